@@ -19,9 +19,9 @@ from posefield.feet import limb_choice
 from posefield.feet.footsteps import Character
 from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield.performance.joins import blends, cut_search, join_quality
-from posefield.performance.joins.blends import Blend
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance import join_quality, joins
+from posefield.performance.joins import Blend
+from posefield.performance.passage import RATE, Passage
 from posefield_train.graph import trained_card
 from posefield_train.source import data_folder, ingest, recipe
 from posefield_train.source.ingest import Example
@@ -82,10 +82,10 @@ def join_peaks(before: Clip, after: Clip, cyclic: bool) -> tuple[float, float]:
     enter = REACH // 2 if cyclic else len(second) // 2
     exits = range(max(leave - REACH + 1, 1), min(leave + 1, len(first)))
     entries = range(max(enter - REACH // 2, 0), min(enter + REACH // 2 + 1, len(second) - 1))
-    cut = cut_search.find_cut(body, first, second, exits, entries)
+    cut = joins.find_cut(body, first, second, exits, entries)
     second = second.placed(cut.motion)
     kinds: tuple[Blend, Blend] = ("hermite" if cyclic else "dead", "cut")
-    blended, plain = (peak(body, blends.join(first, second, cut, kind), cut.exit) for kind in kinds)
+    blended, plain = (peak(body, joins.join(first, second, cut, kind), cut.exit) for kind in kinds)
     return blended, plain
 
 

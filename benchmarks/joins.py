@@ -21,11 +21,10 @@ from posefield.feet.stances import FootPath
 from posefield.motion.clip import Clip
 from posefield.motion.contacts import contact_detection
 from posefield.motion.foot_contacts import FootContact
-from posefield.performance.joins import blends, cut_search, join_quality, join_steps
-from posefield.performance.joins.blends import Blend
-from posefield.performance.joins.cut_search import Cut
-from posefield.performance.joins.join_quality import JoinFacts, UsualMotion
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance import join_quality, joins
+from posefield.performance.join_quality import JoinFacts, UsualMotion
+from posefield.performance.joins import Blend, Cut
+from posefield.performance.passage import RATE, Passage
 from posefield_train.graph import trained_card
 from posefield_train.source import canonical, clip_table, data_folder, ingest, recipe
 
@@ -150,13 +149,13 @@ def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: UsualMotion) 
     else:
         after = other.passage.part(other.event, min(other.event + round(AFTER * RATE), rest))
         exits, entries = 15, 21
-    before, _ = join_steps.on_floor(body, before, own.contacts)
-    after, _ = join_steps.on_floor(body, after, own.contacts)
+    before, _ = join_quality.on_floor(body, before, own.contacts)
+    after, _ = join_quality.on_floor(body, after, own.contacts)
     window = range(len(before) - exits, len(before))
-    cut = cut_search.find_cut(body, before, after, window, range(entries))
+    cut = joins.find_cut(body, before, after, window, range(entries))
     after = after.placed(cut.motion)
-    joined = blends.join(before, after, cut, kind)
-    stepped, _ = join_steps.add_steps(body, before, after, cut, joined)
+    joined = joins.join(before, after, cut, kind)
+    stepped, _ = join_quality.add_steps(body, before, after, cut, joined)
     placed, slides, lowered = _placed(own, stepped, cut)
     found = join_quality.describe_cut((before, after), cut, kind, usual)
     real, blended, peak = (_peak(body, each, cut.exit) for each in (own.passage, joined, placed))
@@ -173,7 +172,7 @@ def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float
     found = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
     placed = Passage(found.rotations, found.roots, passage.contacts, passage.sigmas)
     near = _near(cut.exit, len(passage))
-    points = cut_search.positions(own.character, placed, 0, len(placed))[..., [0, 2]]
+    points = joins.positions(own.character, placed, 0, len(placed))[..., [0, 2]]
     slides = []
     for leg, steps in zip(own.character.legs, plan.steps, strict=True):
         for stance in steps.stances:

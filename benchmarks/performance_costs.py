@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.performance import composition
 from posefield.performance.composition import Composed
-from posefield.performance.passages.passage import RATE
+from posefield.performance.passage import RATE
 from posefield.performance.script import Script, resolve_script
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.synthesis.synthesizer import Synthesizer

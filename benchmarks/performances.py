@@ -28,7 +28,7 @@ from rows import Row, record, table
 from posefield.common.array_shapes import Frames
 from posefield.feet import foot_placement
 from posefield.performance import composition
-from posefield.performance.passages.passage import RATE
+from posefield.performance.passage import RATE
 from posefield.registry import model_registry, shipped_models
 from posefield.synthesis.synthesizer import Synthesizer
 

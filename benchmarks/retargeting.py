@@ -22,8 +22,7 @@ from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import SampledClip, Trust
 from posefield.registry import shipped_models
-from posefield.retarget.retarget_report import RetargetReport
-from posefield.retarget.retargeting import retarget
+from posefield.retarget.retargeting import RetargetReport, retarget
 from posefield.rigs.rig import Rig
 from posefield.rigs.rig_reader import read_rig
 from posefield.synthesis import clips

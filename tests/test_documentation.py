@@ -19,8 +19,8 @@ from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.performance_operations import MAX_SCRIPT_BYTES
-from posefield.performance.joins import join_quality
-from posefield.performance.script_bounds import MAX_SECONDS
+from posefield.performance import join_quality
+from posefield.performance.script import MAX_SECONDS
 from posefield.question import json_decoding
 from posefield.question.performance_batch_question import PerformancesQuestion
 from posefield.question.performance_question import MAX_SEGMENTS, PerformanceQuestion

@@ -7,8 +7,7 @@ import pytest
 
 from posefield.inference import session
 from posefield.motion import skeleton
-from posefield.performance.acts import act_segment, hold_segment
-from posefield.performance.acts.hold_segment import Hold
+from posefield.performance import act_motion, holds
 from posefield.question.motion_question import MotionQuestion, Target
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
@@ -48,7 +47,7 @@ def test_a_return_begins_where_its_controls_say(made):
     card = model.session.card
     hand, example = card.skeleton.names.index("rhand"), card.examples[0]
     controls = {own.name: value for own, value in zip(card.controls, example, strict=True)}
-    found = act_segment.act_passage(model, MotionQuestion(controls=controls))
+    found = act_motion.act_passage(model, MotionQuestion(controls=controls))
     moved = skeleton.translations(found.bones, found.passage.roots)
     path = skeleton.positions(card.skeleton.parents, found.passage.rotations, moved)[:, hand]
     assert found.event == 0
@@ -69,12 +68,10 @@ def test_a_target_at_the_event_of_a_return_gives_its_controls(made):
 
 def test_a_hand_of_a_captured_body_is_held(made):
     _, _, model = made
-    found = act_segment.act_passage(model, MotionQuestion(controls={}))
+    found = act_motion.act_passage(model, MotionQuestion(controls={}))
     card = model.session.card
-    body = hold_segment.body_of(card.skeleton, card.roles, found.bones)
-    held = hold_segment.hold_passage(
-        hold_segment.come_to_rest(found.passage), Hold(2.0, "rhand"), body
-    ).passage
+    body = holds.body_of(card.skeleton, card.roles, found.bones)
+    held = holds.hold_passage(holds.come_to_rest(found.passage), body, 2.0, "rhand")[0]
     moved = skeleton.translations(found.bones, held.roots)
     path = skeleton.positions(body.parents, held.rotations, moved)
     hand, head = (path[:, body.names.index(name)] for name in ("rhand", "head"))

@@ -5,7 +5,7 @@ import skeleton_tables
 from families import quadruped_walk
 
 from posefield.motion.joint_roles import ROLES
-from posefield.roles import body_shape, joint_recognition
+from posefield.roles import joint_recognition
 from posefield_train.sample import noise_free
 
 DEVELOPMENT = skeleton_tables.read("development")
@@ -93,14 +93,14 @@ def standing():
 def test_a_body_that_stands_keeps_its_roles(standing):
     names, guesses, positions = standing
     assert len(guesses) >= 20
-    assert body_shape.check_shape(guesses, names, positions) == guesses
+    assert joint_recognition.check_shape(guesses, names, positions) == guesses
     # The axes of the file do not matter.
-    assert body_shape.check_shape(guesses, names, positions[..., [2, 0, 1]]) == guesses
+    assert joint_recognition.check_shape(guesses, names, positions[..., [2, 0, 1]]) == guesses
 
 
 def test_mirrored_sides_are_asked(standing):
     names, guesses, positions = standing
-    checked = body_shape.check_shape(guesses, names, positions * [-1.0, 1.0, 1.0])
+    checked = joint_recognition.check_shape(guesses, names, positions * [-1.0, 1.0, 1.0])
     unsure = {role for role, guess in checked.items() if not guess.is_sure}
     assert unsure == {role for role in guesses if role.startswith(("left", "right"))}
 
@@ -110,7 +110,7 @@ def test_bones_of_different_lengths_are_asked(standing):
     longer = positions.copy()
     hand, elbow = (names.index(guesses[role].joint) for role in ("leftHand", "leftLowerArm"))
     longer[:, hand] += 0.25 * (positions[:, hand] - positions[:, elbow])
-    checked = body_shape.check_shape(guesses, names, longer)
+    checked = joint_recognition.check_shape(guesses, names, longer)
     unsure = {role for role, guess in checked.items() if not guess.is_sure}
     assert unsure == {"leftHand", "rightHand"}
     assert "units long, left and right" in checked["leftHand"].reasons[0]
@@ -135,6 +135,6 @@ def test_a_quadruped_with_human_names_is_asked():
     names = tuple(human_name(name) for name in own.names)
     guesses = joint_recognition.recognise(names, own.parents)
     assert len(joint_recognition.sure_roles(guesses)) > 10
-    checked = body_shape.check_shape(guesses, names, clip.positions())
+    checked = joint_recognition.check_shape(guesses, names, clip.positions())
     assert joint_recognition.sure_roles(checked) == {}
     assert "as a quadruped's" in checked["hips"].reasons[-1]

@@ -13,7 +13,7 @@ from posefield.common.array_shapes import Positions
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
-from posefield.rigs.rig_roles import NEEDED
+from posefield.rigs.rig import NEEDED
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import proposals
 from posefield_train.probe.proposals import ADULT_LEG, MOST_WHOLE, OTHER_UNIT, Proposal

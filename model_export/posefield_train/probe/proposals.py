@@ -8,7 +8,7 @@ import numpy as np
 
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat, skeleton
-from posefield.roles import body_shape, joint_recognition
+from posefield.roles import joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.source import frame_faults, motion_file
 from posefield_train.source.clip_joints import UNITS
@@ -112,7 +112,7 @@ def measure(file: MotionFile) -> Figure:
     moves = np.ptp(translations, axis=0).max(axis=-1) > 0.0
     return Figure(
         file,
-        body_shape.check_shape(guesses, joints.names, positions),
+        joint_recognition.check_shape(guesses, joints.names, positions),
         positions,
         np.linalg.norm(np.median(translations, axis=0), axis=-1),
         rotations[frames, 0],

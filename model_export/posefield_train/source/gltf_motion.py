@@ -8,11 +8,10 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield.rigs.gltf import gltf_accessors, gltf_document, gltf_skeleton
-from posefield.rigs.gltf.gltf_document import Beside, GltfDocument
-from posefield.rigs.gltf.gltf_skeleton import GltfJoints
-from posefield.rigs.joints import format_faults, posed_joints
-from posefield.rigs.joints.posed_joints import PosedJoints
+from posefield.rigs import gltf_document, gltf_rig, rest_joints
+from posefield.rigs.gltf_document import Beside, GltfDocument
+from posefield.rigs.gltf_rig import GltfJoints
+from posefield.rigs.rest_joints import PosedJoints
 from posefield_train.source import motion_file
 from posefield_train.source.motion_file import MotionFile, ReadOptions, UnevenKeys
 
@@ -50,7 +49,7 @@ def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> M
     without a name chosen, and for keys that are no frames.
     """
     # pygltflib checks no types, so that wrong ones are found where they are used.
-    with format_faults.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
+    with rest_joints.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
         return _read(content, source, beside, options)
 
 
@@ -58,7 +57,7 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
     document = gltf_document.load(content, source, beside)
     name, animation = _chosen(document, options.animation)
     tracks = _tracks(document, animation)
-    joints = gltf_skeleton.joints_of(document, {node for node, _ in tracks})
+    joints = gltf_rig.joints_of(document, {node for node, _ in tracks})
     moving = {*joints.nodes, *joints.outer}
     tracks = {key: track for key, track in tracks.items() if key[0] in moving}
     if not tracks:
@@ -72,7 +71,7 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
             f"found {len(found.times)} frames of {len(joints.nodes)} joints, expected at most "
             f"{MAX_POSES} poses of a joint"
         )
-    plain = posed_joints.plain_motion(_posed(document, joints, tracks, found.times))
+    plain = rest_joints.plain_motion(_posed(document, joints, tracks, found.times))
     return MotionFile(
         source,
         "glTF",
@@ -138,8 +137,8 @@ def _tracks(document: GltfDocument, animation: Any) -> Tracks:
 
 
 def _track(document: GltfDocument, sampler: Any, part: str) -> Track:
-    times = gltf_accessors.numbers(document, sampler.input, "SCALAR")[:, 0]
-    values = gltf_accessors.numbers(document, sampler.output, KINDS[part])
+    times = gltf_document.numbers(document, sampler.input, "SCALAR")[:, 0]
+    values = gltf_document.numbers(document, sampler.output, KINDS[part])
     if part == "rotation":
         values = values[:, [3, 0, 1, 2]]
     kind = sampler.interpolation or "LINEAR"
@@ -179,7 +178,7 @@ def _posed(
         joints.names,
         joints.parents,
         joints.rest_rotations,
-        gltf_skeleton.rest_places(document, joints),
+        gltf_rig.rest_places(document, joints),
         turns,
         places,
         scales,
@@ -190,7 +189,7 @@ def _sampled(
     document: GltfDocument, node: int, tracks: Tracks, times: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return rotation (F, 4), translation (F, 3) and scale (F, 3) of a node."""
-    still = gltf_skeleton.node_transform(document, node)
+    still = gltf_rig.node_transform(document, node)
     found = []
     for part, rest in zip(KINDS, (still.rotation, still.translation, still.scale), strict=True):
         track = tracks.get((node, part))

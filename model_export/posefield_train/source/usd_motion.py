@@ -10,12 +10,9 @@ from pxr import UsdGeom, UsdSkel
 from posefield.common.array_shapes import Positions, Rotations
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield.rigs.joints import format_faults, posed_joints
-from posefield.rigs.joints.posed_joints import PosedJoints
-from posefield.rigs.joints.rest_joints import MAX_JOINTS
-from posefield.rigs.usd import usd_stage
-from posefield.rigs.usd.skel_joints import SkelJoints
-from posefield.rigs.usd.usd_stage import SkelStage
+from posefield.rigs import rest_joints, usd_rig
+from posefield.rigs.rest_joints import MAX_JOINTS, PosedJoints
+from posefield.rigs.usd_rig import SkelJoints, SkelStage
 from posefield_train.source import motion_file
 from posefield_train.source.motion_file import MotionFile, ReadOptions, UnevenKeys
 
@@ -120,12 +117,12 @@ def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     """
     # usd-core finds damage of values when they are read: its own errors are RuntimeErrors, and
     # names of joints may be no text.
-    with format_faults.naming_faults(source, RuntimeError, ValueError, TypeError):
+    with rest_joints.naming_faults(source, RuntimeError, ValueError, TypeError):
         return _read(path, source, options)
 
 
 def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
-    opened = usd_stage.open_stage(path, source)
+    opened = usd_rig.open_stage(path, source)
     motion = _chosen(opened, options.animation)
     codes = motion.sample_codes()
     pace, notes = _codes_per_second(opened)
@@ -143,7 +140,7 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
         )
     # The samples themselves, where the rate is theirs.
     exact = codes if options.rate is None else found.times * pace
-    plain = posed_joints.plain_motion(motion.posed_joints(exact))
+    plain = rest_joints.plain_motion(motion.posed_joints(exact))
     stage = opened.stage
     has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
     is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
@@ -183,7 +180,7 @@ def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
     prim = (bound or skeletons)[0]
     query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(prim))
     if not query:
-        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {usd_stage.fault_of(prim)}")
+        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {usd_rig.fault_of(prim)}")
     own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
     if not own:
         raise opened.error(f"{animation.GetPath()} names no joints, expected those of a skeleton")

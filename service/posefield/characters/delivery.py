@@ -20,8 +20,7 @@ from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import HeldJoint, PerformanceAnswer, ScriptWarning
 from posefield.question.results import ClipAnswer, FeetResult, SampledClip, StanceResult
 from posefield.retarget import role_map
-from posefield.retarget.retarget_report import HandGoal, RetargetSettings
-from posefield.retarget.retargeting import Retargeted, retarget
+from posefield.retarget.retargeting import HandGoal, Retargeted, RetargetSettings, retarget
 
 ARM = ("UpperArm", "LowerArm", "Hand")
 CLOSED = 1e-3

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from starlette.types import Receive, Scope, Send
 
-from posefield.characters import character_folder
-from posefield.characters.character_folder import EMPTY, CharacterFolder
+from posefield.characters import user_character
+from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common.errors import UnknownFormat
 from posefield.common.name_suggestion import did_you_mean
 from posefield.http import request_cycle
@@ -95,7 +95,7 @@ def _characters(settings: Settings) -> CharacterFolder:
     """Return the characters of users; a file that cannot be used is logged and stops no other."""
     if not settings.characters:
         return EMPTY
-    found = character_folder.read_folder(Path(settings.characters), settings.character_prefix)
+    found = user_character.read_folder(Path(settings.characters), settings.character_prefix)
     for fault in found.faults:
         log.warning("character %s cannot be used: %s", fault.file, fault.reason)
     return found

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from posefield.characters.character_folder import EMPTY, CharacterFolder
+from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.http.access.access_control import AccessPolicy
 from posefield.http.api.settings import Settings
 from posefield.http.concurrency.clip_batching import ClipBatcher

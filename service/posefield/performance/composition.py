@@ -13,12 +13,10 @@ from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import FeetPlan, SampledMotion
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip, assemble
-from posefield.performance import act_steps, hold_steps, reporting, walk_steps
-from posefield.performance.acts.staged_act import StagedAct
-from posefield.performance.joins import join_quality
-from posefield.performance.joins.join_quality import JoinFacts
-from posefield.performance.passages import limb_targets
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance import acts, holds, join_quality, limb_targets, reporting, walk_steps
+from posefield.performance.act_motion import StagedAct
+from posefield.performance.join_quality import JoinFacts
+from posefield.performance.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
 from posefield.performance.timeline import Composed, Timeline, from_poses, resample
 from posefield.question.performance_question import Act, Hold, Segment, Walk
@@ -126,10 +124,10 @@ def compose(script: Script) -> Composed:
             if isinstance(own, Walk):
                 staged = walk_steps.add_walk(timeline, script, index, ahead)
             elif isinstance(own, Hold):
-                hold_steps.add_hold(timeline, script, index)
+                holds.add_hold(timeline, script, index)
             else:
-                act = staged or act_steps.stage_at_join(timeline, script, index)
-                act_steps.add_act(timeline, script, act)
+                act = staged or acts.stage_at_join(timeline, script, index)
+                acts.add_act(timeline, script, act)
                 staged = None
             timeline.check_duration()
     motion, missed = limb_targets.meet_targets(
@@ -162,14 +160,14 @@ def _stage_ahead(script: Script, index: int) -> StagedAct | None:
     if not _is_open(script.segments[index]):
         return None
     following = script.segments[index + 1] if index + 1 < len(script.segments) else None
-    if not isinstance(following, Act) or not act_steps.has_place(following):
+    if not isinstance(following, Act) or not acts.has_place(following):
         raise InvalidField(
             f"segments/{index}",
             "a walk without along, to or seconds, expected one of them, or an act with a place "
             "after it: at, or a target in the world",
         )
     with errors_under("segments", index + 1):
-        return act_steps.stage_after_walk(script, index + 1)
+        return acts.stage_after_walk(script, index + 1)
 
 
 def frame_times(composed: Composed, fps: float, most: int) -> Frames:

@@ -1,4 +1,4 @@
-"""Scripts whose models and character are known, checked before any motion is made."""
+"""Scripts whose models, numbers and character are checked before any motion is made."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,21 +19,117 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion import joint_roles
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.skeleton import Skeleton
-from posefield.performance import script_bounds
-from posefield.performance.joins import join_steps
-from posefield.performance.passages import skeleton_match
-from posefield.performance.passages.passage import Passage
-from posefield.performance.passages.skeleton_match import SkeletonMatch, SkeletonsDiffer
+from posefield.performance import join_quality
+from posefield.performance.passage import (
+    Passage,
+    SkeletonMatch,
+    SkeletonsDiffer,
+    leg_share,
+    match_skeletons,
+    scale_heights,
+)
 from posefield.question.motion_question import MotionQuestion
 from posefield.question.performance_question import (
     Act,
+    Curve,
     Hold,
     PerformanceQuestion,
     Segment,
     Walk,
 )
+from posefield.question.value_validation import check_number, check_range, check_take
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
+
+MOST_PLACE, MOST_ANGLE, MOST_RADIUS, MOST_RATE = 1e4, 1e3, 1e3, 1e3
+"""Largest coordinates, m, angles, rad, radii, m, and speeds, m/s or rad/s."""
+MIN_SECONDS, MAX_SECONDS = 0.1, 600.0
+"""Shortest segment with a duration of its own, and longest performance, s."""
+MIN_FPS, MAX_FPS = 1.0, 240.0
+MAX_BLEND = 5.0
+"""Longest time of a blend, s."""
+
+Bounded = tuple[str, float, float, float, str]
+"""Field, value, least, most and unit."""
+
+
+def check_bounds(question: PerformanceQuestion) -> None:
+    """Raise InvalidField for a number out of bounds, with a pointer into the script."""
+    for field, value, low, high, unit in _numbers(question):
+        check_range(field, check_number(field, value), low, high, unit)
+    for field, value, unit in _positive(question):
+        if not value > 0.0:
+            raise InvalidField(field, f"{value:.9g} {unit}, expected more than 0 {unit}")
+    check_take(question.take, question.variety)
+    if isinstance(question.segments[0], Hold) and not question.start.poses:
+        raise InvalidField("segments/0", "a hold, expected a walk or an act before it")
+
+
+def check_level(level: int, models: Sequence[Synthesizer | None]) -> None:
+    """Raise InvalidField for a level of detail that a model does not have."""
+    for model in models:
+        count = 0 if model is None else len(model.session.card.levels)
+        if model is not None and not 0 <= level < count:
+            name = model.session.card.name
+            raise InvalidField("level", f"{level}, expected 0 to {count - 1}, as {name} has")
+
+
+def _numbers(question: PerformanceQuestion) -> Iterator[Bounded]:
+    yield "fps", question.fps, MIN_FPS, MAX_FPS, "frames/s"
+    yield from _places("start/position", question.start.position)
+    yield "start/heading", question.start.heading, -MOST_ANGLE, MOST_ANGLE, "rad"
+    for index, disc in enumerate(question.obstacles):
+        yield from _places(f"obstacles/{index}/position", disc.position)
+        yield f"obstacles/{index}/radius", disc.radius, -MOST_RADIUS, MOST_RADIUS, "m"
+    for index, own in enumerate(question.segments):
+        yield from _of_segment(f"segments/{index}", own)
+
+
+def _positive(question: PerformanceQuestion) -> Iterator[tuple[str, float, str]]:
+    """Yield field, value and unit of what is more than 0."""
+    for index, disc in enumerate(question.obstacles):
+        yield f"obstacles/{index}/radius", disc.radius, "m"
+    for index, own in enumerate(question.segments):
+        if not isinstance(own, Hold):
+            field, join = f"segments/{index}/join", own.join
+            yield f"{field}/seconds", math.inf if join.seconds is None else join.seconds, "s"
+            yield f"{field}/most", math.inf if join.most is None else join.most, "m"
+
+
+def _of_segment(field: str, own: Segment) -> Iterator[Bounded]:
+    if not isinstance(own, Act) and own.seconds is not None:
+        yield f"{field}/seconds", own.seconds, MIN_SECONDS, MAX_SECONDS, "s"
+    if not isinstance(own, Hold) and own.join.seconds is not None:
+        yield f"{field}/join/seconds", own.join.seconds, -MAX_BLEND, MAX_BLEND, "s"
+    if not isinstance(own, Hold) and own.join.most is not None:
+        yield f"{field}/join/most", own.join.most, -MOST_PLACE, MOST_PLACE, "m"
+    if isinstance(own, Walk):
+        yield from _curve(f"{field}/turn", own.turn, "rad/s")
+        yield from _curve(f"{field}/speed", own.speed, "m/s")
+        for index, point in enumerate(own.along or ()):
+            yield from _places(f"{field}/along/{index}", point)
+        yield from _places(f"{field}/to", own.to or ())
+    if isinstance(own, Act):
+        yield from _places(f"{field}/at", own.at or ())
+        if own.facing is not None:
+            yield f"{field}/facing", own.facing, -MOST_ANGLE, MOST_ANGLE, "rad"
+    if isinstance(own, Hold):
+        yield from _places(f"{field}/look_at", own.look_at or ())
+
+
+def _curve(field: str, curve: float | Curve | None, unit: str) -> Iterator[Bounded]:
+    if isinstance(curve, int | float):
+        yield field, curve, -MOST_RATE, MOST_RATE, unit
+        return
+    for index, (place, value) in enumerate(curve or ()):
+        yield f"{field}/{index}/0", place, -MOST_PLACE, MOST_PLACE, ""
+        yield f"{field}/{index}/1", value, -MOST_RATE, MOST_RATE, unit
+
+
+def _places(field: str, values: Sequence[float]) -> Iterator[Bounded]:
+    for axis, value in enumerate(values):
+        yield f"{field}/{axis}", value, -MOST_PLACE, MOST_PLACE, "m"
+
 
 # Characters whose bones are kept, by model, controls and labels; 1 kB each.
 KEPT_BONES = 256
@@ -73,7 +169,7 @@ class Source:
 
     def adapted(self, passage: Passage) -> Passage:
         """Return a passage of the model as one of the character."""
-        roots = skeleton_match.scale_heights(passage.roots, self.share)
+        roots = scale_heights(passage.roots, self.share)
         return Passage(
             self.match.rotations(passage.rotations),
             roots,
@@ -120,7 +216,7 @@ class Script:
         source, own = self.sources[segment], self.character
         if source is None:
             return passage
-        return join_steps.on_floor(own.body, source.adapted(passage), own.contacts)[0]
+        return join_quality.on_floor(own.body, source.adapted(passage), own.contacts)[0]
 
     @property
     def contacts(self) -> tuple[FootContact, ...]:
@@ -170,9 +266,9 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
     pointer into the script, for a model that cannot play its part, for skeletons that differ, and
     for numbers out of range.
     """
-    script_bounds.check_bounds(question)
+    check_bounds(question)
     models = [_model(index, own, find) for index, own in enumerate(question.segments)]
-    script_bounds.check_level(question.level, models)
+    check_level(question.level, models)
     character = _character(question, models, find)
     # Refused here, as a plan refuses what its performance would.
     joint_roles.rename_joints(character.skeleton, character.roles, question.names)
@@ -278,7 +374,7 @@ def _source(
     """Return the model of a segment as a source of the character's poses."""
     card, field = model.session.card, f"segments/{index}/model"
     try:
-        match = skeleton_match.match(card.skeleton, character.skeleton, character.feet)
+        match = match_skeletons(card.skeleton, character.skeleton, character.feet)
     except SkeletonsDiffer as fault:
         raise InvalidField(
             field, f"{card.name} has another skeleton than {character.identity}: {fault}"
@@ -286,7 +382,7 @@ def _source(
     feet = _feet(field, card, character)
     whose = MotionQuestion(controls={}, performer=segment.performer, labels=segment.labels)
     own = _bones(model, whose)
-    share = skeleton_match.leg_share(card.skeleton.parents, own, character.bones, character.feet)
+    share = leg_share(card.skeleton.parents, own, character.bones, character.feet)
     with errors_under("segments", index):
         walks = model.gait if card.cyclic else None
     return Source(model, match, share, feet, walks)

@@ -10,15 +10,13 @@ from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.errors import InvalidField
 from posefield.common.units import Booleans, Floats
 from posefield.motion import quat
-from posefield.performance.joins import blends, cut_search, join_quality, join_steps
-from posefield.performance.joins.blends import Blend
-from posefield.performance.joins.cut_search import Cut
-from posefield.performance.joins.join_quality import CutFacts, UsualMotion
-from posefield.performance.passages.limb_targets import WorldTarget
-from posefield.performance.passages.passage import RATE, FloorMotion, Passage
-from posefield.performance.script import ScriptCharacter
-from posefield.performance.script_bounds import MAX_SECONDS
-from posefield.performance.walks.walk_segment import WalkPlan
+from posefield.performance import join_quality, joins
+from posefield.performance.join_quality import CutFacts, UsualMotion
+from posefield.performance.joins import Blend, Cut
+from posefield.performance.limb_targets import WorldTarget
+from posefield.performance.passage import RATE, FloorMotion, Passage
+from posefield.performance.script import MAX_SECONDS, ScriptCharacter
+from posefield.performance.walk_plan import WalkPlan
 from posefield.question.performance_question import GivenPose, Join
 from posefield.question.performance_report import Reference, ScriptWarning, SegmentKind
 from posefield.question.results import ConstraintResult
@@ -91,9 +89,7 @@ class Timeline:
 
     def find_cut(self, after: Passage, entries: range, motion: FloorMotion | None = None) -> Cut:
         """Return the best cut from an exit of the motion to an entry of a passage."""
-        return cut_search.find_cut(
-            self.character.body, self.done, after, self.exits, entries, motion
-        )
+        return joins.find_cut(self.character.body, self.done, after, self.exits, entries, motion)
 
     def warn(self, pointer: str, message: str) -> None:
         """Add a warning, once."""
@@ -126,15 +122,15 @@ class Timeline:
         last = len(self.done) - 1
         cut = Cut(last, 0, FloorMotion(), 0.0, 0.0)
         own = self._usual(placed)
-        self.motion, self.usual = blends.join(self.done, placed, cut, "hermite"), own
+        self.motion, self.usual = joins.join(self.done, placed, cut, "hermite"), own
         return last
 
     def join(self, segment: int, placed: Passage, cut: Cut, kind: Blend, seconds: float) -> int:
         """Go on with a placed passage from a cut; return the frame of its own first frame."""
         before, body = self.done, self.character.body
         fits = min(seconds, max(len(placed) - 1 - cut.entry, 0) / RATE)
-        joined = blends.join(before, placed, cut, kind, fits)
-        self.motion, _ = join_steps.add_steps(body, before, placed, cut, joined)
+        joined = joins.join(before, placed, cut, kind, fits)
+        self.motion, _ = join_quality.add_steps(body, before, placed, cut, joined)
         own = self._usual(placed)
         reference: Reference = "captured" if self.captured else "synthesised"
         usual = UsualMotion(max(self.usual, own), reference)
@@ -181,7 +177,7 @@ def choose_blend(join: Join, gaits: tuple[bool, bool]) -> tuple[Blend, float]:
     kind: Blend = ("hermite" if gaits[1] else "dead") if join.blend == "auto" else join.blend
     if kind == "cut":
         return kind, 0.0
-    usual = blends.SECONDS["hermite"] if all(gaits) else blends.SECONDS["dead"]
+    usual = joins.SECONDS["hermite"] if all(gaits) else joins.SECONDS["dead"]
     return kind, usual if join.seconds is None else join.seconds
 
 

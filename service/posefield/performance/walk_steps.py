@@ -1,16 +1,226 @@
-"""Walks of a script: planned, joined to the segment before, and recorded in the timeline."""
+"""Walks of a script: planned, joined to the segment before, and recorded in the timeline.
 
-from dataclasses import replace
+A walk that leads to an act ends in the phase and in the place from which the act goes on. Where an
+act lies is known from one cycle of the walk: in the frame that travels with the walker a pose
+hardly depends on the path. So the end of the path follows from the place of the act in closed form,
+and a second plan is already within a centimetre.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
-from posefield.performance import approach
-from posefield.performance.acts.staged_act import StagedAct
+from posefield.common import cancellation
+from posefield.common.units import Floats
+from posefield.feet.footsteps import Character
+from posefield.locomotion import floor_plane
+from posefield.performance import joins, walk_entries, walk_plan
+from posefield.performance.act_motion import StagedAct
+from posefield.performance.joins import Cut
+from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
 from posefield.performance.walk_entries import WalkEntry, find_entry, synthesis_settings, walk_of
-from posefield.performance.walks import walk_passage, walk_phases, walk_segment
-from posefield.performance.walks.walk_segment import WalkPlan
+from posefield.performance.walk_plan import WalkPlan
+from posefield.question.performance_question import Act
+
+# Plans that are made so that the act after a walk lies where it should, and the smallest shift, m,
+# and turn, rad, for which one more is made.
+APPROACHES, NEAR, STRAIGHT = 8, 0.01, 0.01
+MOST_CHANGED = 0.08
+"""Share by which strides are made longer or shorter so that a walk ends in a phase."""
+BENT, LINE_SHARE = 1e-6, 0.3
+"""Curvature from which on a path is no line, 1/m, and the part of a curve that is taken for one."""
+MOVING = 0.05
+"""Smallest distance that an act moves in `ENTRY_SECONDS` for it to have a direction, m."""
+ENTRY_SECONDS = 0.35
+"""Time from the start of an act in which a motion may go on into it, s."""
+
+
+@dataclass(frozen=True)
+class LastCycle:
+    """Last cycle of a walk, and an act that goes on from one of its frames.
+
+    plan: of the cycle. poses: of the character. entries: frames of the act.
+    """
+
+    character: Character
+    plan: WalkPlan
+    poses: Passage
+    act: Passage
+    entries: range
+
+    @property
+    def exits(self) -> range:
+        """Frames from which the act may go on: the last one of a walk that ends standing."""
+        return range(len(self.poses) - 1 if self.plan.closes else 0, len(self.poses))
+
+    def find_cut(self, runs: Sequence[range]) -> Cut:
+        """Return the best cut from frames of the cycle; of equal ones the first."""
+        found = [
+            joins.find_cut(self.character, self.poses, self.act, exits, self.entries)
+            for exits in runs
+        ]
+        return min(found, key=lambda own: round(own.cost / joins.GRAIN))
+
+    def lies(self, cut: Cut) -> FloorMotion:
+        """Return where the act lies in the frame that travels with the walker at the exit."""
+        return _travelling(self.plan, cut.exit).inverse().after(cut.motion)
+
+    def reachable(self, plan: WalkPlan, free: bool) -> list[range]:
+        """Return the frames in whose phases another plan can end, in runs; the nearest if none."""
+        gaps = np.abs(_gaps(self.plan.phases, plan))
+        most = np.inf if free else MOST_CHANGED * float(plan.phases[-1] - plan.phases[0])
+        near = gaps <= max(most, float(gaps.min()))
+        edges = np.flatnonzero(np.diff(near, prepend=False, append=False)).tolist()
+        return [range(*own) for own in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def lead_to(
+    timeline: Timeline, script: Script, index: int, entry: WalkEntry, staged: StagedAct
+) -> tuple[WalkPlan, StagedAct]:
+    """Return the plan of a walk whose end leads into an act, and the act with its place.
+
+    A first plan tells from which phase of the cycle the act goes on best, and where the act then
+    lies; the next ones end in it, or in the best of those that their strides can be changed to, so
+    that the act lies where it should. An act without a heading of its own faces the way the walk
+    comes.
+    """
+    by = staged.by or staged.facing(float(np.angle(staged.goal - entry.start.shift)))
+    act = script.adapted(staged.segment, staged.act.passage)
+    plan = _plan_to(script, index, entry, by.after(_arrival(act)), staged)
+    entries = entries_of(script, staged, len(act))
+    cycle = _last_cycle(script, index, plan, (act, entries))
+    # A walk that begins standing begins in its own phase.
+    free = timeline.motion is None and plan.standing is None
+    cut = cycle.find_cut([cycle.exits])
+    for _ in range(APPROACHES):
+        cancellation.check()
+        rest = cycle.lies(cut).inverse().after(_trail(plan))
+        by = staged.by or staged.facing(staged.act.heading + _turn(plan, rest, by, staged.goal))
+        plan = _plan_to(script, index, entry, by.after(rest), staged)
+        if plan.closes:
+            # Where a walk stands depends on the foot that closes.
+            cycle = _last_cycle(script, index, plan, (act, entries))
+        runs = [cycle.exits] if plan.closes else cycle.reachable(plan, free)
+        if plan.closes or not any(cut.exit in own for own in runs):
+            cut = cycle.find_cut(runs)
+        shown = _travelling(plan, -1).after(cycle.lies(cut))
+        by = staged.by or staged.facing(staged.act.heading + shown.turn)
+        away = by.after(shown.inverse())
+        if abs(away.shift) < NEAR and abs(away.turn) < STRAIGHT:
+            break
+    if not plan.closes:
+        plan = _ending_in(plan, float(cycle.plan.phases[cut.exit]), free)
+    return plan, replace(staged, by=by, adapted=act)
+
+
+def _turn(plan: WalkPlan, rest: FloorMotion, by: FloorMotion, goal: complex) -> float:
+    """Return the turn of an act at a goal, rad, for which a path like that of a plan faces it.
+
+    rest: end of the path in the frame of the act. by: places the act with another turn. The path
+    ends with a line, which turns about its begin when its end moves: it is the tangent from there
+    to the circle about the goal on which the path ends.
+    """
+    begin = plan.end.shift - _line(plan) * np.exp(1j * plan.end.turn)
+    away = goal - begin
+    point = np.exp(-1j * by.turn) * (goal - by.shift)
+    aside = (np.exp(-1j * rest.turn) * (rest.shift - point)).imag
+    heading = np.angle(away) + np.arcsin(np.clip(aside / max(abs(away), 1e-9), -1.0, 1.0))
+    return float(heading - rest.turn)
+
+
+def _line(plan: WalkPlan) -> float:
+    """Return the length of the line with which the path of a plan ends, m, or a part of a curve."""
+    bent = np.flatnonzero(np.abs(plan.path.curvatures) > BENT)
+    begins = plan.path.distances[bent[-1]] if len(bent) else 0.0
+    return max(plan.path.length - float(begins), LINE_SHARE * plan.path.length)
+
+
+def _plan_to(
+    script: Script, index: int, entry: WalkEntry, end: FloorMotion, staged: StagedAct
+) -> WalkPlan:
+    """Return the plan of a walk to a place; with the heading there of an act that has one."""
+    _, source = walk_of(script, index)
+    goal = {"end": end} if staged.by else {"to": (end.shift.imag, end.shift.real)}
+    asked = replace(entry.request, **goal)
+    return walk_plan.plan_walk(source.gait, asked, entry.start, entry.phase)
+
+
+def _last_cycle(
+    script: Script, index: int, plan: WalkPlan, act: tuple[Passage, range]
+) -> LastCycle:
+    """Return the last cycle of a plan for an act with the frames at which it may be entered."""
+    _, source = walk_of(script, index)
+    last = plan.part(int(np.argmax(plan.phases >= plan.phases[-1] - 1.0)), len(plan))
+    poses = source.adapted(
+        walk_entries.walk_passage(source.model, last, synthesis_settings(script.question))
+    )
+    return LastCycle(script.character.body, last, poses, *act)
+
+
+def _travelling(plan: WalkPlan, frame: int) -> FloorMotion:
+    """Return the frame that travels with the walker."""
+    return FloorMotion(float(plan.headings[frame]), complex(plan.places[frame]))
+
+
+def _trail(plan: WalkPlan) -> FloorMotion:
+    """Return the end of a plan's path in the frame that travels with the walker there."""
+    return _travelling(plan, -1).inverse().after(plan.end)
+
+
+def _gaps(phases: Annotated[Floats, "frames"], plan: WalkPlan) -> Annotated[Floats, "frames"]:
+    """Return signed differences (F,) of phases from that in which a plan ends, in cycles."""
+    found: Floats = (phases - plan.phases[-1] + 0.5) % 1.0 - 0.5
+    return found
+
+
+def entry_range(frames: int, event: int | None) -> range:
+    """Return the frames of an act at which a motion may go on into it: before its event."""
+    last = event or frames - 1
+    return range(max(min(round(ENTRY_SECONDS * RATE), last), 1))
+
+
+def entries_of(script: Script, staged: StagedAct, frames: int) -> range:
+    """Return the frames at which a motion may go on into an act, so that no target is cut off."""
+    stop = entry_range(frames, staged.act.event).stop
+    return range(min([stop, *(frame + 1 for frame in target_frames(script, staged))]))
+
+
+def target_frames(script: Script, staged: StagedAct) -> list[int]:
+    """Return the frames of an act at which its targets hold; none for a motion without targets."""
+    own, source = script.segments[staged.segment], script.sources[staged.segment]
+    if not isinstance(own, Act) or source is None:
+        return []
+    skeleton = source.model.session.card.skeleton
+    return [
+        staged.act.frame_of(each.when, skeleton.parents, skeleton.names.index(each.joint))
+        for each in own.targets
+    ]
+
+
+def _arrival(act: Passage) -> FloorMotion:
+    """Return where a walk should end for an act: at its first root, the way it moves."""
+    frames = min(round(ENTRY_SECONDS * RATE), len(act) - 1)
+    places = floor_plane.project(act.roots[[0, frames]])
+    moved = complex(places[1] - places[0])
+    turned = float(np.angle(moved)) if abs(moved) > MOVING else act.heading(0)
+    return FloorMotion(turned, complex(places[0]))
+
+
+def _ending_in(plan: WalkPlan, phase: float, free: bool) -> WalkPlan:
+    """Return a plan that ends in a phase of the cycle, or as near to it as strides allow.
+
+    free: whether the walk may begin in any phase; strides are made longer or shorter if not.
+    """
+    gap = float(_gaps(np.array([phase]), plan)[0])
+    if free:
+        return replace(plan, phases=plan.phases + gap)
+    whole = float(plan.phases[-1] - plan.phases[0])
+    share = float(np.clip(gap / max(whole, 1e-9), -MOST_CHANGED, MOST_CHANGED))
+    return replace(plan, phases=plan.phases[0] + (plan.phases - plan.phases[0]) * (1.0 + share))
 
 
 def add_walk(
@@ -24,9 +234,9 @@ def add_walk(
     entry = find_entry(timeline, script, index)
     if ahead is None:
         _, source = walk_of(script, index)
-        plan = walk_segment.plan_walk(source.gait, entry.request, entry.start, entry.phase)
+        plan = walk_plan.plan_walk(source.gait, entry.request, entry.start, entry.phase)
     else:
-        plan, ahead = approach.lead_to(timeline, script, index, entry, ahead)
+        plan, ahead = lead_to(timeline, script, index, entry, ahead)
     _add(timeline, script, index, (plan, entry))
     return ahead
 
@@ -36,7 +246,7 @@ def _add(
 ) -> None:
     (own, source), (plan, entry) = walk_of(script, index), planned
     passage = script.adapted(
-        index, walk_passage.walk_passage(source.model, plan, synthesis_settings(script.question))
+        index, walk_entries.walk_passage(source.model, plan, synthesis_settings(script.question))
     )
     first = 0
     if entry.continues:
@@ -58,7 +268,7 @@ def _record(timeline: Timeline, script: Script, plan: WalkPlan, place: tuple[int
     card, notes = source.model.session.card, [note.message for note in plan.notes]
     for note in plan.notes:
         # How a step is made is told by the notes of the segment alone.
-        if note.code.startswith(walk_phases.SYNTHESISED):
+        if note.code.startswith(walk_plan.SYNTHESISED):
             continue
         # Obstacles are those of the whole script; the end of a walk to an act is no field of it.
         if note.field.startswith("obstacles"):

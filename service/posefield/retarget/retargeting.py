@@ -1,30 +1,235 @@
-"""Retargeting of a clip to a rig: orientations by role, then pelvis, feet and hands."""
+"""Retargeting of a clip to a rig: orientations by role, then pelvis, feet and hands; its report."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import RootPath
-from posefield.common.units import UP
+from posefield.common.array_shapes import Frames, RootPath, Vector
+from posefield.common.errors import InvalidField
+from posefield.common.units import UP, Booleans, Floats, round_micrometres
+from posefield.feet.two_bone import shortest_turn
+from posefield.motion import blend, quat, skeleton
 from posefield.motion import clip as clips
-from posefield.motion import skeleton
 from posefield.motion.clip import Clip
-from posefield.retarget import (
-    copied_pose,
-    foot_paths,
-    hand_goals,
-    planted_legs,
-    reference_pose,
-    retarget_measures,
-    role_map,
-)
-from posefield.retarget.foot_paths import FLOOR, SourceFeet
-from posefield.retarget.planted_legs import PlantedLegs, PosedRig, RigSoles
-from posefield.retarget.rest_alignment import Soles
-from posefield.retarget.retarget_report import USUAL, HandGoal, RetargetReport, RetargetSettings
+from posefield.question.results import StanceResult
+from posefield.retarget import copied_pose, planted_legs, role_map
+from posefield.retarget.copied_pose import Soles
+from posefield.retarget.planted_legs import FLOOR, PlantedLegs, PosedRig, RigSoles, SourceFeet
 from posefield.retarget.role_map import SIDES, Body
 from posefield.rigs.rig import Rig
+
+Travel = Literal["scaled", "kept"]
+"""Way of the root: in proportion to the legs, or as the motion has it, for places in the world."""
+
+
+@dataclass(frozen=True)
+class HandGoal:
+    """A point in the world that a hand meets: `position` (3,), m, at `time`, s, from the start.
+
+    role: leftHand or rightHand. until: time until which it stays there, s; None for the moment.
+    """
+
+    role: str
+    time: float
+    position: Vector
+    until: float | None = None
+
+    @property
+    def end(self) -> float:
+        """Return the last time at which the hand is there, s."""
+        return self.time if self.until is None else self.until
+
+
+@dataclass(frozen=True)
+class RetargetSettings:
+    """Settings of retargeting.
+
+    stances: of the motion's feet; None to detect them. hands: exact targets of hands, which are
+    kept. travel: of the root.
+    """
+
+    stances: Sequence[StanceResult] | None = None
+    hands: Sequence[HandGoal] = ()
+    travel: Travel = "scaled"
+
+
+USUAL = RetargetSettings()
+
+
+@dataclass(frozen=True)
+class RetargetReport:
+    """Facts about a retargeted motion.
+
+    mapped: roles of the motion that the rig follows. missing: roles of the motion that the rig
+    lacks. scale: length of the rig's legs over that of the motion's. skate_source, skate_copied,
+    skate: mean foot skate of the motion in proportion to the legs, of its copied orientations, and
+    of the result, while the motion's feet stand, m/s. legs_turned: mean angle between the bones of
+    legs as copied and as given, rad. lowered: most by which the pelvis was lowered so that the legs
+    reach, m. penetration: 99th percentile of the depth of soles below the floor, m. hands_missed:
+    distance of each hand from its goal, m. warnings: sentences for the user.
+    """
+
+    mapped: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    scale: float = 1.0
+    skate_source: float = 0.0
+    skate_copied: float = 0.0
+    skate: float = 0.0
+    legs_turned: float = 0.0
+    lowered: float = 0.0
+    penetration: float = 0.0
+    hands_missed: tuple[float, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def facts(self) -> dict[str, Any]:
+        """Return the fields as plain values, lengths rounded to micrometres."""
+        found = asdict(self)
+        for name, value in found.items():
+            if isinstance(value, float):
+                found[name] = round_micrometres(value)
+        found["hands_missed"] = tuple(map(round_micrometres, self.hands_missed))
+        return found
+
+
+PERCENTILE = 99.0
+
+
+def measure(feet: SourceFeet, made: PlantedLegs, scale: float, rate: float) -> RetargetReport:
+    """Return the report on a motion with planted feet, without its roles, hands and warnings.
+
+    feet: of the motion, in proportion. scale: length of the rig's legs over the motion's.
+    """
+    paths = [
+        np.stack([own.of_role(role) for role in feet.roles], axis=1)
+        for own in (made.copied, made.rig)
+    ]
+    before, copied, after = (skate(own, feet.standing, rate) for own in (feet.paths, *paths))
+    return RetargetReport(
+        scale=scale,
+        skate_source=before,
+        skate_copied=copied,
+        skate=after,
+        legs_turned=legs_turned(made.copied, made.rig),
+        lowered=float(made.lowered.max()),
+        penetration=penetration(made.depths),
+    )
+
+
+def skate(
+    paths: Annotated[Floats, "frames feet 3"],
+    standing: Annotated[Booleans, "frames feet"],
+    rate: float,
+) -> float:
+    """Return the mean speed of feet over the floor while they stand, m/s; 0 if they never do.
+
+    paths (F, 2, 3), m. standing (F, 2): of the motion's feet.
+    """
+    both = standing[1:] & standing[:-1]
+    speeds = rate * np.linalg.norm(np.diff(paths, axis=0) * (1.0 - UP), axis=-1)
+    return float(np.sum(speeds * both) / max(int(both.sum()), 1))
+
+
+def legs_turned(copied: PosedRig, made: PosedRig) -> float:
+    """Return the mean angle between the bones of legs in two poses, rad."""
+    angles = []
+    for side in SIDES:
+        for upper, lower in (("UpperLeg", "LowerLeg"), ("LowerLeg", "Foot")):
+            ends = [own.of_role(side + lower) - own.of_role(side + upper) for own in (copied, made)]
+            angles.append(np.linalg.norm(quat.log(shortest_turn(*ends)), axis=-1))
+    return float(np.mean(angles))
+
+
+def penetration(depths: Annotated[Floats, "frames feet"]) -> float:
+    """Return the 99th percentile of the depths (F, 2) of soles below the floor, m."""
+    return float(np.percentile(np.maximum(depths, 0.0), PERCENTILE))
+
+
+FADE = 0.4
+"""Time before and after a goal over which the arm turns to it and back, s."""
+ARMS = {
+    side + "Hand": tuple(side + part for part in ("UpperArm", "LowerArm", "Hand"))
+    for side in ("left", "right")
+}
+
+
+def check_goals(goals: Sequence[HandGoal], rig: PosedRig, rate: float) -> None:
+    """Raise InvalidField for a goal of no hand of the rig, or outside the motion."""
+    last = (len(rig.roots) - 1) / rate
+    for goal in goals:
+        lacking = [role for role in ARMS.get(goal.role, ()) if role not in rig.body.joints]
+        if goal.role not in ARMS or lacking:
+            said = f", but the character has no {', '.join(lacking)}" if lacking else ""
+            raise InvalidField(
+                "character", f"with a goal of {goal.role!r}{said}; expected a hand of it"
+            )
+        if not -1e-6 <= goal.time <= goal.end <= last + 1e-6:
+            raise InvalidField(
+                "character",
+                f"with a goal at {goal.time:g} s until {goal.end:g} s, expected 0 to {last:g} s",
+            )
+
+
+def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRig:
+    """Return poses in which each hand is at its goals at their times.
+
+    A hand is moved by its distance from the goal, less before and after it. Out of reach it comes
+    near.
+    """
+    if not goals:
+        return rig
+    rotations = rig.rotations.copy()
+    times = np.arange(len(rotations)) / rate
+    for role, roles in ARMS.items():
+        own = [goal for goal in goals if goal.role == role]
+        if not own:
+            continue
+        hand, moved = rig.of_role(role), np.zeros(rig.roots.shape)
+        for goal in own:
+            there = np.clip(times, goal.time, goal.end)
+            apart = np.asarray(goal.position) - _at(hand + moved, there * rate)
+            moved += _shares(times - there, goal, own)[:, None] * apart
+        limb, poses = rig.limb(roles)
+        planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + moved)
+    return planted_legs.posed(rig.body, rotations, rig.roots)
+
+
+def _at(path: RootPath, places: Annotated[Floats, "places"]) -> Annotated[Floats, "places 3"]:
+    """Return the points (N, 3) of a path (F, 3) at fractional frames (N,)."""
+    if len(path) < 2:
+        return path[[0] * len(places)]
+    return blend.interpolate_rows(path, np.clip(places, 0, len(path) - 1))
+
+
+def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
+    """Return the shares (F,) of a goal: 1 at its times, 0 from the next and the last goals on.
+
+    away (F,): time since the goal, negative before it, s.
+    """
+    before = min([FADE, *(gap for own in goals if (gap := goal.time - own.end) > 0.0)])
+    after = min([FADE, *(gap for own in goals if (gap := own.time - goal.end) > 0.0)])
+    found: Frames = blend.smoothstep(
+        np.clip(1.0 - np.where(away < 0.0, -away / before, away / after), 0.0, 1.0)
+    )
+    return found
+
+
+def misses(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> tuple[float, ...]:
+    """Return the largest distance of each hand from its goal, m."""
+    return tuple(
+        float(np.linalg.norm(goal.position - path, axis=-1).max())
+        for goal in goals
+        for path in [_at(rig.of_role(goal.role), _frames(goal, rate))]
+    )
+
+
+def _frames(goal: HandGoal, rate: float) -> Annotated[Floats, "places"]:
+    """Return the fractional frames of a goal: its first and last, and all between them."""
+    first, last = goal.time * rate, goal.end * rate
+    between = np.arange(np.floor(first) + 1.0, np.ceil(last))
+    return np.concatenate([[first], between, [last]])
+
 
 SAME_BONE = 1e-4
 """Difference of the lengths of bones up to which they are the same, m."""
@@ -59,20 +264,20 @@ def retarget(
         clip.root_path,
         *skeleton.forward_kinematics(clip.skeleton.parents, clip.rotations, clip.translations),
     )
-    motion = reference_pose.with_upright_rest(motion)
+    motion = copied_pose.with_upright_rest(motion)
     scale = body.leg_length / source.leg_length
     motion = _scaled(motion, scale, scale if settings.travel == "scaled" else 1.0)
     feet = _feet(motion, body, clip, settings)
     ground = _ground(motion, body, feet, scale)
     made = _planted(motion, body, feet, ground, clip.rate)
-    hand_goals.check_goals(settings.hands, made.rig, clip.rate)
-    final = hand_goals.meet_goals(made.rig, settings.hands, clip.rate)
+    check_goals(settings.hands, made.rig, clip.rate)
+    final = meet_goals(made.rig, settings.hands, clip.rate)
     found = clips.assemble(
         rig.skeleton, final.rotations, final.roots, rig.skeleton.offsets, clip.rate
     )
-    report = retarget_measures.measure(feet, made, ground.scale, clip.rate)
+    report = measure(feet, made, ground.scale, clip.rate)
     mapped, missing = _mapped(source, body)
-    missed = hand_goals.misses(final, settings.hands, clip.rate)
+    missed = misses(final, settings.hands, clip.rate)
     warnings = (*rig.notes, *_warnings(missing, settings.hands, missed))
     return Retargeted(
         replace(found, curves=clip.curves),
@@ -100,11 +305,11 @@ def _hips(rig: PosedRig) -> RootPath:
 
 def _feet(motion: PosedRig, body: Body, clip: Clip, settings: RetargetSettings) -> SourceFeet:
     """Return the feet of a motion in the rig's proportion."""
-    roles = foot_paths.contact_roles(motion.body, body)
+    roles = planted_legs.contact_roles(motion.body, body)
     left, right = (motion.body.joints[role] for role in roles)
     names = clip.skeleton.names[left], clip.skeleton.names[right]
     paths = motion.places[:, [left, right]]
-    return foot_paths.feet_of(paths, clip.rate, roles, names, settings.stances)
+    return planted_legs.feet_of(paths, clip.rate, roles, names, settings.stances)
 
 
 @dataclass(frozen=True)
@@ -124,10 +329,10 @@ class _Ground:
 
 def _ground(motion: PosedRig, body: Body, feet: SourceFeet, scale: float) -> _Ground:
     """Return how the feet of a motion and of a rig stand."""
-    heights, standing = foot_paths.standing_heights(feet, body), feet.standing
-    ours = [reference_pose.sole_at_rest(body, side) for side in SIDES]
+    heights, standing = planted_legs.standing_heights(feet, body), feet.standing
+    ours = [copied_pose.sole_at_rest(body, side) for side in SIDES]
     theirs = [
-        reference_pose.sole_of_motion(motion, side, standing[:, foot], ours[foot])
+        copied_pose.sole_of_motion(motion, side, standing[:, foot], ours[foot])
         for foot, side in enumerate(SIDES)
     ]
     left, right = zip(theirs, ours, strict=True)

@@ -12,8 +12,7 @@ from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton, joint_chain
-from posefield.rigs import rig_roles
-from posefield.rigs.rig import Rig
+from posefield.rigs.rig import NEEDED, Rig, facing_of
 from posefield.roles import joint_recognition
 
 SIDES = joint_recognition.SIDES
@@ -67,7 +66,7 @@ class Body:
     def facing(self) -> float:
         """Return the direction in which the body faces at rest, rad, to the left of +Z."""
         left, right = (self.rest[self.joints[side + "UpperLeg"]] for side in SIDES)
-        return rig_roles.facing_of(left - right)
+        return facing_of(left - right)
 
     @cached_property
     def spine(self) -> "Chain":
@@ -126,7 +125,7 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
     """
     named = roles or joint_recognition.roles_of(skeleton.names, skeleton.parents)
     joints = {role: skeleton.names.index(own) for role, own in named.items()}
-    missing = [role for role in rig_roles.NEEDED if role not in joints]
+    missing = [role for role in NEEDED if role not in joints]
     if missing:
         raise InvalidField(
             FIELD,

@@ -1,15 +1,180 @@
-"""Rig: the skeleton of a character's file, with the roles of its joints."""
+"""Rig: the skeleton of a character's file, with the roles of its joints.
 
-from collections.abc import Mapping
+Roles are recognised or stated; refusals say what to state.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from posefield.common.array_shapes import Positions, Rotations
+import numpy as np
+
+from posefield.common.array_shapes import Positions, Rotations, Vector
+from posefield.common.errors import MotionFileError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.motion.clip import Clip
-from posefield.motion.skeleton import Skeleton
-from posefield.rigs.joints.rest_joints import RestJoints
-from posefield.roles.joint_recognition import RoleGuess
+from posefield.motion.joint_roles import ROLES
+from posefield.motion.skeleton import Skeleton, joint_chain
+from posefield.rigs.rest_joints import RestJoints
+from posefield.roles import joint_recognition
+from posefield.roles.joint_recognition import LOWEST_CONFIDENCE, SIDES, RoleGuess
+
+LEG = ("UpperLeg", "LowerLeg", "Foot")
+NEEDED = ("hips", *(side + part for side in SIDES for part in LEG))
+"""Roles without which nothing is retargeted."""
+ARM = ("UpperArm", "LowerArm", "Hand")
+CHAINS = tuple(
+    tuple(side + part for part in parts) for side in SIDES for parts in ((*LEG, "Toes"), ARM)
+)
+"""Roles of limbs: each joint is below that of the role before it."""
+SHOWN = 12
+HOW = "state them by role, such as leftUpperLeg=thigh_l"
+LEG_LENGTHS = (0.2, 2.5)
+"""Usual lengths of the legs of characters, m."""
+
+
+@dataclass(frozen=True)
+class RigRoles:
+    """Roles of a rig's joints.
+
+    guesses: joint by role. facing: of the body at rest, rad, to the left of +Z. notes: on roles
+    that are left out, and on an unusual size.
+    """
+
+    guesses: Mapping[str, RoleGuess]
+    facing: float
+    notes: tuple[str, ...]
+
+
+def find_roles(
+    source: str, skeleton: Skeleton, paths: Sequence[str], stated: Mapping[str, str]
+) -> RigRoles:
+    """Return the roles of a rig's joints.
+
+    paths (J,): other names by which joints may be stated. stated: joint by role; others are
+    recognised. Raises MotionFileError for unknown roles and joints, for a body without hips and two
+    legs, and for roles of limbs that are not sure.
+    """
+    told = _stated(source, skeleton, paths, stated)
+    seen = joint_recognition.recognise(skeleton.names, skeleton.parents)
+    taken = {guess.joint for guess in told.values()}
+    seen = {role: own for role, own in seen.items() if own.joint not in taken or role in told}
+    guesses = {role: (seen | told)[role] for role in ROLES if role in seen | told}
+    positions = skeleton.at_rest(skeleton.offsets)[None]
+    checked = joint_recognition.check_shape(guesses, skeleton.names, positions)
+    checked |= told
+    if told:
+        _check_order(source, skeleton, checked)
+    _refuse_unsure(source, checked, skeleton.names)
+    unsure = {role: own for role, own in checked.items() if not own.is_sure}
+    found = {role: own for role, own in checked.items() if own.is_sure}
+    _check_order(source, skeleton, found)
+    notes = tuple(
+        f"{role} may be {own.joint!r}, but it is not sure ({own.confidence:.2f} of "
+        f"{LOWEST_CONFIDENCE}): left out, {HOW}"
+        for role, own in unsure.items()
+    )
+    return RigRoles(found, _facing(skeleton, found), notes + _notes_on_size(skeleton, found))
+
+
+def _stated(
+    source: str, skeleton: Skeleton, paths: Sequence[str], stated: Mapping[str, str]
+) -> dict[str, RoleGuess]:
+    """Return stated roles with full confidence."""
+    found: dict[str, RoleGuess] = {}
+    places = dict(zip(paths, skeleton.names, strict=True)) | {own: own for own in skeleton.names}
+    for role, joint in stated.items():
+        if role not in ROLES:
+            raise MotionFileError(
+                source,
+                f"found the role {role!r}{did_you_mean(role, ROLES)}, expected one of "
+                f"{', '.join(ROLES)}",
+            )
+        if joint not in places:
+            raise MotionFileError(
+                source, f"found no joint {joint!r} for {role}{did_you_mean(joint, places)}"
+            )
+        other = next((own for own, told in found.items() if told.joint == places[joint]), None)
+        if other is not None:
+            raise MotionFileError(
+                source, f"found joint {joint!r} for {other} and {role}, expected one for each"
+            )
+        found[role] = RoleGuess(places[joint], 1.0)
+    return found
+
+
+def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequence[str]) -> None:
+    """Raise MotionFileError for needed roles that are missing, and roles of limbs not sure."""
+    missing = [role for role in NEEDED if role not in guesses]
+    if missing:
+        listed = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
+        raise MotionFileError(
+            source,
+            f"found no joint for {', '.join(missing)} among {listed}; expected hips and two legs: "
+            f"{HOW}",
+        )
+    limbs = {role for chain in CHAINS for role in chain[:3]} | {"hips"}
+    unsure = [
+        f"{role} (perhaps {own.joint!r}, {own.confidence:.2f}: {'; '.join(own.reasons)})"
+        for role, own in guesses.items()
+        if role in limbs and not own.is_sure
+    ]
+    if unsure:
+        raise MotionFileError(
+            source,
+            f"found no sure joint for {', '.join(unsure)}; expected a confidence of "
+            f"{LOWEST_CONFIDENCE}: {HOW}",
+        )
+
+
+def _check_order(source: str, skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> None:
+    """Raise MotionFileError if a joint of a limb is not below the one before it."""
+    places = {role: skeleton.names.index(own.joint) for role, own in roles.items()}
+    for chain in CHAINS:
+        own = ["hips", *chain]
+        known = [role for role in own if role in places]
+        for upper, lower in pairwise(known):
+            if places[upper] not in joint_chain(skeleton.parents, places[lower])[:-1]:
+                raise MotionFileError(
+                    source,
+                    f"found {lower} at {roles[lower].joint!r}, which is not below {upper} at "
+                    f"{roles[upper].joint!r}; expected a chain: {HOW}",
+                )
+
+
+def _facing(skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> float:
+    """Return the direction in which the body faces at rest, rad, to the left of +Z."""
+    left, right = (_position(skeleton, roles[side + "UpperLeg"]) for side in SIDES)
+    return facing_of(left - right)
+
+
+def facing_of(across: Vector) -> float:
+    """Return the direction in which a body faces, rad, to the left of +Z.
+
+    across: vector (3,) from its right upper leg to the left one.
+    """
+    return float(np.arctan2(-across[2], across[0]))
+
+
+def _notes_on_size(skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> tuple[str, ...]:
+    """Return a note on legs of an unusual length, which a wrong unit would have."""
+    hip, foot = (_position(skeleton, roles[part]) for part in ("leftUpperLeg", "leftFoot"))
+    length = float(np.linalg.norm(hip - foot))
+    if LEG_LENGTHS[0] <= length <= LEG_LENGTHS[1]:
+        return ()
+    return (
+        f"legs are {length:.3g} m long, usually {LEG_LENGTHS[0]} to {LEG_LENGTHS[1]} m: is "
+        "the unit of the file right?",
+    )
+
+
+def _position(skeleton: Skeleton, guess: RoleGuess) -> Vector:
+    """Return where a joint is at rest (3,), m."""
+    positions: Vector = skeleton.at_rest(skeleton.offsets)[skeleton.names.index(guess.joint)]
+    return positions
+
 
 RigFormat = Literal["USD", "glTF"]
 

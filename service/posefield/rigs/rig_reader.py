@@ -5,8 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from posefield.common.errors import MotionFileError
-from posefield.rigs import rig_roles
-from posefield.rigs.joints import format_faults
+from posefield.rigs import rest_joints, rig
 from posefield.rigs.rig import Rig
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
@@ -31,9 +30,9 @@ def read_rig(path: Path, roles: Mapping[str, str] = NONE_STATED) -> Rig:
         )
     _check_readable(path)
     if suffix in USD_SUFFIXES:
-        with format_faults.naming_faults(source, RuntimeError, ValueError, TypeError):
+        with rest_joints.naming_faults(source, RuntimeError, ValueError, TypeError):
             return _usd_rig(path, source, roles)
-    with format_faults.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
+    with rest_joints.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
         return _gltf_rig(path, source, roles)
 
 
@@ -46,20 +45,20 @@ def _check_readable(path: Path) -> None:
 
 def _usd_rig(path: Path, source: str, stated: Mapping[str, str]) -> Rig:
     # usd-core takes 0.12 s to import.
-    from posefield.rigs.usd import usd_rig
+    from posefield.rigs import usd_rig
 
     own = usd_rig.read(path, source)
-    roles = rig_roles.find_roles(source, own.rest.skeleton, own.paths, stated)
+    roles = rig.find_roles(source, own.rest.skeleton, own.paths, stated)
     place = (own.paths, own.prim, ())
     return Rig(path, "USD", *place, own.rest, roles.guesses, roles.facing, own.notes + roles.notes)
 
 
 def _gltf_rig(path: Path, source: str, stated: Mapping[str, str]) -> Rig:
     # pygltflib takes 0.1 s to import.
-    from posefield.rigs.gltf import gltf_rig
+    from posefield.rigs import gltf_rig
 
     own = gltf_rig.read(path, source)
     paths = tuple(map(str, own.nodes))
-    roles = rig_roles.find_roles(source, own.rest.skeleton, paths, stated)
+    roles = rig.find_roles(source, own.rest.skeleton, paths, stated)
     place = (paths, "", own.skins)
     return Rig(path, "glTF", *place, own.rest, roles.guesses, roles.facing, own.notes + roles.notes)

@@ -4,7 +4,7 @@ import numpy as np
 
 from posefield.feet import limb_choice
 from posefield.motion import quat
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance.passage import RATE, Passage
 
 # A trunk with two legs (hip, knee, ankle) and a head.
 PARENTS = (-1, 0, 1, 2, 0, 4, 5, 0)

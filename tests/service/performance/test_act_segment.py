@@ -11,8 +11,8 @@ from posefield.inference import session
 from posefield.inference.graph_ports import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.model_file.model_card import Event
-from posefield.performance.acts import act_placement, act_segment
-from posefield.performance.passages.passage import RATE, FloorMotion
+from posefield.performance import act_motion, acts
+from posefield.performance.passage import RATE, FloorMotion
 from posefield.question.motion_question import ClipQuestion, MotionQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -32,7 +32,7 @@ def walker(walk_path):
 
 def test_times_pass_through_the_moment_at_the_rate():
     for moment, duration in ((0.0, 1.01), (1.01, 1.01), (0.333, 1.01), (0.5, 0.52)):
-        times, frame = act_segment.times_through(moment, duration)
+        times, frame = act_motion.times_through(moment, duration)
         assert times[frame] == moment
         assert np.allclose(np.diff(times), 1.0 / RATE, atol=1e-12)
         assert 0.0 <= times[0] < 1.0 / RATE
@@ -41,12 +41,12 @@ def test_times_pass_through_the_moment_at_the_rate():
 
 def test_a_motion_of_one_frame_is_refused():
     with pytest.raises(InvalidField, match=r"a motion of 0\.01 s, expected at least two frames"):
-        act_segment.times_through(0.01, 0.01)
+        act_motion.times_through(0.01, 0.01)
 
 
 def test_an_act_has_the_poses_of_the_model_at_its_times(reach):
     asked = MotionQuestion(controls=HIGH)
-    found = act_segment.act_passage(reach, asked)
+    found = act_motion.act_passage(reach, asked)
     times = found.begins + np.arange(len(found.passage)) / RATE
     own = poses.synthesize_poses(reach, PoseQuestion(controls=HIGH, times=times.tolist()))
     assert np.allclose(found.passage.rotations, own.rotations, atol=1e-6)
@@ -62,7 +62,7 @@ def test_an_act_has_the_poses_of_the_model_at_its_times(reach):
 def test_the_event_is_a_frame_whose_hand_meets_its_target(reach):
     place = (-0.1, 1.5, 0.5)
     asked = MotionQuestion(controls={}, targets=(Target("RightHand", place, at="event"),))
-    found = act_segment.act_passage(reach, asked)
+    found = act_motion.act_passage(reach, asked)
     assert found.event == len(found.passage) - 1
     hand = acting.joint_path(reach, found, "RightHand")
     assert np.linalg.norm(hand[found.event] - place) < 1e-3
@@ -72,7 +72,7 @@ def test_the_event_is_a_frame_whose_hand_meets_its_target(reach):
 
 def test_an_event_within_the_motion_is_a_frame_of_its_canonical_time(reach):
     early = acting.with_card(reach, event=Event(reach.session.card.event.joint, 0.5))
-    found = act_segment.act_passage(early, MotionQuestion(controls=HIGH))
+    found = act_motion.act_passage(early, MotionQuestion(controls=HIGH))
     question = early.question(MotionQuestion(controls=HIGH))
     time = np.array([found.begins + found.event / RATE])
     frame = early.session.state(question.point, time, question.labels).frames[0]
@@ -81,7 +81,7 @@ def test_an_event_within_the_motion_is_a_frame_of_its_canonical_time(reach):
 
 
 def test_contacts_are_detected_where_the_model_has_none(reach):
-    found = act_segment.act_passage(reach, MotionQuestion(controls=HIGH))
+    found = act_motion.act_passage(reach, MotionQuestion(controls=HIGH))
     toes = acting.joint_path(reach, found, "RightToeBase")
     assert found.passage.contacts.shape == (len(found.passage), 2)
     detected = contact_estimates.detect(FootPath(toes, RATE))
@@ -92,7 +92,7 @@ def test_contacts_are_those_of_the_model_in_the_order_of_its_feet(walker):
     card = walker.session.card
     still = acting.with_card(walker, cyclic=False, feet=card.feet[::-1])
     asked = MotionQuestion(controls={own.name: own.default for own in card.controls})
-    found = act_segment.act_passage(still, asked)
+    found = act_motion.act_passage(still, asked)
     times = found.begins + np.arange(len(found.passage)) / RATE
     question = still.question(asked)
     (likely,) = still.session.run(question.point, times[None], CONTACTS, labels=question.labels)
@@ -102,7 +102,7 @@ def test_contacts_are_those_of_the_model_in_the_order_of_its_feet(walker):
 
 def test_a_cyclic_model_is_refused(walker):
     with pytest.raises(InvalidField, match=r"act: stroll is a cycle, expected a model of another"):
-        act_segment.act_passage(walker, MotionQuestion(controls={}))
+        act_motion.act_passage(walker, MotionQuestion(controls={}))
 
 
 EXACT = 1e-3
@@ -124,30 +124,30 @@ def hand(reach, placed):
 @pytest.mark.parametrize("facing", [0.0, 2.5])
 def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     position = 1.0 + 2.0j
-    near = act_segment.act_passage(reach, MotionQuestion(controls={})).motion_to(position, facing)
+    near = act_motion.act_passage(reach, MotionQuestion(controls={})).motion_to(position, facing)
     wanted = near.place(np.array([-0.1, 1.5, 0.5]))
     asked = hand_to(tuple(wanted))
-    found = act_placement.act_from(reach, asked, position, facing, [0])
+    found = acts.act_from(reach, asked, position, facing, [0])
     first = found.act.passage.placed(found.by).part(0, 1)
     assert abs(floor_plane.project(first.roots)[0] - position) < 1e-4
     assert first.heading() == pytest.approx(facing, abs=1e-4)
     assert np.linalg.norm(hand(reach, found) - wanted) < EXACT
     # One round is not enough: the target moves the first pose.
-    once = act_placement.act_at(reach, asked, near, [0]).passage.placed(near)
+    once = acts.act_at(reach, asked, near, [0]).passage.placed(near)
     assert abs(floor_plane.project(once.roots)[0] - position) > 1e-4
 
 
 def test_targets_that_move_the_first_pose_on_and_on_are_refused(reach):
-    near = act_segment.act_passage(reach, MotionQuestion(controls={})).motion_to(0j, 0.0)
+    near = act_motion.act_passage(reach, MotionQuestion(controls={})).motion_to(0j, 0.0)
     asked = hand_to(tuple(near.place(np.array([-0.1, 1.5, 0.5]))))
-    assert act_placement.act_from(reach, asked, 0j, 0.0, [0]).act.trust.targets[0].reached
+    assert acts.act_from(reach, asked, 0j, 0.0, [0]).act.trust.targets[0].reached
     with pytest.raises(InvalidField, match=r"^at: the targets move the first pose 0\.\d+ m from"):
-        act_placement.act_from(reach, asked, 0j, 0.0, [0], rounds=1)
+        acts.act_from(reach, asked, 0j, 0.0, [0], rounds=1)
 
 
 def test_a_free_act_takes_place_where_its_target_is(reach):
     for facing in (-2.0, 0.0, 1.0):
-        found = act_placement.place_by_target(reach, hand_to((2.0, 1.5, -3.0))).facing(facing)
+        found = acts.place_by_target(reach, hand_to((2.0, 1.5, -3.0))).facing(facing)
         assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
         first = found.act.passage.placed(found.by)
         assert first.heading() == pytest.approx(facing)
@@ -158,7 +158,7 @@ def test_a_height_out_of_reach_is_refused_with_the_captured_heights(reach, extra
     asked = hand_to((2.0, 3.5, -3.0), extrapolate=extrapolate)
     text = r"^targets/0: .* out of reach; captured clips have heights of 0\.\d\d to 1\.\d\d m"
     with pytest.raises(OutOfReach, match=text):
-        act_placement.place_by_target(reach, asked)
+        acts.place_by_target(reach, asked)
 
 
 @pytest.mark.parametrize(
@@ -170,6 +170,6 @@ def test_a_height_out_of_reach_is_refused_with_the_captured_heights(reach, extra
 )
 def test_positions_that_are_none_are_refused(reach, place, text):
     with pytest.raises(InvalidField, match=text):
-        act_placement.place_by_target(reach, hand_to(place))
+        acts.place_by_target(reach, hand_to(place))
     with pytest.raises(InvalidField, match=text):
-        act_placement.act_at(reach, hand_to(place), FloorMotion(), [0])
+        acts.act_at(reach, hand_to(place), FloorMotion(), [0])

@@ -8,14 +8,11 @@ import pytest
 
 from posefield.inference import session
 from posefield.locomotion import floor_plane
-from posefield.performance import approach, walk_entries
-from posefield.performance.acts.act_segment import Act
-from posefield.performance.acts.staged_act import StagedAct
-from posefield.performance.joins import cut_search
-from posefield.performance.passages.passage import FloorMotion
+from posefield.performance import joins, walk_entries, walk_steps, walker
+from posefield.performance.act_motion import Act, StagedAct
+from posefield.performance.passage import FloorMotion
 from posefield.performance.script import resolve_script
 from posefield.performance.timeline import Timeline
-from posefield.performance.walks import walk_passage, walker
 from posefield.question import json_decoding
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.synthesis.synthesizer import Synthesizer
@@ -41,7 +38,7 @@ def act(script):
     source = script.sources[0]
     who = walker.find_walker(source.gait, {}, {})
     controls = who.controls(np.array([float(source.gait.rates[:, 0].mean())]), np.zeros(1))
-    cycle = walk_passage.cycle_passage(source.model, who, controls[0], FRAMES)
+    cycle = walk_entries.cycle_passage(source.model, who, controls[0], FRAMES)
     moved = cycle.part(FRAMES // 3, FRAMES).placed(FloorMotion(0.7, 3.0 - 2.0j))
     return Act(moved, script.character.bones, None, None)
 
@@ -54,24 +51,24 @@ def lead(script, staged, before=False):
         timeline.exits = range(len(timeline.done) - 1, len(timeline.done))
     entry = walk_entries.find_entry(timeline, script, 0)
     entry = replace(entry, request=replace(entry.request, seconds=None))
-    return approach.lead_to(timeline, script, 0, entry, staged)
+    return walk_steps.lead_to(timeline, script, 0, entry, staged)
 
 
 def last_cut(script, plan, staged):
     """Return the cut from the last frame of a walk into the act where it was placed."""
-    walked = script.adapted(0, walk_passage.walk_passage(script.sources[0].model, plan))
+    walked = script.adapted(0, walk_entries.walk_passage(script.sources[0].model, plan))
     placed = script.adapted(1, staged.act.passage.placed(staged.by))
-    exits, entries = range(len(walked) - 1, len(walked)), approach.entry_range(len(placed), None)
+    exits, entries = range(len(walked) - 1, len(walked)), walk_steps.entry_range(len(placed), None)
     body = script.character.body
     return (
-        cut_search.find_cut(body, walked, placed, exits, entries),
-        cut_search.find_cut(body, walked, placed, exits, entries, FloorMotion()),
+        joins.find_cut(body, walked, placed, exits, entries),
+        joins.find_cut(body, walked, placed, exits, entries, FloorMotion()),
     )
 
 
 def assert_leads(script, plan, staged):
     free, given = last_cut(script, plan, staged)
-    assert abs(free.motion.turn) < 2.0 * approach.STRAIGHT
+    assert abs(free.motion.turn) < 2.0 * walk_steps.STRAIGHT
     assert given.distance < FIT
     # Negative controls: the act a step aside, and the walk that ends in another phase.
     aside = replace(staged, by=FloorMotion(0.0, 0.05j).after(staged.by))
@@ -104,5 +101,5 @@ def test_strides_change_by_a_share_at_most_where_a_walk_goes_on_from_another_mot
     steady = np.diff(plan.phases).mean() / np.diff(plan.distances).mean()
     free, _ = lead(script, turned)
     usual = np.diff(free.phases).mean() / np.diff(free.distances).mean()
-    assert abs(steady / usual - 1.0) < approach.MOST_CHANGED + 1e-3
+    assert abs(steady / usual - 1.0) < walk_steps.MOST_CHANGED + 1e-3
     assert last_cut(script, plan, staged)[1].distance < 2.0 * FIT

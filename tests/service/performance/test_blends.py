@@ -10,8 +10,8 @@ from passages import PARENTS, character, smooth
 from scipy.optimize import minimize
 
 from posefield.motion import quat, skeleton
-from posefield.performance.joins import blends, cut_search
-from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+from posefield.performance import joins
+from posefield.performance.passage import RATE, FloorMotion, Passage
 
 
 def joints_of(passage):
@@ -21,9 +21,9 @@ def joints_of(passage):
 
 def joined(kind, seed=1, seconds=None):
     before, after = smooth(seed), smooth(seed + 100)
-    cut = cut_search.find_cut(character(), before, after, range(20, 58), range(10))
+    cut = joins.find_cut(character(), before, after, range(20, 58), range(10))
     after = after.placed(cut.motion)
-    return before, after, cut, blends.join(before, after, cut, kind, seconds)
+    return before, after, cut, joins.join(before, after, cut, kind, seconds)
 
 
 @given(st.integers(0, 1000), st.sampled_from(["dead", "hermite"]))
@@ -41,7 +41,7 @@ def test_a_blend_has_no_jump(seed, kind):
     # The velocity of the dead blend decays by a twelfth a frame from the cut on.
     fast = np.linalg.norm(np.diff(own, axis=0), axis=-1).mean(axis=1).max() * RATE
     assert near.max() < 3.0 * usual + 0.2 * fast
-    plain = joints_of(blends.join(before, after, cut, "cut"))
+    plain = joints_of(joins.join(before, after, cut, "cut"))
     jump = np.linalg.norm(np.diff(plain, n=2, axis=0), axis=-1).mean(axis=1) * RATE
     assert jump[cut.exit - 2 : cut.exit + 1].max() > near.max()
 
@@ -49,7 +49,7 @@ def test_a_blend_has_no_jump(seed, kind):
 @pytest.mark.parametrize("kind", ["dead", "hermite", "cut"])
 def test_a_join_begins_and_ends_as_its_passages(kind):
     before, after, cut, found = joined(kind)
-    last = round(blends.SECONDS[kind] * RATE)
+    last = round(joins.SECONDS[kind] * RATE)
     assert len(found) == cut.exit + len(after) - cut.entry
     assert np.array_equal(found.rotations[: cut.exit], before.rotations[: cut.exit])
     assert np.array_equal(found.roots[cut.exit + last :], after.roots[cut.entry + last :])
@@ -61,8 +61,8 @@ def test_a_join_begins_and_ends_as_its_passages(kind):
 
 def test_a_motion_that_goes_on_into_itself_is_kept():
     whole = smooth(7, 120)
-    cut = cut_search.find_cut(character(), whole, whole.part(50, 120), range(50, 90), range(1, 2))
-    found = blends.join(whole, whole.part(50, 120), cut, "hermite")
+    cut = joins.find_cut(character(), whole, whole.part(50, 120), range(50, 90), range(1, 2))
+    found = joins.join(whole, whole.part(50, 120), cut, "hermite")
     assert cut.exit == 51
     assert joints_of(found) == pytest.approx(joints_of(whole), abs=1e-6)
 
@@ -71,7 +71,7 @@ def test_sigma_is_that_of_a_mixture():
     before, after, cut, _ = joined("dead")
     before = replace(before, sigmas=np.full(len(before), 0.02))
     after = replace(after, sigmas=np.full(len(after), 0.05))
-    found = blends.join(before, after, cut, "dead").sigmas[cut.exit :]
+    found = joins.join(before, after, cut, "dead").sigmas[cut.exit :]
     assert found[0] == pytest.approx(0.02)
     assert found[30] == 0.05
     middle = np.sqrt((0.02**2 + 0.05**2) / 2.0 + cut.distance**2 / 4.0)
@@ -85,7 +85,7 @@ def test_offsets_of_more_than_half_a_turn_do_not_flip():
     spinning[:, 7] = np.stack([np.cos(angles / 2), 0 * angles, np.sin(angles / 2), 0 * angles], 1)
     still = after.rotations.copy()
     still[:, 7] = [1.0, 0.0, 0.0, 0.0]
-    found = blends.join(
+    found = joins.join(
         replace(before, rotations=spinning), replace(after, rotations=still), cut, "dead"
     )
     steps = np.abs(np.sum(found.rotations[1:, 7] * found.rotations[:-1, 7], axis=-1))
@@ -99,7 +99,7 @@ def cost(before, after, exit_frame, entry, motion):
     weights = np.ones(len(PARENTS))
     for foot, leg in enumerate(character().legs):
         if before.contacts[exit_frame, foot] > 0.5 and after.contacts[entry, foot] > 0.5:
-            weights[leg.tip] = cut_search.FOOT_WEIGHT
+            weights[leg.tip] = joins.FOOT_WEIGHT
     speed, toward = np.gradient(own, 1 / RATE, axis=0), np.gradient(other, 1 / RATE, axis=0)
     apart = weights @ np.sum(np.square(own[exit_frame] - other[entry]), axis=-1)
     faster = np.sum(np.square(speed[exit_frame] - toward[entry]))
@@ -114,7 +114,7 @@ def moved(number):
 def test_the_found_motion_costs_least(seed):
     before, after = smooth(seed), smooth(seed + 1).placed(FloorMotion(0.5, 3.0 - 2.0j))
     frame, entry = seed % 60, seed % 7
-    found = cut_search.find_cut(
+    found = joins.find_cut(
         character(), before, after, range(frame, frame + 1), range(entry, entry + 1)
     )
     assert found.cost == pytest.approx(cost(before, after, frame, entry, found.motion), abs=1e-10)
@@ -128,10 +128,10 @@ def test_the_found_motion_costs_least(seed):
 def test_the_best_pair_is_that_of_brute_force():
     before, after = smooth(1), smooth(2)
     exits, entries = range(30, 60), range(12)
-    found = cut_search.find_cut(character(), before, after, exits, entries)
+    found = joins.find_cut(character(), before, after, exits, entries)
     pairs = [
         (
-            cut_search.find_cut(character(), before, after, range(e, e + 1), range(b, b + 1)).cost,
+            joins.find_cut(character(), before, after, range(e, e + 1), range(b, b + 1)).cost,
             e,
             b,
         )
@@ -140,25 +140,25 @@ def test_the_best_pair_is_that_of_brute_force():
     ]
     assert (found.cost, found.exit, found.entry) == pytest.approx(min(pairs))
     assert max(pairs)[0] > 2.0 * found.cost
-    assert cut_search.find_cut(character(), before, after, exits, entries) == found
+    assert joins.find_cut(character(), before, after, exits, entries) == found
 
 
 def test_a_given_motion_is_kept():
     before, after = smooth(1), smooth(2)
     exits, entries, given_motion = range(30, 60), range(12), FloorMotion(0.2, 0.8 + 0.1j)
-    found = cut_search.find_cut(character(), before, after, exits, entries, given_motion)
+    found = joins.find_cut(character(), before, after, exits, entries, given_motion)
     costs = {(e, b): cost(before, after, e, b, given_motion) for e in exits for b in entries}
     assert found.motion == given_motion
     assert (found.exit, found.entry) == min(costs, key=costs.get)
     assert found.cost == pytest.approx(min(costs.values()), abs=1e-10)
-    free = cut_search.find_cut(character(), before, after, exits, entries)
+    free = joins.find_cut(character(), before, after, exits, entries)
     assert free.cost < found.cost
 
 
 def test_a_motion_goes_on_into_itself_wherever_it_lies():
     before, by = smooth(3, 90), FloorMotion(1.0, 2.0 + 1.0j)
     after = before.part(40, 90).placed(by)
-    found = cut_search.find_cut(character(), before, after, range(20, 80), range(1, 10))
+    found = joins.find_cut(character(), before, after, range(20, 80), range(1, 10))
     # Frames 1 to 9 of the part fit equally: the earliest exit is taken.
     assert (found.exit, found.entry) == (41, 1)
     assert found.distance == pytest.approx(0.0, abs=1e-7)
@@ -169,7 +169,7 @@ def test_a_motion_goes_on_into_itself_wherever_it_lies():
 
 def test_nothing_to_search_is_refused():
     with pytest.raises(ValueError, match="0 exits and 5 entries"):
-        cut_search.find_cut(character(), smooth(1), smooth(2), range(0), range(5))
+        joins.find_cut(character(), smooth(1), smooth(2), range(0), range(5))
 
 
 def test_a_motion_after_another_and_back_is_none():

@@ -9,9 +9,8 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.motion import quat, skeleton
-from posefield.performance.acts import act_segment, gaze, hold_segment
-from posefield.performance.acts.hold_segment import Hold
-from posefield.performance.passages.passage import RATE, Passage, concatenate
+from posefield.performance import act_motion, gaze, holds
+from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.question.motion_question import MotionQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -26,12 +25,12 @@ def reach(model_path):
 
 @pytest.fixture(scope="module")
 def act(reach):
-    return act_segment.act_passage(reach, MotionQuestion(controls={"target_height": 1.5}))
+    return act_motion.act_passage(reach, MotionQuestion(controls={"target_height": 1.5}))
 
 
 @pytest.fixture(scope="module")
 def rested(act):
-    return hold_segment.come_to_rest(act.passage.part(0, act.event - 5))
+    return holds.come_to_rest(act.passage.part(0, act.event - 5))
 
 
 @pytest.fixture(scope="module")
@@ -54,8 +53,8 @@ def line(frames, speed=1.0):
 
 def test_a_motion_comes_to_rest_in_its_last_pose():
     own = line(40)
-    found = hold_segment.come_to_rest(own)
-    assert len(found) == 40 + hold_segment.REST_FRAMES // 2
+    found = holds.come_to_rest(own)
+    assert len(found) == 40 + holds.REST_FRAMES // 2
     assert np.allclose(found.roots[-1], own.roots[-1], atol=1e-9)
     assert np.allclose(found.rotations[-1], own.rotations[-1], atol=1e-9)
     speeds = np.linalg.norm(np.diff(found.roots, axis=0), axis=-1) * RATE
@@ -63,7 +62,7 @@ def test_a_motion_comes_to_rest_in_its_last_pose():
     assert speeds[-1] < 0.01
     assert np.all(np.diff(speeds) < 1e-9)
     # The largest deceleration of 1 - 3 u^2 + 2 u^3 over its time.
-    steepest = 1.5 * RATE / hold_segment.REST_FRAMES
+    steepest = 1.5 * RATE / holds.REST_FRAMES
     assert np.abs(np.diff(speeds)).max() * RATE == pytest.approx(steepest, rel=0.02)
     turned = quat.twist(found.rotations[:, 0], np.array([0.0, 1.0, 0.0]))
     assert np.allclose(turned, found.roots[:, 2], atol=1e-9)
@@ -77,7 +76,7 @@ def test_frames_between_frames_lie_on_the_curve():
 
     own = Passage(quat.exp(wave(times))[:, None], wave(times), np.zeros((30, 1)), np.zeros(30))
     places = np.array([0.3, 4.0, 11.5, 28.7])
-    found = hold_segment.at_frames(own, places)
+    found = holds.at_frames(own, places)
     exact = wave(places / RATE)
     assert np.allclose(found.roots, exact, atol=2e-5)
     assert np.allclose(quat.log(found.rotations[:, 0]), exact, atol=1e-4)
@@ -87,7 +86,7 @@ def test_frames_between_frames_lie_on_the_curve():
 
 
 def test_a_held_hand_stays_while_the_body_sways(reach, act, rested, body):
-    found = hold_segment.hold_passage(rested, Hold(3.0, "RightHand", seed=3), body).passage
+    found = holds.hold_passage(rested, body, 3.0, "RightHand", seed=3)[0]
     assert len(found) == 180
     place = path(reach, act, rested, "RightHand")[-1]
     hand = path(reach, act, found, "RightHand")
@@ -95,7 +94,7 @@ def test_a_held_hand_stays_while_the_body_sways(reach, act, rested, body):
     head = path(reach, act, found, "Head")
     assert 0.002 < np.linalg.norm(head - head[0], axis=-1).max() < 0.05
     # The hand of a body that only sways does not stay.
-    free = hold_segment.hold_passage(rested, Hold(3.0, seed=3), body).passage
+    free = holds.hold_passage(rested, body, 3.0, seed=3)[0]
     moved = path(reach, act, free, "RightHand")
     assert np.linalg.norm(moved - place, axis=-1).max() > 10.0 * STILL
 
@@ -106,20 +105,20 @@ def test_a_stretched_arm_holds_its_hand(reach, act, rested, body):
     straight[:, elbow] = quat.IDENTITY
     own = Passage(straight, rested.roots, rested.contacts, rested.sigmas)
     place = path(reach, act, own, "RightHand")[-1]
-    found = hold_segment.hold_passage(own, Hold(3.0, "RightHand", seed=3), body).passage
+    found = holds.hold_passage(own, body, 3.0, "RightHand", seed=3)[0]
     hand = path(reach, act, found, "RightHand")
     assert np.linalg.norm(hand - place, axis=-1).max() < 1e-3
-    free = hold_segment.hold_passage(own, Hold(3.0, seed=3), body).passage
+    free = holds.hold_passage(own, body, 3.0, seed=3)[0]
     assert not np.allclose(found.roots, free.roots, atol=1e-4)
 
 
 def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, body):
-    asked = Hold(1.0, "RightHand", look_at=(2.0, 1.6, 3.0), seed=3)
-    found = hold_segment.hold_passage(rested, asked, body)
-    assert np.allclose(found.passage.roots[-1], rested.roots[-1], atol=1e-12)
-    dots = np.abs(np.sum(found.passage.rotations[-1] * rested.rotations[-1], axis=-1))
+    asked = 1.0, "RightHand", (2.0, 1.6, 3.0), 3
+    found, _ = holds.hold_passage(rested, body, *asked)
+    assert np.allclose(found.roots[-1], rested.roots[-1], atol=1e-12)
+    dots = np.abs(np.sum(found.rotations[-1] * rested.rotations[-1], axis=-1))
     assert np.allclose(dots, 1.0, atol=1e-9)
-    whole = concatenate(rested, found.passage)
+    whole = concatenate(rested, found)
     own, after = (
         np.linalg.norm(np.diff(acting.positions(reach, passage, act.bones), 2, axis=0), axis=-1)
         .mean(axis=-1)
@@ -130,7 +129,7 @@ def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, b
     assert after <= own + 1e-9
     # Without coming to rest the motion stops at once.
     cut = act.passage.part(0, act.event - 5)
-    stopped = concatenate(cut, hold_segment.hold_passage(cut, asked, body).passage)
+    stopped = concatenate(cut, holds.hold_passage(cut, body, *asked)[0])
     x = acting.positions(reach, stopped, act.bones)
     assert np.linalg.norm(np.diff(x, 2, axis=0), axis=-1).mean(axis=-1).max() * RATE**2 > own
 
@@ -138,15 +137,15 @@ def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, b
 @pytest.mark.parametrize(
     ("asked", "text"),
     [
-        (Hold(0.0), r"^hold: 0 s, expected at least 0\.0167 s"),
-        (Hold(float("nan")), r"^hold: nan, expected a finite number"),
-        (Hold(1.0, "RightHnd"), r"^joint: 'RightHnd' \(did you mean 'RightHand'\?\), expected"),
-        (Hold(1.0, "Spine"), r"^joint: 'Spine', expected a joint that an arm or a leg leads to"),
+        ((0.0,), r"^hold: 0 s, expected at least 0\.0167 s"),
+        ((float("nan"),), r"^hold: nan, expected a finite number"),
+        ((1.0, "RightHnd"), r"^joint: 'RightHnd' \(did you mean 'RightHand'\?\), expected"),
+        ((1.0, "Spine"), r"^joint: 'Spine', expected a joint that an arm or a leg leads to"),
     ],
 )
 def test_holds_that_are_none_are_refused(rested, body, asked, text):
     with pytest.raises(InvalidField, match=text):
-        hold_segment.hold_passage(rested, asked, body)
+        holds.hold_passage(rested, body, *asked)
 
 
 AHEAD = np.array([0.0, 0.0, 1.0])
@@ -156,7 +155,7 @@ AHEAD = np.array([0.0, 0.0, 1.0])
 def posed(model_path):
     """Looker of the reaching model and a pose: rotations (J, 4) and root (3,)."""
     model = acting.measured_reach(Synthesizer("reach", session.load(model_path)))
-    act = act_segment.act_passage(model, MotionQuestion(controls={"target_height": 1.5}))
+    act = act_motion.act_passage(model, MotionQuestion(controls={"target_height": 1.5}))
     body = acting.body(model, act.bones)
     return body, act.passage.part(0, 20)
 
@@ -171,7 +170,9 @@ def seen(body, rotations, root):
 
 def turned(body, own, point):
     rotations, root = own.rotations[-1], own.roots[-1]
-    found = body.looker.look_at(rotations, root, np.array(point))
+    found = gaze.Looker(body.parents, body.bones, body.joints, body.facing).look_at(
+        rotations, root, np.array(point)
+    )
     after = found.add(body.parents, rotations[None], np.ones(1))[0]
     return found, after, root
 
@@ -216,12 +217,12 @@ def test_the_neck_turns_no_farther_than_it_can(posed, point):
 def test_the_gaze_turns_and_comes_back_smoothly(posed):
     body, own = posed
     point = (2.0, 1.6, 2.0)
-    held = hold_segment.hold_passage(own, Hold(2.0, look_at=point), body)
-    still = hold_segment.hold_passage(own, Hold(2.0), body).passage
+    held, miss = holds.hold_passage(own, body, 2.0, look_at=point)
+    still = holds.hold_passage(own, body, 2.0)[0]
     directions = [
         seen(body, *pair)[1] @ seen(body, *rest)[1]
         for pair, rest in zip(
-            zip(held.passage.rotations, held.passage.roots, strict=True),
+            zip(held.rotations, held.roots, strict=True),
             zip(still.rotations, still.roots, strict=True),
             strict=True,
         )
@@ -231,14 +232,14 @@ def test_the_gaze_turns_and_comes_back_smoothly(posed):
     assert angles[-1] < 0.5
     assert angles[60] > 20.0
     assert np.abs(np.diff(angles)).max() < 5.0
-    assert held.miss < np.radians(0.1)
+    assert miss < np.radians(0.1)
 
 
 def test_a_skeleton_without_a_head_is_refused(posed):
     body, own = posed
     blind = replace(body, joints={k: v for k, v in body.joints.items() if k != "head"})
     with pytest.raises(InvalidField, match=r"^look_at: no joint has the role of the head"):
-        hold_segment.hold_passage(own, Hold(1.0, look_at=(0.0, 1.6, 3.0)), blind)
+        holds.hold_passage(own, blind, 1.0, look_at=(0.0, 1.6, 3.0))
 
 
 def test_a_point_at_the_head_is_refused(posed):
@@ -246,6 +247,6 @@ def test_a_point_at_the_head_is_refused(posed):
     place, _ = seen(body, own.rotations[-1], own.roots[-1])
     near = tuple(place + 0.01)
     with pytest.raises(InvalidField, match=r"^look_at: 0\.0\d+ m from the head, expected at least"):
-        hold_segment.hold_passage(own, Hold(1.0, look_at=near), body)
+        holds.hold_passage(own, body, 1.0, look_at=near)
     with pytest.raises(InvalidField, match=r"^look_at/1: inf, expected a finite number"):
-        hold_segment.hold_passage(own, Hold(1.0, look_at=(0.0, float("inf"), 0.0)), body)
+        holds.hold_passage(own, body, 1.0, look_at=(0.0, float("inf"), 0.0))

@@ -8,9 +8,9 @@ from passages import PARENTS, character, smooth
 
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.motion import skeleton
-from posefield.performance.joins import blends, cut_search, join_quality
-from posefield.performance.joins.join_quality import CutFacts, JoinFacts, UsualMotion
-from posefield.performance.passages.passage import RATE, FloorMotion
+from posefield.performance import join_quality, joins
+from posefield.performance.join_quality import CutFacts, JoinFacts, UsualMotion
+from posefield.performance.passage import RATE, FloorMotion
 
 CUT = CutFacts(0.05, 0.02, "dead", UsualMotion(4.0, "captured"))
 EASY = JoinFacts(CUT, 8.0)
@@ -34,9 +34,9 @@ def test_accelerations_are_second_differences_relative_to_the_root():
 
 
 def judged(before, after, kind, motion=None):
-    cut = cut_search.find_cut(character(), before, after, range(30, 50), range(8), motion)
+    cut = joins.find_cut(character(), before, after, range(30, 50), range(8), motion)
     after = after.placed(cut.motion)
-    joined = blends.join(before, after, cut, kind)
+    joined = joins.join(before, after, cut, kind)
     found = join_quality.usual_acceleration(character(), [before, after])
     usual = UsualMotion(found, "synthesised")
     facts = join_quality.describe_cut((before, after), cut, kind, usual)

@@ -10,9 +10,9 @@ from posefield.feet import body_plans, foot_placement
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
 from posefield.motion.foot_contacts import FootContact
-from posefield.performance.joins import blends, join_steps
-from posefield.performance.joins.cut_search import Cut
-from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+from posefield.performance import join_quality, joins
+from posefield.performance.joins import Cut
+from posefield.performance.passage import RATE, FloorMotion, Passage
 
 FRAMES = 90
 CONTACTS = tuple(FootContact(foot, 0.04, 0.35, 0.5, 0.05) for foot in FEET)
@@ -28,12 +28,12 @@ def standing(spread=0.0, height=0.8):
         rotations[:, hip + 1] = quat.exp(np.array([0.8, 0.0, 0.0]))
     roots = np.tile([0.0, height, 0.0], (FRAMES, 1))
     whole = Passage(rotations, roots, np.ones((FRAMES, 2)), np.zeros(FRAMES))
-    return join_steps.on_floor(character(), whole, CONTACTS)[0]
+    return join_quality.on_floor(character(), whole, CONTACTS)[0]
 
 
 def joined(before, after, cut=CUT):
-    whole = blends.join(before, after, cut, "dead")
-    return join_steps.add_steps(character(), before, after, cut, whole)
+    whole = joins.join(before, after, cut, "dead")
+    return join_quality.add_steps(character(), before, after, cut, whole)
 
 
 def slides(passage):
@@ -61,7 +61,7 @@ def test_feet_that_stand_apart_step_one_after_another():
     found, steps = joined(standing(), after)
     assert sorted(step.foot for step in steps) == [0, 1]
     first, second = steps
-    assert first.distance > second.distance > join_steps.FARTHEST
+    assert first.distance > second.distance > join_quality.FARTHEST
     assert (first.begin, first.end) == (60, 81)
     assert second.begin == first.end + 3
     up = found.contacts < 0.5
@@ -69,7 +69,7 @@ def test_feet_that_stand_apart_step_one_after_another():
     assert up.sum(axis=0).tolist() == [21, 21]
     assert max(slides(found)) < 0.01
     # Without steps the feet would be pulled over the floor by the blend.
-    plain = blends.join(standing(), after, CUT, "dead")
+    plain = joins.join(standing(), after, CUT, "dead")
     moved = skeleton.positions(
         PARENTS, plain.rotations, skeleton.translations(character().bones, plain.roots)
     )[:, list(FEET)]
@@ -90,7 +90,7 @@ def test_a_foot_that_swings_lands_when_it_is_near_its_place():
     found, steps = joined(before, after)
     assert 0 not in [step.foot for step in steps]
     lands = 60 + int(np.argmax(found.contacts[60:, 0]))
-    assert 60 < lands < 60 + round(join_steps.LANDING * RATE)
+    assert 60 < lands < 60 + round(join_quality.LANDING * RATE)
     # The other foot waits until it has landed.
     (step,) = steps
     assert (step.foot, step.begin) == (1, lands)
@@ -98,11 +98,11 @@ def test_a_foot_that_swings_lands_when_it_is_near_its_place():
 
 def test_a_passage_is_brought_to_the_floor():
     raised = replace(standing(), roots=standing().roots + np.array([0.0, 0.03, 0.0]))
-    found, by = join_steps.on_floor(character(), raised, CONTACTS)
+    found, by = join_quality.on_floor(character(), raised, CONTACTS)
     assert by == pytest.approx(-0.03)
     assert found.roots == pytest.approx(standing().roots)
     flying = replace(raised, contacts=np.zeros((FRAMES, 2)))
-    assert join_steps.on_floor(character(), flying, CONTACTS)[1] == 0.0
-    upstairs, by = join_steps.on_floor(character(), raised, CONTACTS, floor=0.5)
+    assert join_quality.on_floor(character(), flying, CONTACTS)[1] == 0.0
+    upstairs, by = join_quality.on_floor(character(), raised, CONTACTS, floor=0.5)
     assert by == pytest.approx(0.47)
     assert upstairs.roots[0, 1] == pytest.approx(standing().roots[0, 1] + 0.5)

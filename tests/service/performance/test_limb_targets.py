@@ -5,9 +5,9 @@ import passages
 import pytest
 
 from posefield.motion import quat, skeleton
-from posefield.performance.passages import limb_targets
-from posefield.performance.passages.limb_targets import WorldTarget
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance import limb_targets
+from posefield.performance.limb_targets import WorldTarget
+from posefield.performance.passage import RATE, Passage
 
 LEFT = passages.FEET[0]
 FRAMES, MOMENT = 180, 90

@@ -7,8 +7,8 @@ import pytest
 
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
-from posefield.performance.passages import skeleton_match
-from posefield.performance.passages.skeleton_match import SkeletonsDiffer
+from posefield.performance import passage
+from posefield.performance.passage import SkeletonsDiffer
 
 # A trunk with two legs of four bones and a head; the toes and the head have end sites.
 PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 7, 0)
@@ -45,19 +45,19 @@ def bones_of(own, rotations):
 
 
 def test_an_equal_skeleton_keeps_poses_bit_for_bit():
-    found = skeleton_match.match(source(), source("ABCDEFGHIJ"), FEET)
+    found = passage.match_skeletons(source(), source("ABCDEFGHIJ"), FEET)
     before = poses()
     assert found.rotations(before) is before
     assert found.notes == (
         "10 of 10 joints have other names, such as 'a' for 'A': joints are matched by their place"
         " in the tree",
     )
-    assert skeleton_match.match(source(), source()).notes == ()
+    assert passage.match_skeletons(source(), source()).notes == ()
 
 
 def test_bones_point_as_in_the_source():
     target = turned(turned(source(), 2, 0.2), 6, -0.15, (1.0, 0.0, 0.0))
-    found = skeleton_match.match(source(), target)
+    found = passage.match_skeletons(source(), target)
     before = poses()
     after = found.rotations(before)
     assert np.allclose(bones_of(target, after), bones_of(source(), before), atol=1e-9)
@@ -72,20 +72,20 @@ def test_bones_point_as_in_the_source():
 def test_soles_keep_their_turn_from_the_rest_pose():
     target = turned(source(), 4, 0.2, (1.0, 0.0, 0.0))
     before = np.tile(quat.IDENTITY, (1, len(PARENTS), 1))
-    flat = skeleton_match.match(source(), target, FEET)
+    flat = passage.match_skeletons(source(), target, FEET)
     assert np.allclose(flat.rotations(before), before)
-    tilted = skeleton_match.match(source(), target)
+    tilted = passage.match_skeletons(source(), target)
     assert not np.allclose(tilted.rotations(before), before, atol=0.05)
 
 
 def test_heights_scale_with_the_legs_and_paths_do_not():
     target = source().offsets.copy()
     target[1:9] *= 1.1
-    share = skeleton_match.leg_share(PARENTS, source().offsets, target, FEET)
+    share = passage.leg_share(PARENTS, source().offsets, target, FEET)
     assert share == pytest.approx(1.1)
-    assert skeleton_match.leg_share(PARENTS, target, target, ()) == 1.0
+    assert passage.leg_share(PARENTS, target, target, ()) == 1.0
     roots = np.array([[1.0, 0.9, 2.0], [1.5, 1.0, 3.0]])
-    assert skeleton_match.scale_heights(roots, share) == pytest.approx(
+    assert passage.scale_heights(roots, share) == pytest.approx(
         np.array([[1.0, 0.99, 2.0], [1.5, 1.1, 3.0]])
     )
 
@@ -93,14 +93,14 @@ def test_heights_scale_with_the_legs_and_paths_do_not():
 def test_other_trees_are_refused_in_words():
     other = Skeleton(("a", "b"), (-1, 0), np.ones((2, 3)), (), np.zeros((0, 3)))
     with pytest.raises(SkeletonsDiffer, match="10 joints, expected 2"):
-        skeleton_match.match(source(), other)
+        passage.match_skeletons(source(), other)
     moved = replace(source("ABCDEFGHIJ"), parents=(*PARENTS[:9], 5))
     with pytest.raises(
         SkeletonsDiffer, match="joint 9, 'j', is a child of 'a', expected as 'J' of"
     ):
-        skeleton_match.match(source(), moved)
+        passage.match_skeletons(source(), moved)
     with pytest.raises(
         SkeletonsDiffer, match="joint 1, 'b', points 26 degrees away from that at 'b'"
     ):
-        skeleton_match.match(source(), turned(source(), 2, 0.45))
-    skeleton_match.match(source(), turned(source(), 2, 0.34))
+        passage.match_skeletons(source(), turned(source(), 2, 0.45))
+    passage.match_skeletons(source(), turned(source(), 2, 0.34))

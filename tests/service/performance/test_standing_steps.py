@@ -10,18 +10,23 @@ import pytest
 
 from posefield.inference import session
 from posefield.motion import skeleton
-from posefield.performance import approach, composition, walk_entries
-from posefield.performance.acts.act_segment import Act
-from posefield.performance.acts.staged_act import StagedAct
-from posefield.performance.joins import cut_search
-from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+from posefield.performance import (
+    composition,
+    joins,
+    standing_pose,
+    standing_steps,
+    walk_entries,
+    walk_plan,
+    walk_steps,
+)
+from posefield.performance.act_motion import Act, StagedAct
+from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import resolve_script
+from posefield.performance.standing_steps import StandingEnds, Travel
 from posefield.performance.timeline import Timeline
-from posefield.performance.walks import standing_pose, standing_steps, walk_passage, walk_phases
-from posefield.performance.walks.standing_steps import StandingEnds, Travel
-from posefield.performance.walks.walk_request import WalkRequest
-from posefield.performance.walks.walk_segment import plan_walk
-from posefield.performance.walks.walker import find_walker
+from posefield.performance.walk_plan import plan_walk
+from posefield.performance.walk_request import WalkRequest
+from posefield.performance.walker import find_walker
 from posefield.question import json_decoding
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.synthesis.synthesizer import Synthesizer
@@ -61,7 +66,7 @@ def accelerations(passage):
 
 def walked(request, phase=0.1):
     plan = plan_walk(walk().gait, request, FloorMotion(), phase)
-    return plan, walk_passage.walk_passage(walk(), plan)
+    return plan, walk_entries.walk_passage(walk(), plan)
 
 
 def bends(passage):
@@ -72,9 +77,9 @@ def bends(passage):
 
 def test_the_standing_pose_has_its_feet_beside_each_other():
     own = pose()
-    (still,) = {array.tobytes() for array in walk_passage.still(own).rotations}
+    (still,) = {array.tobytes() for array in walk_entries.still(own).rotations}
     assert still == own.rotations.tobytes()
-    feet = balls(walk_passage.still(own))[0]
+    feet = balls(walk_entries.still(own))[0]
     apart = feet[0] - feet[1]
     assert abs(apart[2]) < 1e-9
     assert 0.1 < abs(apart[0]) < 0.2
@@ -93,7 +98,7 @@ def test_a_model_without_contacts_has_none_and_slows_down():
     assert plan.standing is None
     assert [note.code for note in plan.notes].count("feet-apart") == 2
     assert "synthesised" in plan.notes[0].message
-    assert plan.notes[0].code.startswith(walk_phases.SYNTHESISED)
+    assert plan.notes[0].code.startswith(walk_plan.SYNTHESISED)
 
 
 @pytest.mark.parametrize("length", [3.0, 5.3, 8.0])
@@ -110,7 +115,7 @@ def test_a_walk_begins_and_ends_with_its_feet_beside_each_other(length, end):
     assert root[0] == pytest.approx(feet[:, 0].mean(), abs=0.01)
     # Without the steps one foot is in the air or ahead.
     travel = Travel(plan.places, plan.headings, plan.phases)
-    bare = walk_passage.walk_passage(walk(), replace(plan, standing=None))
+    bare = walk_entries.walk_passage(walk(), replace(plan, standing=None))
     assert np.abs(balls(bare)[frame, :, 1] - pose().levels).max() > 0.01
     none = standing_steps.add_standing_ends(bare, travel, StandingEnds(pose()))
     assert none.rotations.tobytes() == bare.rotations.tobytes()
@@ -141,7 +146,7 @@ def test_steps_are_no_more_sudden_than_walking():
     assert found[: own.opening].max() < usual
     assert found[-own.closing :].max() < usual
     # A pose that is put at the end is seen.
-    still = walk_passage.still(pose()).rotations[0]
+    still = walk_entries.still(pose()).rotations[0]
     sudden = made.rotations.copy()
     sudden[len(made) - own.closing :] = still
     assert accelerations(replace(made, rotations=sudden)).max() > usual
@@ -161,7 +166,7 @@ def test_an_opening_step_is_a_closing_step_backwards():
     plan, _ = walked(WalkRequest(1.1, to=(0.0, 4.0), start="standing"))
     count = plan.standing.opening
     part = plan.part(0, count)
-    bare = walk_passage.walk_passage(walk(), replace(part, standing=None))
+    bare = walk_entries.walk_passage(walk(), replace(part, standing=None))
     travel = Travel(part.places, part.headings, part.phases)
     opened = standing_steps.add_standing_ends(bare, travel, StandingEnds(pose(), opening=count))
     closed = standing_steps.add_standing_ends(
@@ -206,19 +211,19 @@ def test_an_act_goes_on_from_where_a_walk_stands(way):
     content = msgspec.json.encode({"segments": [own, own]})
     asked = json_decoding.decode_question(PerformanceQuestion, content)
     script = resolve_script(asked, lambda _: walk())
-    still = walk_passage.still(pose())
+    still = walk_entries.still(pose())
     act = Act(still.placed(FloorMotion(0.7, 3.0 - 2.0j)), script.character.bones, None, None)
     place = FloorMotion(-0.5, way + 1.0j)
     timeline = Timeline(script.character)
     entry = walk_entries.find_entry(timeline, script, 0)
     entry = replace(entry, request=replace(entry.request, seconds=None))
-    plan, staged = approach.lead_to(timeline, script, 0, entry, StagedAct(1, act, place))
+    plan, staged = walk_steps.lead_to(timeline, script, 0, entry, StagedAct(1, act, place))
     assert plan.closes
-    stood = script.adapted(0, walk_passage.walk_passage(walk(), plan))
+    stood = script.adapted(0, walk_entries.walk_passage(walk(), plan))
     last = range(len(stood) - 1, len(stood))
     body, placed = script.character.body, act.passage.placed(staged.by)
-    found = cut_search.find_cut(body, stood, placed, last, range(1), FloorMotion())
+    found = joins.find_cut(body, stood, placed, last, range(1), FloorMotion())
     assert found.distance < 0.02
     aside = placed.placed(FloorMotion(0.0, 0.05j))
-    moved = cut_search.find_cut(body, stood, aside, last, range(1), FloorMotion())
+    moved = joins.find_cut(body, stood, aside, last, range(1), FloorMotion())
     assert moved.distance > 0.03

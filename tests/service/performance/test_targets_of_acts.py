@@ -7,8 +7,7 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.model_file.model_card import Event
-from posefield.performance import composition
-from posefield.performance.acts import act_segment
+from posefield.performance import act_motion, composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
 from posefield.question.motion_question import MotionQuestion
@@ -35,7 +34,7 @@ def find(models):
 @pytest.fixture(scope="module")
 def own_hand(find):
     """The hand's path (F, 3), m, of the reach of no controls, at 60 frames a second."""
-    return acting.joint_path(find("reach"), act_segment.act_passage(find("reach"), ASKED), HAND)
+    return acting.joint_path(find("reach"), act_motion.act_passage(find("reach"), ASKED), HAND)
 
 
 ASKED = MotionQuestion(controls={})

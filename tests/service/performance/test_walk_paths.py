@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.locomotion import floor_splines
-from posefield.performance.passages.passage import RATE, FloorMotion
-from posefield.performance.walks import discs, speed_profile, turning_curves
-from posefield.performance.walks.discs import Disc
-from posefield.performance.walks.speed_profile import SpeedRamps
-from posefield.performance.walks.turning_curves import Radii
+from posefield.performance import speed_profile, walk_paths, walk_request
+from posefield.performance.passage import RATE, FloorMotion
+from posefield.performance.speed_profile import SpeedRamps
+from posefield.performance.walk_paths import Radii
+from posefield.performance.walk_request import Disc
 
 ROLLING, STANDING = SpeedRamps(None, None), SpeedRamps(0.0, 0.0)
 angles = st.floats(-3.1, 3.1)
@@ -22,7 +22,7 @@ angles = st.floats(-3.1, 3.1)
 def test_curves_end_where_they_should_and_keep_to_their_radii(turn, bearing, heading, away):
     start, radii = FloorMotion(turn, 1.0 - 2.0j), Radii(2.0, 3.0)
     place = start.shift + away * np.exp(1j * bearing)
-    path = turning_curves.connect(start, complex(place), heading, radii)
+    path = walk_paths.connect(start, complex(place), heading, radii)
     assert path.start == start.shift
     assert abs(path.end - place) < 1e-3
     assert path.headings[0] == pytest.approx(turn, abs=1e-6)
@@ -34,7 +34,7 @@ def test_curves_end_where_they_should_and_keep_to_their_radii(turn, bearing, hea
 
 def test_there_is_no_room_to_turn_within_a_circle():
     with pytest.raises(ValueError, match="no curve"):
-        turning_curves.connect(FloorMotion(), 0.5j, None, Radii(3.0, 3.0))
+        walk_paths.connect(FloorMotion(), 0.5j, None, Radii(3.0, 3.0))
 
 
 def test_a_spline_begins_and_ends_with_given_slopes():
@@ -54,7 +54,7 @@ def test_a_spline_begins_and_ends_with_given_slopes():
 
 
 def test_the_way_around_a_disc_is_nearly_the_shortest():
-    corners = discs.way_around(0j, 10.0 + 0j, [Disc(0.0, 5.0, 1.0)], 0.0)
+    corners = walk_request.way_around(0j, 10.0 + 0j, [Disc(0.0, 5.0, 1.0)], 0.0)
     way = np.array([0j, *corners, 10.0 + 0j])
     # Two tangents and an arc.
     tangent, arc = np.sqrt(24.0), np.arcsin(0.2)
@@ -66,8 +66,8 @@ def test_the_way_around_a_disc_is_nearly_the_shortest():
 def test_there_is_no_way_out_of_a_ring_of_discs():
     around = np.linspace(0.0, 2.0 * np.pi, 13)
     ring = [Disc(float(3.0 * np.sin(a)), float(3.0 * np.cos(a)), 0.9) for a in around]
-    assert discs.way_around(0j, 10.0 + 0j, ring, 0.1) is None
-    assert discs.way_around(0j, 10.0 + 0j, ring[2:], 0.1)
+    assert walk_request.way_around(0j, 10.0 + 0j, ring, 0.1) is None
+    assert walk_request.way_around(0j, 10.0 + 0j, ring[2:], 0.1)
 
 
 @given(

@@ -14,12 +14,11 @@ from posefield.inference import session
 from posefield.inference.takes import TakeSettings
 from posefield.locomotion import floor_plane, gait
 from posefield.motion import quat
-from posefield.performance.passages.passage import RATE, FloorMotion
-from posefield.performance.walks import path_following, walk_passage
-from posefield.performance.walks.discs import Disc
-from posefield.performance.walks.walk_passage import SynthesisSettings
-from posefield.performance.walks.walk_request import WalkRequest
-from posefield.performance.walks.walk_segment import plan_walk
+from posefield.performance import reporting, walk_entries
+from posefield.performance.passage import RATE, FloorMotion
+from posefield.performance.walk_entries import SynthesisSettings
+from posefield.performance.walk_plan import plan_walk
+from posefield.performance.walk_request import Disc, WalkRequest
 from posefield.synthesis.synthesizer import Synthesizer
 
 SHIPPED = Path(__file__).parents[3] / "service/posefield/shipped/cmu_walk.onnx"
@@ -78,8 +77,8 @@ def planned(walking, request, start=ORIGIN, phase=0.1):
 @pytest.mark.parametrize("name", WALKS)
 def test_walks_follow_their_paths(walk, walking, name):
     plan = planned(walking, WALKS[name])
-    made = walk_passage.walk_passage(walk, plan)
-    found = path_following.measure(plan, made.roots, made.rotations)
+    made = walk_entries.walk_passage(walk, plan)
+    found = reporting.path_errors(plan, made.roots, made.rotations)
     assert found.lateral < 0.005
     assert found.along < 0.005
     assert np.degrees(found.heading) < 0.5
@@ -88,9 +87,9 @@ def test_walks_follow_their_paths(walk, walking, name):
     # The measure sees a body that is 2 cm beside its path and one that crabs.
     left = np.exp(1j * plan.path.at(plan.distances)[1]) * 0.02j
     beside = made.roots + floor_plane.at_height(left, np.zeros(len(plan)))
-    assert path_following.measure(plan, beside, made.rotations).lateral > 0.015
+    assert reporting.path_errors(plan, beside, made.rotations).lateral > 0.015
     crabs = made.roots + floor_plane.at_height(0.03 * plan.distances * 1j, np.zeros(len(plan)))
-    assert np.degrees(path_following.measure(plan, crabs, made.rotations).heading) > 0.5
+    assert np.degrees(reporting.path_errors(plan, crabs, made.rotations).heading) > 0.5
 
 
 @pytest.mark.parametrize("name", WALKS)
@@ -171,28 +170,28 @@ def test_given_controls_and_performers_are_kept(walking):
 
 def test_takes_and_details_differ_and_stay_on_the_path(walk, walking):
     plan = planned(walking, WalkRequest(1.1, to=(0.0, 10.0)))
-    mean = walk_passage.walk_passage(walk, plan)
+    mean = walk_entries.walk_passage(walk, plan)
     settings = SynthesisSettings(take=TakeSettings(7, 0.7, detail=True))
-    take = walk_passage.walk_passage(walk, plan, settings)
-    again = walk_passage.walk_passage(walk, plan, settings)
+    take = walk_entries.walk_passage(walk, plan, settings)
+    again = walk_entries.walk_passage(walk, plan, settings)
     assert take.rotations.tobytes() == again.rotations.tobytes()
     assert np.abs(take.rotations - mean.rotations).max() > 0.01
-    assert path_following.measure(plan, take.roots, take.rotations).lateral < 0.025
+    assert reporting.path_errors(plan, take.roots, take.rotations).lateral < 0.025
     nothing = SynthesisSettings(take=TakeSettings(0, 0.7, detail=False))
-    same = walk_passage.walk_passage(walk, plan, nothing)
+    same = walk_entries.walk_passage(walk, plan, nothing)
     assert np.allclose(same.rotations, mean.rotations, atol=1e-4)
 
 
 def test_a_steady_cycle_closes_and_is_that_of_a_walk(walk, walking):
     plan = planned(walking, WalkRequest(1.2, to=(0.0, 6.0)), phase=0.0)
     frames = 60
-    cycle = walk_passage.cycle_passage(walk, plan.walker, plan.controls[0], frames)
+    cycle = walk_entries.cycle_passage(walk, plan.walker, plan.controls[0], frames)
     own = plan.walker.strides(plan.controls[:1])
     step = np.linalg.norm(np.diff(cycle.roots, axis=0), axis=1)
     closing = cycle.roots[0] + floor_plane.at_height(own.travels, np.zeros(1))[0] - cycle.roots[-1]
     assert np.linalg.norm(closing) < 1.5 * step.max()
     assert cycle.phases == pytest.approx(np.arange(frames) / frames)
-    walked = walk_passage.walk_passage(walk, plan)
+    walked = walk_entries.walk_passage(walk, plan)
     at = int(np.argmin(np.abs(plan.phases - 0.5)))
     assert np.abs(cycle.rotations[30, 1:] - walked.rotations[at, 1:]).max() < 0.02
     assert np.abs(cycle.rotations[15, 1:] - walked.rotations[at, 1:]).max() > 0.1
@@ -255,8 +254,8 @@ def test_models_without_contacts_and_performers_walk(request, fixture):
     own = gait.fit_gait(model.session)
     low, high = own.region.speeds
     plan = planned(own, WalkRequest(0.5 * (low + high), to=(0.0, 8.0), **BOTH))
-    made = walk_passage.walk_passage(model, plan)
-    found = path_following.measure(plan, made.roots, made.rotations)
+    made = walk_entries.walk_passage(model, plan)
+    found = reporting.path_errors(plan, made.roots, made.rotations)
     assert found.lateral < 0.005
     assert found.along < 0.01
     assert np.isfinite(made.rotations).all()
@@ -285,7 +284,7 @@ def test_valid_walks_end_where_they_should(seed, kind, ends):
     speed = rng.uniform(0.6, 1.3)
     request = WalkRequest(speed, **given_, start=ends[0], stop=ends[1])
     plan = plan_walk(walking, request, start, rng.uniform())
-    made = walk_passage.walk_passage(walk, plan)
+    made = walk_entries.walk_passage(walk, plan)
     for array in (made.rotations, made.roots, made.contacts, made.sigmas, made.phases):
         assert np.isfinite(array).all()
     assert np.all(np.diff(plan.phases) >= 0.0)
@@ -299,7 +298,7 @@ def test_valid_walks_end_where_they_should(seed, kind, ends):
         assert abs(plan.end.shift - complex(*given_["along"][-1][::-1])) < 0.01
     if kind == "seconds":
         assert plan.duration == pytest.approx(request.seconds, abs=0.5 / RATE)
-    again = walk_passage.walk_passage(walk, plan_walk(walking, request, start, plan.phases[0]))
+    again = walk_entries.walk_passage(walk, plan_walk(walking, request, start, plan.phases[0]))
     if ends[0] == "rolling":
         assert again.rotations.tobytes() == made.rotations.tobytes()
         assert again.roots.tobytes() == made.roots.tobytes()

@@ -11,8 +11,7 @@ from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
 from posefield.retarget import planted_legs
-from posefield.retarget.retarget_report import HandGoal, RetargetSettings
-from posefield.retarget.retargeting import retarget
+from posefield.retarget.retargeting import HandGoal, RetargetSettings, retarget
 from posefield.rigs.rig_reader import read_rig
 
 ROUNDING = 1e-5

@@ -13,7 +13,7 @@ from posefield.encode import glb
 from posefield.encode.glb import GlbBuffer
 from posefield.motion import quat
 from posefield.question.results import SampledClip
-from posefield.rigs.joints.rest_joints import RestJoints
+from posefield.rigs.rest_joints import RestJoints
 
 CONSTANT_TOLERANCE = 1e-9
 """Largest variation of a joint's translation, in units of the file, that is taken as constant."""

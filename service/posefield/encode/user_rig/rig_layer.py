@@ -27,7 +27,7 @@ from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion import quat
 from posefield.question.results import SampledClip
-from posefield.rigs.joints.rest_joints import RestJoints
+from posefield.rigs.rest_joints import RestJoints
 
 ANIMATION = "Anim"
 """Name of the animation below the root prim, followed by a number where the file has it."""

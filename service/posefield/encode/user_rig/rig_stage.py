@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.array_shapes import JointWeights, Positions, Rotations
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield.rigs.joints.rest_joints import OuterTransform, RestJoints
+from posefield.rigs.rest_joints import OuterTransform, RestJoints
 
 WORLD = OuterTransform(quat.IDENTITY, np.zeros(3), np.ones(3))
 

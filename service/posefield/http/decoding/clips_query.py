@@ -6,8 +6,8 @@ from posefield.batch import rows
 from posefield.batch.clip_archive import ArchiveOrder
 from posefield.batch.rows import ClipQuery
 from posefield.characters import delivery
-from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.characters.delivery import Delivery
+from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
 from posefield.common.name_suggestion import did_you_mean

@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from posefield.batch import rows
 from posefield.batch.scripts import ArchivedScript, PerformanceOrder
 from posefield.characters import delivery
-from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.characters.delivery import Delivery
-from posefield.characters.user_character import UserCharacter
+from posefield.characters.user_character import EMPTY, CharacterFolder, UserCharacter
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
 from posefield.common.name_suggestion import did_you_mean

@@ -1,0 +1,180 @@
+"""Acts: motions of models without cycles, sampled through the moment of their event."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from posefield.common.array_shapes import Bones, Frames
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
+from posefield.feet import contact_estimates, limbs
+from posefield.feet.stances import FootPath
+from posefield.inference.graph_ports import CONTACTS
+from posefield.locomotion import floor_plane
+from posefield.motion import measures, quat, skeleton
+from posefield.motion.measures import Measure
+from posefield.performance.passage import RATE, FloorMotion, Passage
+from posefield.question.motion_question import MotionQuestion, PoseQuestion, TargetTime
+from posefield.question.results import PoseAnswer, Trust
+from posefield.synthesis import poses
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.question_validation import ValidatedQuestion
+
+# Times at which the canonical frames of a motion are looked up, to find the time of its event.
+WARP_STEPS = 512
+
+
+@dataclass(frozen=True)
+class Act:
+    """Motion of an act in the frame of its segment: its first pose is near the origin.
+
+    bones: offsets (J, 3), m. event: frame of the model's event; None for a model without one.
+    trust: of the motion, with the results of its constraints. begins: time of the first frame from
+    the start of the model's clip, s.
+    """
+
+    passage: Passage
+    bones: Bones
+    event: int | None
+    trust: Trust
+    begins: float = 0.0
+
+    @property
+    def heading(self) -> float:
+        """Heading of the root in the first frame, rad."""
+        return self.passage.heading()
+
+    def motion_to(self, position: complex, facing: float) -> FloorMotion:
+        """Return the motion after which the first frame's root is at a place of the floor, facing.
+
+        position: forward is its real part, left its imaginary part, m. facing: heading, rad.
+        """
+        turn = facing - self.heading
+        start = complex(floor_plane.project(self.passage.roots[0]))
+        return FloorMotion(turn, complex(position - np.exp(1j * turn) * start))
+
+    def frame_of(self, when: TargetTime, parents: tuple[int, ...], joint: int) -> int:
+        """Return the frame of a target of a joint: at a time, s, of the clip, or at a moment."""
+        last = len(self.passage) - 1
+        if isinstance(when, int | float):
+            return min(max(round((when - self.begins) * RATE), 0), last)
+        if when == "event":
+            return last if self.event is None else self.event
+        moved = skeleton.translations(self.bones, self.passage.roots)
+        paths = skeleton.positions(parents, self.passage.rotations, moved)
+        return round(measures.moment_frame(Measure("height", (joint,), when), paths, 0.0))
+
+
+def act_passage(model: Synthesizer, asked: MotionQuestion) -> Act:
+    """Return the act of a question in the frame of its segment.
+
+    Its frames are those of `RATE` that pass through the event, or through the end where the model
+    has no event; less than a frame is lost at either end. Feet are as predicted. Raises
+    InvalidField for a cyclic model, and as `poses.synthesize_poses` does.
+    """
+    card = model.session.card
+    if card.cyclic:
+        raise InvalidField("act", f"{model.name} is a cycle, expected a model of another motion")
+    times, event = _times(model, model.question(asked))
+    answer = poses.synthesize_poses(model, _at_times(asked, times))
+    own = Passage(
+        quat.normalize(answer.rotations.astype(np.float64)),
+        answer.root_position.astype(np.float64),
+        _contacts(model, model.question(asked), answer),
+        np.full(len(times), answer.trust.sigma),
+    )
+    return Act(
+        own,
+        answer.bone_offsets.astype(np.float64),
+        None if card.event is None else event,
+        answer.trust,
+        float(times[0]),
+    )
+
+
+def times_through(moment: float, duration: float) -> tuple[Frames, int]:
+    """Return times (F,), s, within a clip at `RATE` of which one is the moment, and its frame.
+
+    Raises InvalidField for a clip of less than two frames.
+    """
+    # Tolerance of a millionth of a frame for the rounding of products.
+    before, after = (int(span * RATE + 1e-6) for span in (moment, duration - moment))
+    if before + after < 1:
+        raise InvalidField("act", f"a motion of {duration:.3g} s, expected at least two frames")
+    times = moment + np.arange(-before, after + 1) / RATE
+    return np.clip(times, 0.0, duration), before
+
+
+def _times(model: Synthesizer, question: ValidatedQuestion) -> tuple[Frames, int]:
+    """Return the times (F,), s, of an act's frames, and the frame of the event, or the last."""
+    found = model.session.durations(question.point, question.labels, question.level)
+    duration = model.check_duration(float(found[0]))
+    event, last = model.session.card.event, model.session.card.frames - 1
+    if event is None or event.share == 1.0:
+        return times_through(duration, duration)
+    moments = np.linspace(0.0, duration, WARP_STEPS)
+    state = model.session.state(question.point, moments, question.labels, question.level)
+    return times_through(float(np.interp(event.share * last, state.frames, moments)), duration)
+
+
+def _at_times(asked: MotionQuestion, times: Frames) -> PoseQuestion:
+    own = {name: getattr(asked, name) for name in MotionQuestion.__struct_fields__}
+    return PoseQuestion(**own, times=times.tolist())
+
+
+def _contacts(
+    model: Synthesizer, question: ValidatedQuestion, answer: PoseAnswer[Any]
+) -> Annotated[Floats, "frames feet"]:
+    """Return the probabilities (F, K) that the feet of the card contact the ground.
+
+    Contacts of a foot of which the model knows none are detected in the motion.
+    """
+    card = model.session.card
+    found = np.zeros((len(answer.times), len(card.feet)))
+    known = {own.joint: column for column, own in enumerate(card.contacts)}
+    if known:
+        (likely,) = model.session.run(
+            question.point,
+            answer.times[None],
+            CONTACTS,
+            labels=question.labels,
+            level=question.level,
+        )
+    others = [joint for joint in card.feet if joint not in known]
+    # Without a foot to detect, no joint is placed.
+    moved = answer.bone_offsets, others, answer.rotations, answer.root_position
+    placed = limbs.evaluate_joints(card.skeleton.parents, *moved) if others else None
+    for foot, joint in enumerate(card.feet):
+        if joint in known:
+            found[:, foot] = likely[0][:, known[joint]]
+        elif placed is not None:
+            path = FootPath(placed.position(joint), RATE)
+            found[:, foot] = contact_estimates.detect(path)
+    return found
+
+
+def _no_goal(angle: float) -> FloorMotion:
+    raise TypeError("an act without a goal, expected one that may face any way")
+
+
+@dataclass(frozen=True)
+class StagedAct:
+    """An act and its place.
+
+    segment: its index. by: motion that places it; None for any place, or for any heading at its
+    goal. facing: returns the motion for a heading of the first frame, rad, at the goal. adapted:
+    its passage as one of the character, if it is known.
+    """
+
+    segment: int
+    act: Act
+    by: FloorMotion | None
+    goal: complex = 0j
+    facing: Callable[[float], FloorMotion] = _no_goal
+    adapted: Passage | None = None
+
+    def faced(self, angle: float) -> "StagedAct":
+        """Return the act with a heading of its first frame, rad."""
+        return replace(self, by=self.facing(angle))

@@ -1,0 +1,382 @@
+"""Holds: a character stops and stays in its pose for a time, such as with a hand at a shelf.
+
+After an act that has an event, such as the grasp of a reach, it stops at the event; else at the end
+of the motion so far, which slows down first (`come_to_rest`). Then its last pose is kept
+(`hold_passage`): the body sways a little, the head may turn to a point, and one joint, such as the
+hand, stays exactly where it is. The hold ends in the pose in which it began, and targets that are
+met there stay met until then.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
+from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import Floats
+from posefield.feet import limbs, two_bone
+from posefield.feet.contact_estimates import STANDING
+from posefield.feet.limbs import Limb
+from posefield.kriging import philox
+from posefield.motion import quat, skeleton
+from posefield.motion.skeleton import Skeleton
+from posefield.performance.gaze import Looker
+from posefield.performance.limb_targets import WorldTarget
+from posefield.performance.passage import RATE, Passage, concatenate
+from posefield.performance.script import Script
+from posefield.performance.timeline import Span, Timeline
+from posefield.question import value_validation
+from posefield.question.performance_question import Hold
+
+STREAM = 4
+"""Stream of a seed, besides those of takes and details."""
+FREQUENCIES = 0.13, 0.23, 0.37, 0.61
+"""Of the waves of a movement, Hz; most of the sway of quiet standing is below 0.5 Hz (Winter,
+"Human balance and posture control during standing and walking", 1995)."""
+ROOT_SWAY = 0.004
+"""Standard deviation of the root over the floor, m, forward and to the left."""
+ANGLES = {
+    "spine": 0.3,
+    "chest": 0.3,
+    "upperChest": 0.3,
+    "neck": 0.6,
+    "head": 0.6,
+    "leftUpperArm": 0.5,
+    "leftLowerArm": 0.5,
+    "rightUpperArm": 0.5,
+    "rightLowerArm": 0.5,
+}
+"""Standard deviation of the rotation about each axis, degrees, by role of the joint."""
+
+
+def add_sway(
+    rotations: Rotations,
+    roots: RootPath,
+    joints: Mapping[str, int],
+    envelope: Frames,
+    rate: float,
+    seed: int,
+) -> tuple[Rotations, RootPath]:
+    """Return poses (F, J, 4) and roots (F, 3), m, with the sway of a seed.
+
+    joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
+    """
+    roles = [role for role in ANGLES if role in joints]
+    found = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
+    swayed = roots.copy()
+    swayed[:, [2, 0]] += ROOT_SWAY * found[:, :2]
+    vectors = found[:, 2:].reshape(len(roots), -1, 3)
+    moved = rotations.copy()
+    for place, role in enumerate(ANGLES):
+        if role in roles:
+            turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, place])
+            moved[:, joints[role]] = quat.mul(moved[:, joints[role]], turn)
+    return moved, swayed
+
+
+def waves(
+    frames: int, rate: float, channels: int, seed: int
+) -> Annotated[Floats, "frames channels"]:
+    """Return smooth random numbers (F, C) with a mean of zero and a variance of one over seeds.
+
+    rate: frames a second. Each channel is a sum of waves of `FREQUENCIES` with random coefficients.
+    """
+    angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * np.array(FREQUENCIES)
+    basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.sqrt(len(FREQUENCIES))
+    found: Floats = basis @ philox.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
+    return found
+
+
+REST_FRAMES = 16
+"""Frames in which a motion comes to rest; they show the last half as many frames of it."""
+RAMP = 1.0
+"""Time in which sway grows and fades, s. A shorter hold sways less."""
+LOOK_RAMP = 0.5
+"""Time in which the gaze turns to a point and back, s."""
+# Frames through which the one between two others is interpolated.
+WINDOW = 4
+
+
+@dataclass(frozen=True)
+class HeldBody:
+    """Skeleton of a character that stays in a pose.
+
+    bones: offsets (J, 3), m. joints: by role. facing: of the rest pose, from +z to the left, rad.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    bones: Bones
+    joints: Mapping[str, int]
+    facing: float = 0.0
+
+
+def body_of(
+    skeleton: Skeleton, roles: Mapping[str, str], bones: Bones, facing: float = 0.0
+) -> HeldBody:
+    """Return the body of a character with joints by role, bone offsets (J, 3), m, and its facing.
+
+    facing: of the rest pose, from +z to the left, rad.
+    """
+    joints = {role: skeleton.names.index(joint) for role, joint in roles.items()}
+    return HeldBody(skeleton.names, skeleton.parents, bones, joints, facing)
+
+
+def come_to_rest(before: Passage) -> Passage:
+    """Return the passage with its end slowed down, so that it reaches its last pose at rest.
+
+    The last frames are shown in twice their time, `REST_FRAMES` at most, with the speed of time
+    1 - 3 u^2 + 2 u^3 over them, so that each joint keeps its path.
+    """
+    places = _slowed_places(len(before))
+    if not len(places):
+        return before
+    begin = len(before) - 1 - len(places) // 2
+    return concatenate(before.part(0, begin + 1), at_frames(before, places))
+
+
+def rest_frame(frames: int, frame: int) -> int:
+    """Return the frame of a slowed passage that is nearest to a frame of the original one.
+
+    frames: number of frames of the original passage.
+    """
+    places = _slowed_places(frames)
+    begin = frames - 1 - len(places) // 2
+    if frame <= begin:
+        return frame
+    return begin + 1 + int(np.argmin(np.abs(places - frame)))
+
+
+def _slowed_places(frames: int) -> Frames:
+    """Return the fractional frames (S,) at which a passage of F frames is sampled as it slows."""
+    shown = min(REST_FRAMES // 2, frames - 1)
+    if not shown:
+        return np.zeros(0)
+    share = np.arange(1, 2 * shown + 1) / (2 * shown)
+    gone = 2.0 * shown * (share - share**3 + 0.5 * share**4)
+    found: Frames = frames - 1 - shown + np.minimum(gone, shown)
+    return found
+
+
+def hold_passage(
+    before: Passage,
+    body: HeldBody,
+    seconds: float,
+    joint: str | None = None,
+    look_at: tuple[float, float, float] | None = None,
+    seed: int = 0,
+) -> tuple[Passage, float]:
+    """Return the frames in which the last pose of a passage is held, that one left out.
+
+    Second is the angle by which the gaze stays beside its point, rad; 0 for none. seconds: how long
+    the pose is kept. joint: name of the joint that stays where it is. look_at: point that the head
+    turns to, in the frame of the passage, m. seed: of the sway. The passage has come to rest
+    (`come_to_rest`). The held joint stays where it is, and so does its orientation; feet are to be
+    planned, as their contacts go on. Raises InvalidField for a time without a frame, a joint that
+    no arm or leg leads to, and as `Looker.look_at` does.
+    """
+    seconds = value_validation.check_number("hold", seconds)
+    count = round(seconds * RATE)
+    if count < 1:
+        raise InvalidField("hold", f"{seconds:g} s, expected at least {1.0 / RATE:.3g} s")
+    limb = _limb(body, joint)
+    rotations = np.repeat(before.rotations[-1:], count, axis=0)
+    roots = np.repeat(before.roots[-1:], count, axis=0)
+    # The speed of the sway is that of a long hold.
+    sway = _envelope(count, RAMP) * min(1.0, 0.5 * count / RATE / RAMP)
+    rotations, roots = add_sway(rotations, roots, body.joints, sway, RATE, seed)
+    miss = 0.0
+    if look_at is not None:
+        point = np.array(
+            [value_validation.check_number(f"look_at/{i}", own) for i, own in enumerate(look_at)]
+        )
+        looker = Looker(body.parents, body.bones, body.joints, body.facing)
+        gaze = looker.look_at(before.rotations[-1], before.roots[-1], point)
+        # A head cannot turn to a point and back in no time: a short hold turns it by a part.
+        share = min(1.0, 0.5 * count / RATE / LOOK_RAMP)
+        turning = _envelope(count, LOOK_RAMP) * share
+        rotations = gaze.add(body.parents, rotations, turning)
+        miss = gaze.miss + (1.0 - share) * float(np.linalg.norm(gaze.turn))
+    if limb is not None:
+        rotations, roots = _keep(body, limb, before, rotations, roots)
+    last = before.part(len(before) - 1, len(before))
+    contacts, sigmas = (np.repeat(own, count, axis=0) for own in (last.contacts, last.sigmas))
+    return Passage(rotations, roots, contacts, sigmas), miss
+
+
+def at_frames(own: Passage, places: Frames) -> Passage:
+    """Return a passage at fractional frames (S,), by cubics through the nearest ones."""
+    size = min(WINDOW, len(own))
+    first = np.clip(places.astype(int) - 1, 0, len(own) - size)
+    rows = first[:, None] + np.arange(size)
+    weights = _lagrange(places - first, size)
+    nearest = own.rotations[rows[:, 0]]
+    apart = quat.log(quat.mul(quat.conj(nearest)[:, None], own.rotations[rows]))
+    turned = quat.mul(nearest, quat.exp(np.einsum("sk,skjc->sjc", weights, apart)))
+    roots = np.einsum("sk,skc->sc", weights, own.roots[rows])
+    before = np.clip(places.astype(int), 0, len(own) - 1)
+    after = np.minimum(before + 1, len(own) - 1)
+    share = places - before
+    contacts = own.contacts[before] + share[:, None] * (own.contacts[after] - own.contacts[before])
+    sigmas = own.sigmas[before] + share * (own.sigmas[after] - own.sigmas[before])
+    return Passage(turned, roots, contacts, sigmas)
+
+
+def _lagrange(places: Frames, size: int) -> np.ndarray:
+    """Return the weights (S, size) of points 0, 1, ... for the polynomial through them."""
+    found = np.ones((len(places), size))
+    for point in range(size):
+        for other in range(size):
+            if other != point:
+                found[:, point] *= (places - other) / (point - other)
+    return found
+
+
+def _envelope(count: int, ramp: float) -> Frames:
+    """Return a weight (F,) that grows from 0 to 1 and falls to 0 in the last frame."""
+    times = np.arange(1, count + 1) / RATE
+    whole = count / RATE
+    share = np.clip(np.minimum(times, whole - times) / min(ramp, 0.5 * whole), 0.0, 1.0)
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+
+
+def _limb(body: HeldBody, name: str | None) -> Limb | None:
+    """Return the limb that ends at a joint; None for no joint."""
+    if name is None:
+        return None
+    if name not in body.names:
+        known = ", ".join(body.names)
+        raise InvalidField("joint", f"{name!r}{did_you_mean(name, body.names)}, expected {known}")
+    found = limbs.find_kept_limb(body.parents, body.bones, body.names.index(name))
+    if found is None:
+        raise InvalidField("joint", f"{name!r}, expected a joint that an arm or a leg leads to")
+    return found
+
+
+def _keep(
+    body: HeldBody, limb: Limb, before: Passage, rotations: Rotations, roots: RootPath
+) -> tuple[Rotations, RootPath]:
+    """Return poses (F, J, 4) and roots (F, 3), m, whose limb ends where it did.
+
+    The root follows where the limb is too short.
+    """
+    last = limbs.evaluate_poses(
+        body.parents, body.bones, [limb], before.rotations[-1:], before.roots[-1:]
+    )
+    poses = limbs.evaluate_poses(body.parents, body.bones, [limb], rotations, roots)
+    apart = last.position(limb.lower) - poses.position(limb.upper)
+    distance = np.linalg.norm(apart, axis=-1)
+    beyond = np.maximum(distance - two_bone.firm_reach(last, limb), 0.0)
+    shift = (beyond / distance)[:, None] * apart
+    turns = two_bone.solve(poses, limb, apart - shift)
+    # The hand keeps its orientation while the body above it sways.
+    kept = quat.mul(quat.conj(poses.orientation(limb.lower)), last.orientation(limb.lower))
+    found = rotations.copy()
+    replace(turns, lower=quat.mul(turns.lower, kept)).apply(limb, found)
+    return found, roots + shift
+
+
+LOOKS_ASIDE = np.radians(2.0)
+"""Angle by which the gaze may stay beside its point without a warning, rad."""
+
+
+def add_hold(timeline: Timeline, script: Script, index: int) -> None:
+    """Add a hold to the motion; an act before it stops at its event.
+
+    Raises InvalidField for a joint that cannot be held, for a point that cannot be looked at, and
+    for an act before it that has a target after its event.
+    """
+    own = script.segments[index]
+    if not isinstance(own, Hold):
+        raise TypeError(f"segment {index}, expected a hold")
+    _come_to_rest(timeline)
+    before = timeline.done
+    joint = own.joint or _held_joint(timeline, script)
+    who = script.character
+    body = body_of(who.skeleton, who.roles, who.bones, who.facing)
+    passage, miss = hold_passage(
+        before, body, own.seconds, joint, own.look_at, script.question.take
+    )
+    if miss > LOOKS_ASIDE:
+        timeline.warn(
+            f"/segments/{index}/look_at",
+            f"the head looks {np.degrees(miss):.0f} degrees beside the point",
+        )
+    begin = len(before) - 1
+    timeline.motion = concatenate(before, passage)
+    model = timeline.spans[-1].model if timeline.spans else script.character.identity
+    sigma = float(before.sigmas[-1])
+    timeline.spans.append(Span("hold", model, begin, begin, sigma))
+    # A target that holds at the begin of a hold holds until its end.
+    last = len(timeline.done) - 1
+    timeline.targets = [
+        replace(each, end=last) if each.end == begin else each for each in timeline.targets
+    ]
+    timeline.targets += _held_place(timeline, script, joint, range(begin, last + 1), index)
+    timeline.exits = range(last, last + 1)
+
+
+def _held_place(
+    timeline: Timeline, script: Script, joint: str | None, frames: range, index: int
+) -> list[WorldTarget]:
+    """Return the place of the joint that is held as a target, so that feet are planned around it.
+
+    Empty for a joint that stays anyway: one with a target there, or of a foot that stands.
+    """
+    body, character = script.character.body, script.character
+    if joint is None:
+        return []
+    own = character.skeleton.names.index(joint)
+    above = skeleton.joint_chain(body.parents, own)
+    standing = timeline.done.contacts[frames.start] > STANDING
+    legs = zip(body.legs, standing.tolist(), strict=True)
+    known = [each for each in timeline.targets if each.end == frames[-1]]
+    if any(down and leg.lower in above for leg, down in legs) or own in {
+        each.joint for each in known
+    }:
+        return []
+    pose = timeline.done.part(frames.start, frames.start + 1)
+    moved = skeleton.translations(body.bones, pose.roots)
+    place = skeleton.positions(body.parents, pose.rotations, moved)[0, own]
+    return [WorldTarget(own, place, frames[0], frames[-1], f"/segments/{index}")]
+
+
+def _come_to_rest(timeline: Timeline) -> None:
+    """End the motion at its last event, at rest; targets near it are met later."""
+    done, span = timeline.done, timeline.spans[-1] if timeline.spans else None
+    if span is not None and span.kind == "hold":
+        return
+    last = len(done) - 1 if span is None or span.event is None else span.event
+    late = next((own for own in timeline.targets if own.begin > last), None)
+    if late is not None:
+        raise InvalidField(
+            "",
+            f"stops the act before it at its event, {(late.begin - last) / RATE:.2f} s before the "
+            f"moment of the target {late.pointer}, expected targets until the event",
+        )
+    rested = come_to_rest(done.part(0, last + 1))
+    later = len(rested) - 1
+    timeline.motion = rested
+    if span is not None and span.event == last:
+        timeline.spans[-1] = replace(span, event=later)
+    timeline.targets = [
+        replace(
+            own,
+            begin=rest_frame(last + 1, own.begin),
+            end=rest_frame(last + 1, own.end),
+        )
+        for own in timeline.targets
+    ]
+
+
+def _held_joint(timeline: Timeline, script: Script) -> str | None:
+    """Return the joint of the event that the hold begins with, such as the hand of a reach."""
+    index = len(timeline.spans) - 1
+    source = script.sources[index] if index >= 0 else None
+    event = None if source is None else source.model.session.card.event
+    if event is None or timeline.spans[-1].kind != "act":
+        return None
+    return script.character.skeleton.names[event.joint]

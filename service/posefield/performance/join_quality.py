@@ -1,0 +1,320 @@
+"""Feet at joins, and facts about joins: how far poses are apart, and how fast they change.
+
+No blend keeps the place of a foot that stands on both sides of a cut, at two places. So contacts
+are changed around the cut, and `feet.footsteps` plans the feet over the whole performance. A join
+is judged once, when its feet are placed: before that its peak is not known.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames
+from posefield.common.units import UP, Booleans, Floats
+from posefield.feet import limbs
+from posefield.feet.contact_estimates import DECIMALS, STANDING
+from posefield.feet.foot_placement import PlacedFrames
+from posefield.feet.footsteps import Character
+from posefield.locomotion import floor_plane
+from posefield.model_file.captured_acceleration import USUAL, mean_accelerations
+from posefield.motion.contacts import contact_detection
+from posefield.motion.foot_contacts import FootContact
+from posefield.performance.joins import Blend, Cut, positions
+from posefield.performance.passage import RATE, Passage, concatenate
+from posefield.question.performance_report import Reference
+
+MOST_DISTANCE = 0.25
+"""Distance of the poses at a cut from which on a join is hard, m."""
+MOST_PEAK = 3.0
+"""Peak acceleration of a join over the usual one from which on it is hard (decision 0086)."""
+MOST_DROP = 0.12
+"""Difference of the roots' heights at a cut from which on a join is hard, m."""
+# The peak is looked for from this time before a join to this one after it, s.
+BEFORE, AFTER = 0.1, 0.6
+MOTIONS: Mapping[Reference, str] = {
+    "captured": "captured clips of the models that are joined",
+    "synthesised": "motions that are joined",
+}
+"""Motions that a join is compared with, in words."""
+
+
+@dataclass(frozen=True)
+class UsualMotion:
+    """Usual largest acceleration of the motions of a join, and where it was measured.
+
+    acceleration: 99th percentile of the frames' accelerations, m/s². reference: of the models'
+    captured clips, or of the motions as they were synthesised.
+    """
+
+    acceleration: float
+    reference: Reference
+
+
+@dataclass(frozen=True)
+class CutFacts:
+    """Facts about a join that stay when targets are met and feet are placed.
+
+    distance: RMS distance of the joints at the cut, m. drop: difference of the roots' heights
+    there, m. blend: its kind. usual: of the motions on both sides.
+    """
+
+    distance: float
+    drop: float
+    blend: Blend
+    usual: UsualMotion
+
+
+@dataclass(frozen=True)
+class JoinFacts:
+    """Facts about a join in the motion that is sent.
+
+    peak: largest mean over the joints of the acceleration relative to the root, m/s², from 0.1 s
+    before to 0.6 s after the cut.
+    """
+
+    cut: CutFacts
+    peak: float
+
+    @property
+    def hard(self) -> bool:
+        """Say whether the poses are too far apart, or change too fast."""
+        return bool(self.reasons)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Return why a join is hard, in words; empty if it is not."""
+        cut, found = self.cut, []
+        if cut.distance > MOST_DISTANCE:
+            found.append(
+                f"the poses are {100 * cut.distance:.0f} cm apart, expected at most"
+                f" {100 * MOST_DISTANCE:.0f}"
+            )
+        if cut.drop > MOST_DROP:
+            found.append(
+                f"the root is {100 * cut.drop:.0f} cm higher on one side, expected at most"
+                f" {100 * MOST_DROP:.0f}"
+            )
+        usual = cut.usual
+        if self.peak > MOST_PEAK * usual.acceleration:
+            found.append(
+                f"joints accelerate by {self.peak:.0f} m/s2, expected at most {MOST_PEAK:g} times"
+                f" the {usual.acceleration:.1f} m/s2 of the {MOTIONS[usual.reference]}"
+            )
+        return tuple(found)
+
+
+def accelerations(character: Character, passage: Passage, begin: int, end: int) -> Frames:
+    """Return mean accelerations (F,) of the joints relative to the root, m/s².
+
+    They are second differences, of the frames from `begin` until before `end`, without those at an
+    end of the passage.
+    """
+    first, last = max(begin - 1, 0), min(end + 1, len(passage))
+    if last - first < 3:
+        return np.zeros(0)
+    return mean_accelerations(positions(character, passage, first, last), RATE)
+
+
+def usual_acceleration(character: Character, passages: Sequence[Passage]) -> float:
+    """Return the 99th percentile of the accelerations of passages, of that with the largest, m/s².
+
+    The passages are as their models made them: without joins.
+    """
+    found = [accelerations(character, passage, 0, len(passage)) for passage in passages]
+    return max((float(np.percentile(own, USUAL)) for own in found if len(own)), default=0.0)
+
+
+def describe_cut(
+    sides: tuple[Passage, Passage], cut: Cut, blend: Blend, usual: UsualMotion
+) -> CutFacts:
+    """Return the facts about a cut. sides: passages before and after it."""
+    apart = (sides[0].roots[cut.exit] - sides[1].roots[cut.entry]) @ UP
+    return CutFacts(cut.distance, abs(float(apart)), blend, usual)
+
+
+def judge(
+    character: Character, joins: Sequence[tuple[int, CutFacts]], sent: PlacedFrames
+) -> list[JoinFacts]:
+    """Return the facts about joins in the motion that is sent.
+
+    joins: frame and cut of each. sent: all frames of the performance, at `RATE`.
+    """
+    return [JoinFacts(cut, _peak(character, sent, frame)) for frame, cut in joins]
+
+
+def judge_act(
+    character: Character, sent: PlacedFrames, frames: tuple[int, int], captured: float
+) -> str:
+    """Return a warning about an act that is faster than captured clips of its model; else "".
+
+    sent: all frames of the performance, at `RATE`. frames: of the act, from its begin until before
+    its end; those near joins count as the joins'. captured: 99th percentile of the accelerations
+    of captured clips, m/s².
+    """
+    # The first and the last one of these frames have no acceleration of their own.
+    begin = frames[0] + round(AFTER * RATE) if frames[0] else 0
+    end = frames[1] - round(BEFORE * RATE) + 1 if frames[1] < len(sent.roots) else frames[1]
+    found = _accelerations(character, sent, slice(begin, max(end, begin)))
+    peak = float(found.max(initial=0.0))
+    if peak <= MOST_PEAK * captured:
+        return ""
+    time = (begin + 1 + int(np.argmax(found))) / RATE
+    return (
+        f"joints accelerate by {peak:.0f} m/s2 at {time:.2f} s, expected at most {MOST_PEAK:g}"
+        f" times the {captured:.1f} m/s2 of captured clips of the model"
+    )
+
+
+def _peak(character: Character, sent: PlacedFrames, frame: int) -> float:
+    """Return the largest acceleration near a frame, m/s², as `JoinFacts.peak` is."""
+    first = max(frame - round(BEFORE * RATE) - 1, 0)
+    found = _accelerations(character, sent, slice(first, frame + round(AFTER * RATE) + 2))
+    return float(found.max(initial=0.0))
+
+
+def _accelerations(character: Character, sent: PlacedFrames, rows: slice) -> Frames:
+    """Return the mean accelerations of some frames without the first and the last one, m/s²."""
+    rotations, roots = sent.rotations[rows], sent.roots[rows]
+    count = len(roots)
+    passage = Passage(rotations, roots, np.zeros((count, 0)), np.zeros(count))
+    return accelerations(character, passage, 0, count)
+
+
+FARTHEST = 0.05
+"""Distance over the floor by which a foot that stands on both sides may be moved, m."""
+SWING, SUPPORT = 0.35, 0.05
+"""Durations of a step over a join, and of the time on both feet before the next one, s."""
+LANDING = 0.4
+"""Time within which a foot that swings before a join lands after it, s."""
+# A swing of the other foot is put off if this much of it is left, s.
+SHORTEST_SWING = 0.2
+# A foot that has come so near the height that it has after a join is on the ground, m.
+LOW = contact_detection.DEFAULT.height
+
+
+@dataclass(frozen=True)
+class JoinStep:
+    """A step over a join. foot: column of the contacts. begin, end: frames. distance: m."""
+
+    foot: int
+    begin: int
+    end: int
+    distance: float
+
+
+def on_floor(
+    character: Character, passage: Passage, contacts: Sequence[FootContact], floor: float = 0.0
+) -> tuple[Passage, float]:
+    """Return a passage whose feet stand as high as captured ones do, and how far it was raised, m.
+
+    A model of another character, or another model of the same one, may have feet that float or sink
+    by a few cm. One height for a whole performance cannot mend that, so each passage has its own:
+    by the median over the frames in which a foot stands, and the mean over its feet. contacts: of
+    the character's legs. floor: its height, m.
+    """
+    heights = _balls(character, passage) @ UP
+    down = np.round(passage.contacts, DECIMALS) > STANDING
+    above = [
+        float(np.median(ball[own])) - foot.height - floor
+        for ball, foot, own in zip(heights.T, contacts, down.T, strict=True)
+        if own.any()
+    ]
+    raised = -float(np.mean(above)) if above else 0.0
+    return replace(passage, roots=passage.roots + raised * UP), raised
+
+
+def add_steps(
+    character: Character, before: Passage, after: Passage, cut: Cut, joined: Passage
+) -> tuple[Passage, tuple[JoinStep, ...]]:
+    """Return a joined passage with contacts that let feet step over the cut, and the steps.
+
+    after: where the cut places it. joined: `blends.join` of both, or a longer passage with the join
+    at frame `cut.exit`. A foot that stands more than 5 cm apart on both sides steps, one foot after
+    another, the farthest first. A foot that swings before the cut and stands after it lands where
+    it has come near the ground and its place.
+    """
+    end = min(cut.exit + round((LANDING + 2.0 * (SWING + SUPPORT)) * RATE), len(joined))
+    left, right = (
+        before.part(cut.exit, cut.exit + 1),
+        after.part(cut.entry, cut.entry + end - cut.exit),
+    )
+    made = joined.part(cut.exit, cut.exit + len(right))
+    # All at once: for so few poses each call takes longer than the poses.
+    every = _balls(character, concatenate(left, right, made))
+    own, there, shown = every[0], every[1 : 1 + len(right)], every[1 + len(right) :]
+    stands = [_standing(side, at) for side, at in ((before, cut.exit), (after, cut.entry))]
+    contacts = joined.contacts.copy()
+    landed = cut.exit
+    for foot in np.flatnonzero(~stands[0] & stands[1]).tolist():
+        last = cut.exit + _landing(shown[:, foot], there[:, foot])
+        contacts[cut.exit : last, foot] = 0.0
+        landed = max(landed, last)
+    apart = _apart(own, there[0])
+    must = np.flatnonzero(stands[0] & stands[1] & (np.round(apart, DECIMALS) > FARTHEST))
+    steps = []
+    for foot in sorted(
+        must.tolist(), key=lambda foot: (-round(float(apart[foot]), DECIMALS), foot)
+    ):
+        step = JoinStep(foot, landed, landed + round(SWING * RATE), float(apart[foot]))
+        _swing(contacts, step)
+        steps.append(step)
+        landed = step.end + round(SUPPORT * RATE)
+    return replace(joined, contacts=contacts), tuple(steps)
+
+
+def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames feet 3"]:
+    """Return the paths of the joints that contact."""
+    tips = [leg.tip for leg in character.legs]
+    poses = limbs.evaluate_joints(
+        character.parents, character.bones, tips, passage.rotations, passage.roots
+    )
+    balls = [poses.position(tip) for tip in tips]
+    return np.stack(balls, axis=1) if balls else np.zeros((len(passage), 0, 3))
+
+
+def _standing(passage: Passage, frame: int) -> Annotated[Booleans, "feet"]:
+    """Return which feet stand in a frame."""
+    found: Booleans = np.round(passage.contacts[frame], DECIMALS) > STANDING
+    return found
+
+
+def _apart(
+    own: Annotated[Floats, "*#batch 3"], other: Annotated[Floats, "*#batch 3"]
+) -> Annotated[Floats, "*batch"]:
+    """Return distances over the floor, m."""
+    found: Floats = np.abs(floor_plane.project(own) - floor_plane.project(other))
+    return found
+
+
+def _landing(shown: Annotated[Floats, "frames 3"], there: Annotated[Floats, "frames 3"]) -> int:
+    """Return the number of frames from a cut to the landing of a foot.
+
+    It lands once its shown path is within 5 cm of the place where it stands after the join, and
+    nearly as low; at `LANDING` at the latest.
+    """
+    count = min(len(shown), len(there), round(LANDING * RATE))
+    own, other = shown[:count], there[:count]
+    near = (_apart(own, other) <= FARTHEST) & (np.abs(own[:, 1] - other[:, 1]) <= LOW)
+    return int(np.argmax(near)) if near.any() else count
+
+
+def _swing(contacts: Annotated[Floats, "frames feet"], step: JoinStep) -> None:
+    """Change contacts so that one foot swings, while those that stand when it begins stay."""
+    begin, end = step.begin, min(step.end, len(contacts))
+    if begin >= end:
+        return
+    for other in range(contacts.shape[1]):
+        if other == step.foot or contacts[begin, other] <= STANDING:
+            continue
+        lifted = contacts[begin:end, other] <= STANDING
+        if lifted.any() and _left(contacts[end:, other]) >= round(SHORTEST_SWING * RATE):
+            contacts[begin:end, other] = 1.0
+    contacts[begin:end, step.foot] = 0.0
+
+
+def _left(contacts: Sequence[float] | Floats) -> int:
+    """Return the number of frames until a foot stands."""
+    standing = np.asarray(contacts) > STANDING
+    return int(np.argmax(standing)) if standing.any() else len(standing)

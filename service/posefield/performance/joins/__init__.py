@@ -1,1 +1,0 @@
-"""Joins of a performance: cuts, blends, steps over them, and how hard they are."""

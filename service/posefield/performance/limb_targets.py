@@ -1,0 +1,247 @@
+"""Exact targets on the character of a performance: limbs are bent so that joints meet them.
+
+A model meets its targets with its own bones before it is joined to what comes before. What other
+bones and the joins leave is the work of the limb alone. Its joints are turned as far as the target
+needs it, and before and after that by a share of these turns, so that no limb is jerked straight.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, RootPath, Vector
+from posefield.common.units import Floats, Indices
+from posefield.feet import limbs, two_bone
+from posefield.feet.footsteps import Character
+from posefield.feet.leads import Led
+from posefield.feet.limbs import Limb, LimbPoses, Turns
+from posefield.feet.two_bone import LimbTurns
+from posefield.motion import quat, skeleton
+from posefield.motion.blend import smoothstep
+from posefield.performance.passage import RATE, Passage
+
+EASING, LONGEST_EASING = 0.5, 1.2
+"""Shortest and longest time before and after a target over which a limb goes to and from it, s."""
+EASE, FAR = 0.02, 0.1
+"""Length by which a limb stays shorter than it could, m, for a target this much or more out of
+reach, m: a stretched limb leaves the pelvis no room to be lowered for the feet."""
+GENTLE = 8.0
+"""Acceleration of a limb's end on its way to and from a target, m/s²; the longest time limits it
+less."""
+
+
+@dataclass(frozen=True)
+class WorldTarget:
+    """Point at which a joint is from one frame until another.
+
+    position: in the world, m. pointer: to the target in the script.
+    """
+
+    joint: int
+    position: Vector
+    begin: int
+    end: int
+    pointer: str
+
+
+def find_limbs(character: Character, targets: Sequence[WorldTarget]) -> dict[int, Limb | None]:
+    """Return the limb that moves each joint with a target; None for a joint of the trunk."""
+    return {
+        own.joint: limbs.find_kept_limb(character.parents, character.bones, own.joint)
+        for own in targets
+    }
+
+
+def meet_targets(
+    character: Character, passage: Passage, targets: Sequence[WorldTarget]
+) -> tuple[Passage, tuple[float, ...]]:
+    """Return the passage whose joints meet targets, and the distances that are left, m.
+
+    A target out of reach is approached as far as its limb extends. A joint of the trunk stays where
+    it is.
+    """
+    found = find_limbs(character, targets)
+    for own in targets:
+        limb = found[own.joint]
+        if limb is not None:
+            others = [each for each in targets if _share_joints(found[each.joint], limb)]
+            passage = _moved(character, passage, limb, own, others)
+    return passage, tuple(_miss(character, passage, own) for own in targets)
+
+
+def _share_joints(one: Limb | None, other: Limb) -> bool:
+    return one is not None and not set(_chain(one)).isdisjoint(_chain(other))
+
+
+def find_leads(
+    character: Character, targets: Sequence[WorldTarget], frames: range
+) -> tuple[Character, Led]:
+    """Return the character with the limbs that targets lead, and when they are led.
+
+    frames: of the motion in the time of the targets. A foot with a target is led while the target
+    holds, and planned as any other foot before and after. Another limb keeps the path of its end
+    while its way is eased. Where a target is met by neither, such as one of the trunk, the whole
+    body stays as it is.
+    """
+    count, around = len(frames), EASING * RATE
+    feet, root = np.zeros((len(character.legs), count), bool), np.zeros(count, bool)
+    arms: dict[Limb, Frames] = {}
+    found = find_limbs(character, targets)
+    used = {joint for leg in character.legs for joint in _chain(leg)}
+    for own in targets:
+        limb, share = found[own.joint], _share(np.array(frames, float), own, around, around)
+        above = skeleton.joint_chain(character.parents, own.joint)
+        legs = [leg.lower in above for leg in character.legs]
+        if limb is not None and (limb in arms or not used.intersection(_chain(limb))):
+            arms[limb] = np.maximum(arms.get(limb, 0.0), share)
+            used.update(_chain(limb))
+        elif any(legs):
+            feet[legs] |= share == 1.0
+        else:
+            feet[:] |= share == 1.0
+            root |= share == 1.0
+    shares = np.array(list(arms.values())).reshape(len(arms), count)
+    return replace(character, kept=tuple(arms)), Led(feet, shares, root)
+
+
+def _chain(limb: Limb) -> tuple[int, int, int]:
+    return limb.upper, limb.middle, limb.lower
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A limb in the frames in which its target holds.
+
+    way: along which its end goes there, m, as an arc. turns: of its joints then.
+    """
+
+    way: float
+    turns: LimbTurns
+
+
+def _moved(
+    character: Character,
+    passage: Passage,
+    limb: Limb,
+    own: WorldTarget,
+    others: Sequence[WorldTarget],
+) -> Passage:
+    """Return the passage with one limb bent so that its tip meets a target.
+
+    others: targets of joints of the same limb, at which this one does not act.
+    """
+    held = _hold(_poses(character, passage, limb, range(own.begin, own.end + 1)), limb, own)
+    # A cosine over a time T has the acceleration 0.5 (pi / T)^2 times the way.
+    around = float(np.sqrt(0.5 * np.pi**2 * held.way / GENTLE))
+    frames = round(float(np.clip(around, EASING, LONGEST_EASING)) * RATE)
+    before = min([frames, *(own.begin - each.end for each in others if each.end < own.begin)])
+    after = min([frames, *(each.begin - own.end for each in others if each.begin > own.end)])
+    rows = range(max(own.begin - before, 0), min(own.end + after + 1, len(passage)))
+    share = _share(np.array(rows, float), own, before, after)
+    poses = _poses(character, passage, limb, rows)
+    rotations = passage.rotations.copy()
+    _eased(poses, limb, held.turns, share, own.begin - rows.start).apply(
+        limb, rotations[rows.start : rows.stop]
+    )
+    return replace(passage, rotations=rotations)
+
+
+def _poses(character: Character, passage: Passage, limb: Limb, rows: range) -> LimbPoses:
+    own = slice(rows.start, rows.stop)
+    return limbs.evaluate_poses(
+        character.parents, character.bones, [limb], passage.rotations[own], passage.roots[own]
+    )
+
+
+def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> _Held:
+    """Return a limb, in the frames in which a target holds, with its tip there or nearest to it."""
+    upper, lower = poses.position(limb.upper), poses.position(limb.lower)
+    wanted = own.position - poses.position(limb.tip) + lower
+    goal = wanted + _shortfall(poses, limb, upper, wanted)
+    end = goal - upper
+    distance = np.linalg.norm(end, axis=-1)
+    above, below = poses.length(limb.middle), poses.length(limb.lower)
+    least = np.maximum(distance, 1.001 * np.abs(above - below) + 1e-6)
+    end = end * (least / np.maximum(distance, 1e-9))[:, None]
+    before = (lower - upper)[:1]
+    sine, cosine = np.linalg.norm(quat.cross(before, end[:1])), np.sum(before * end[:1])
+    arc = float(np.arctan2(sine, cosine) * np.linalg.norm(end[0]))
+    stretch = float(np.linalg.norm(end[0]) - np.linalg.norm(before))
+    return _Held(float(np.hypot(arc, stretch)), two_bone.solve(poses, limb, end))
+
+
+def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) -> Vector:
+    """Return by how much the end of a limb stays away from where it is wanted (3,), m.
+
+    It is the same in all frames, so that what is held stays still while the body sways.
+    """
+    firm = two_bone.firm_reach(poses, limb)
+    if (np.linalg.norm(wanted - upper, axis=-1) <= firm + 1e-9).all():
+        return np.zeros(3)
+    centre = upper.mean(axis=0)
+    spread = float(np.linalg.norm(upper - centre, axis=-1).max())
+    away = wanted.mean(axis=0) - centre
+    distance = max(float(np.linalg.norm(away)), 1e-9)
+    length = float((poses.length(limb.middle) + poses.length(limb.lower))[0])
+    reached = float(two_bone.soften(np.array([distance + spread]), firm[:1], length)[0]) - spread
+    beyond = np.clip((distance + spread - firm[:1]) / FAR, 0.0, 1.0)
+    reached -= EASE * float(smoothstep(beyond)[0])
+    shortfall: Vector = away * (reached / distance - 1.0)
+    return shortfall
+
+
+def _eased(poses: LimbPoses, limb: Limb, held: LimbTurns, share: Frames, first: int) -> LimbTurns:
+    """Return the turns of a limb's joints on the way to a target, while it holds, and after it.
+
+    share: of the turns that the target needs (F,). first: frame from which on it holds. The
+    orientation of the limb's end is kept.
+    """
+    count = len(held.upper)
+    near = np.clip(np.arange(len(share)) - first, 0, count - 1)
+    above = poses.parent_orientation(limb.upper)
+    own = [
+        quat.mul(quat.conj(above), poses.orientation(limb.upper)),
+        quat.mul(quat.conj(poses.orientation(limb.upper)), poses.orientation(limb.middle)),
+    ]
+    upper, middle = (
+        _turned(before, after, share, near, first)
+        for before, after in zip(own, (held.upper, held.middle), strict=True)
+    )
+    turned = quat.mul(above, quat.mul(upper, middle))
+    return LimbTurns(upper, middle, quat.mul(quat.conj(turned), poses.orientation(limb.lower)))
+
+
+def _turned(
+    before: Turns,
+    held: Annotated[Floats, "held 4"],
+    share: Frames,
+    near: Annotated[Indices, "frames"],
+    first: int,
+) -> Turns:
+    """Return a joint's rotations (F, 4) with a share of the turn that it has at a target.
+
+    near: for each frame, that of the held ones (H, 4) that is nearest to it.
+    """
+    apart = quat.mul(held, quat.conj(before[first : first + len(held)]))
+    apart = apart * np.where(apart[:, :1] < 0.0, -1.0, 1.0)
+    return quat.mul(quat.exp(share[:, None] * quat.log(apart)[near]), before)
+
+
+def _share(frames: Frames, own: WorldTarget, before: float, after: float) -> Frames:
+    """Return the share (F,) of a target: 1 while it holds, 0 some frames `before` and `after`."""
+    early, late = (own.begin - frames) / before, (frames - own.end) / after
+    away = np.clip(np.maximum(early, late), 0.0, 1.0)
+    found: Frames = 0.5 + 0.5 * np.cos(np.pi * away)
+    return found
+
+
+def _miss(character: Character, passage: Passage, own: WorldTarget) -> float:
+    """Return the largest distance of a joint from its target while it holds, m."""
+    part = passage.part(own.begin, min(own.end + 1, len(passage)))
+    placed = limbs.evaluate_joints(
+        character.parents, character.bones, [own.joint], part.rotations, part.roots
+    )
+    found = placed.position(own.joint)
+    return float(np.linalg.norm(found - own.position, axis=-1).max())

@@ -1,0 +1,284 @@
+"""Standing pose of a walker, made from its slowest cycle: no captured clip stands.
+
+Trunk, head and arms have their mean rotations over the cycle. Each leg is that of the moment at
+which the other foot passes it, so that its foot is flat; both feet are then brought beside each
+other, and the knees a little straighter, by inverse kinematics.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Bones, JointRotations, RootPath, Rotations, Vector
+from posefield.common.units import UP, Floats, Indices
+from posefield.common.value_cache import ValueCache
+from posefield.feet import limbs, two_bone
+from posefield.feet.limbs import Limb, LimbPoses
+from posefield.locomotion import floor_plane, stride
+from posefield.locomotion.floor_plane import FloorVectors
+from posefield.locomotion.stride import RelativePoses
+from posefield.motion import blend, quat, skeleton
+from posefield.motion.foot_contacts import FootContact
+from posefield.performance.passage import FloorMotion
+from posefield.performance.walker import Walker, WalkerKey
+from posefield.synthesis import walking_feet
+
+PHASES = 30
+"""Phases of the cycle at which the poses are evaluated."""
+# Walkers whose standing poses are kept, by model, labels and given controls; 3 kB each.
+KEPT = 64
+LEFT = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class FootPassing:
+    """Moment of the cycle at which the swinging foot is beside the standing one.
+
+    phase: of the cycle. swinging: leg, by place. before, after: phases since the double support
+    before it, and to the one after it.
+    """
+
+    phase: float
+    swinging: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class StandingPose:
+    """Pose with both feet on the floor, in the frame that travels with the walker.
+
+    parents: of the joints. bones: offsets (J, 3), m. legs: of the two feet, in the order of the
+    passages' contacts. contacts: statistics of the feet. passings: of a cycle. rotations: (J, 4).
+    height: of the root, m. place: of the root over the floor. balls: of the feet over the floor
+    (2,). levels: heights of the balls (2,), m. gaps: from the balls to where they are in the walk
+    while the other foot passes (2,).
+    """
+
+    parents: tuple[int, ...]
+    bones: Bones
+    legs: tuple[Limb, Limb]
+    contacts: tuple[FootContact, FootContact]
+    passings: tuple[FootPassing, FootPassing]
+    rotations: JointRotations
+    height: float
+    place: complex
+    balls: Annotated[FloorVectors, "2"]
+    levels: Annotated[Floats, "2"]
+    gaps: Annotated[FloorVectors, "2"]
+
+    @property
+    def phases(self) -> Annotated[Floats, "2"]:
+        """Return the phases at which a foot passes the other one."""
+        return np.array([own.phase for own in self.passings])
+
+    def passing_at(self, phase: float) -> FootPassing:
+        """Return the passing that is nearest to a phase."""
+        return min(self.passings, key=lambda own: abs((own.phase - phase + 0.5) % 1.0 - 0.5))
+
+
+def find_standing_pose(walker: Walker) -> StandingPose | None:
+    """Return the standing pose of a walker; None for a model without two feet that step in turn."""
+    return _kept.find(walker.key, lambda: _made(walker))
+
+
+_kept: ValueCache[WalkerKey, StandingPose | None] = ValueCache(KEPT)
+
+
+def _made(walker: Walker) -> StandingPose | None:
+    contacts = walking_feet.foot_contacts(walker.card)
+    if len(contacts) != 2:
+        return None
+    parents = walker.card.skeleton.parents
+    session, controls = walker.gait.session, walker.slowest
+    bones = stride.bones(session, controls, walker.labels(1))[0].astype(np.float64)
+    legs = [limbs.find_limb(parents, bones, own.joint) for own in contacts]
+    phases = np.arange(PHASES) / PHASES
+    rows = np.repeat(controls, PHASES, axis=0)
+    posed = stride.synthesize_poses(session, rows, walker.labels(PHASES), phases)
+    if legs[0] is None or legs[1] is None:
+        return None
+    cycle = _Cycle(parents, bones, (legs[0], legs[1]), posed)
+    passings = _passings(cycle, walker.double_supports)
+    if passings is None:
+        return None
+    return _stand(cycle, (contacts[0], contacts[1]), passings)
+
+
+def path_start(walker: Walker, pose: StandingPose) -> tuple[FloorMotion, float]:
+    """Return where the path of a walk begins that opens from its standing pose, and its phase.
+
+    The path is in the frame of the pose: it begins below the mean root, and runs the way the walker
+    travels.
+    """
+    first = pose.passings[0]
+    place = complex(walker.mean_offsets(walker.slowest)[0]) - pose.gaps[1 - first.swinging]
+    drift = float(walker.strides(walker.slowest).drifts[0])
+    return FloorMotion(drift, complex(place)), first.phase
+
+
+@dataclass(frozen=True)
+class _Cycle:
+    """Poses of one cycle of a walker, at even phases."""
+
+    parents: tuple[int, ...]
+    bones: Bones
+    legs: tuple[Limb, Limb]
+    posed: RelativePoses
+
+    def evaluate(self, rotations: Rotations, roots: RootPath) -> LimbPoses:
+        """Return the limbs in poses (F, J, 4) with roots (F, 3), m."""
+        return limbs.evaluate_poses(self.parents, self.bones, self.legs, rotations, roots)
+
+    @cached_property
+    def roots(self) -> RootPath:
+        """Roots (F, 3), m."""
+        return floor_plane.at_height(self.posed.places, self.posed.heights)
+
+    @cached_property
+    def poses(self) -> LimbPoses:
+        """Limbs in all poses."""
+        return self.evaluate(self.posed.rotations, self.roots)
+
+
+def _passings(
+    cycle: _Cycle, supports: Annotated[Floats, "some"]
+) -> tuple[FootPassing, FootPassing] | None:
+    """Return the moments at which the feet pass each other; None if they do not do so twice."""
+    ahead = [floor_plane.project(cycle.poses.position(leg.tip)).real for leg in cycle.legs]
+    gap = ahead[0] - ahead[1]
+    later = np.roll(gap, -1)
+    rows = np.flatnonzero((gap < 0.0) != (later < 0.0))
+    if len(rows) != 2 or len(supports) != 2:
+        return None
+    first, second = (_passing(gap, later, int(row), supports) for row in rows)
+    return (first, second) if first.swinging != second.swinging else None
+
+
+def _passing(
+    gap: Annotated[Floats, "phases"],
+    later: Annotated[Floats, "phases"],
+    row: int,
+    supports: Annotated[Floats, "some"],
+) -> FootPassing:
+    """Return the passing between a phase and the next one; the foot that gets ahead swings."""
+    phase = (row + float(gap[row] / (gap[row] - later[row]))) / len(gap)
+    before, after = np.min((phase - supports) % 1.0), np.min((supports - phase) % 1.0)
+    return FootPassing(phase, 0 if gap[row] < 0.0 else 1, float(before), float(after))
+
+
+@dataclass(frozen=True)
+class _StandingLeg:
+    """Leg on which a walker stands while the other foot passes, in the frame that travels.
+
+    rotations: of the joints of the leg, by joint (L, 4). foot: orientation (4,) of its end. ball:
+    over the floor. level: height of the ball, m. arm: from the leg's end to the ball (3,), m.
+    chord: distance from the hip to the leg's end in standing, m: halfway between that at this
+    moment, at which a walker's standing leg is bent most, and the longest one.
+    """
+
+    rotations: Annotated[Floats, "some 4"]
+    foot: Annotated[Floats, "4"]
+    ball: complex
+    level: float
+    arm: Vector
+    chord: float
+
+    def ankle(self, ball: complex) -> Vector:
+        """Return the place (3,), m, of the leg's end with the ball of the foot at a floor point."""
+        found: Vector = (
+            floor_plane.at_height(np.array([ball]), np.array([self.level]))[0] - self.arm
+        )
+        return found
+
+
+def _standing_leg(
+    cycle: _Cycle, leg: int, passings: tuple[FootPassing, FootPassing]
+) -> _StandingLeg:
+    """Return a leg at the moment at which the other foot passes it."""
+    (phase,) = (own.phase for own in passings if own.swinging != leg)
+    at = phase * PHASES
+    rows = np.array([int(at), int(at) + 1]) % PHASES
+    share = np.array([at - int(at)])
+    before, after = cycle.posed.rotations[rows][:, None]
+    rotations = blend.nlerp(before, after, share)
+    roots = (1.0 - share) * cycle.roots[rows[:1]] + share * cycle.roots[rows[1:]]
+    poses, limb = cycle.evaluate(rotations, roots), cycle.legs[leg]
+    hip, end, ball = (poses.position(own)[0] for own in (limb.upper, limb.lower, limb.tip))
+    return _StandingLeg(
+        rotations[0, _below(cycle.parents, limb)],
+        poses.orientation(limb.lower)[0],
+        complex(floor_plane.project(ball)),
+        float(ball @ UP),
+        ball - end,
+        0.5 * float(np.linalg.norm(end - hip) + _chords(cycle.poses, limb).max()),
+    )
+
+
+def _chords(poses: LimbPoses, leg: Limb) -> Annotated[Floats, "frames"]:
+    """Return the distances from the hip to the leg's end (F,), m."""
+    found: Floats = np.linalg.norm(poses.position(leg.lower) - poses.position(leg.upper), axis=-1)
+    return found
+
+
+def _below(parents: tuple[int, ...], leg: Limb) -> Indices:
+    """Return the joints of a leg."""
+    return np.flatnonzero(skeleton.descendant_matrix(parents)[leg.upper])
+
+
+def _stand(
+    cycle: _Cycle,
+    contacts: tuple[FootContact, FootContact],
+    passings: tuple[FootPassing, FootPassing],
+) -> StandingPose:
+    """Return the pose in which both feet stand, beside each other."""
+    stood = [_standing_leg(cycle, leg, passings) for leg in range(2)]
+    rotations = quat.mean(cycle.posed.rotations)
+    for leg, own in zip(cycle.legs, stood, strict=True):
+        rotations[_below(cycle.parents, leg)] = own.rotations
+    place = complex(cycle.posed.places.mean())
+    root = np.array([place.imag, 0.0, place.real])
+    poses = cycle.evaluate(rotations[None], root[None])
+    stances = np.array([own.ball for own in stood])
+    balls = stances.real.mean() + 1j * _sides(poses, cycle.legs, stances.imag)
+    ankles = [own.ankle(complex(ball)) for own, ball in zip(stood, balls, strict=True)]
+    heights = [
+        _root_height(poses.position(leg.upper)[0], ankle, own.chord)
+        for leg, ankle, own in zip(cycle.legs, ankles, stood, strict=True)
+    ]
+    poses = cycle.evaluate(rotations[None], (root + min(heights) * UP)[None])
+    for leg, ankle, own in zip(cycle.legs, ankles, stood, strict=True):
+        turns = two_bone.solve(poses, leg, ankle - poses.position(leg.upper))
+        turned = quat.mul(quat.conj(poses.orientation(leg.lower)), own.foot)
+        rotations[leg.upper], rotations[leg.middle] = turns.upper[0], turns.middle[0]
+        rotations[leg.lower] = quat.mul(turns.lower, turned)[0]
+    levels = np.array([own.level for own in stood])
+    pose = rotations, min(heights), place
+    feet = balls, levels, stances - balls
+    return StandingPose(cycle.parents, cycle.bones, cycle.legs, contacts, passings, *pose, *feet)
+
+
+def _sides(
+    poses: LimbPoses, legs: tuple[Limb, Limb], walked: Annotated[Floats, "2"]
+) -> Annotated[Floats, "2"]:
+    """Return how far the feet stand to the left (2,), m, with the root over their middle.
+
+    walked: how far to the left they are in the walk (2,), m. Walkers set one foot nearly before the
+    other one; in standing the feet are halfway from there to the width of the hips.
+    """
+    hips = np.array([poses.position(leg.upper)[0] @ LEFT for leg in legs])
+    width = 0.5 * (hips[0] - hips[1] + walked[0] - walked[1])
+    found: Floats = np.array([0.5, -0.5]) * width + float(poses.position(0)[0] @ LEFT)
+    return found
+
+
+def _root_height(hip: Vector, ankle: Vector, chord: float) -> float:
+    """Return the height of the root, m, at which a leg has a length, m.
+
+    hip: (3,), m, with the root at height 0.
+    """
+    level = float(np.sum(np.square((hip - ankle) * (1.0 - UP))))
+    return float((ankle - hip) @ UP) + math.sqrt(max(chord**2 - level, 0.0))

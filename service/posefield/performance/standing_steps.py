@@ -1,0 +1,224 @@
+"""Opening and closing steps: a walk begins and ends with its feet beside each other.
+
+In a closing step one foot stands, and the other one swings to a place beside it. Meanwhile the root
+slows down until it is at rest over both feet, and the pose is blended into the standing pose. An
+opening step is a closing step backwards in time.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, RootPath, Rotations
+from posefield.common.units import Floats
+from posefield.feet import limbs, two_bone
+from posefield.feet.contact_estimates import STANDING
+from posefield.feet.limbs import LimbPoses
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import FloorVectors
+from posefield.motion import blend
+from posefield.performance.passage import RATE, Passage
+from posefield.performance.standing_pose import StandingPose
+
+# Shares of a step's frames: the latest lift of its foot, and the latest landing.
+LATEST_LIFT, LATEST_LANDING = 0.3, 0.9
+# Time after the landing until the pose is the standing pose, s, and the shortest step, s.
+SETTLING, SHORTEST = 0.2, 0.4
+MOST_BESIDE = 0.03
+"""Distance, m, by which feet beside each other may be ahead of their place under the root."""
+
+
+@dataclass(frozen=True)
+class StandingEnds:
+    """Steps with which a walk begins and ends standing.
+
+    opening, closing: numbers of their frames at the begin and at the end of the walk; 0 for none.
+    """
+
+    pose: StandingPose
+    opening: int = 0
+    closing: int = 0
+
+    def part(self, frames: int, begin: int, end: int) -> "StandingEnds":
+        """Return the steps that are whole in some of the frames of a walk."""
+        opening = self.opening if begin == 0 and end >= self.opening else 0
+        closing = self.closing if end == frames and begin <= frames - self.closing else 0
+        return StandingEnds(self.pose, opening, closing)
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Frames that travel with a walker, which are those of a `WalkPlan`.
+
+    places: over the floor (F,). headings: (F,), rad. phases: (F,), without wrapping.
+    """
+
+    places: Annotated[FloorVectors, "frames"]
+    headings: Frames
+    phases: Frames
+
+    def part(self, frames: slice) -> "Travel":
+        """Return some of the frames."""
+        return Travel(self.places[frames], self.headings[frames], self.phases[frames])
+
+
+def opening_frames(pose: StandingPose, phases: Frames) -> int:
+    """Return the frames from a passing of the feet to the next double support; 0 if too few."""
+    first = float(phases[0])
+    return _enough(int(np.sum(phases <= first + pose.passing_at(first).after)), phases)
+
+
+def closing_frames(pose: StandingPose, phases: Frames) -> int:
+    """Return the frames from the last double support to the end; 0 if too few.
+
+    The end need not be at a passing of the feet, since the scaling of strides is limited.
+    """
+    passing, last = pose.passing_at(float(phases[-1])), float(phases[-1])
+    beyond = (last - passing.phase + 0.5) % 1.0 - 0.5
+    return _enough(int(np.sum(phases >= last - beyond - passing.before)), phases)
+
+
+def _enough(frames: int, phases: Frames) -> int:
+    """Return a number of frames; 0 for too short a step, and for one that is not all there."""
+    return frames if SHORTEST * RATE <= frames < len(phases) else 0
+
+
+def add_standing_ends(walked: Passage, travel: Travel, ends: StandingEnds) -> Passage:
+    """Return a walk of F frames whose first and last ones are its opening and closing steps."""
+    count = len(walked)
+    if ends.opening:
+        rows = slice(ends.opening - 1, None, -1)
+        part = _part(walked, rows)
+        # The foot of an opening step is on the floor from the double support on: contacts are
+        # likely from the landing of the heel on, and a ball that is put down then turns the knee.
+        part = replace(part, contacts=np.zeros_like(part.contacts))
+        walked = _replaced(walked, rows, _close(ends.pose, part, travel.part(rows)))
+    if ends.closing:
+        rows = slice(count - ends.closing, count)
+        walked = _replaced(walked, rows, _close(ends.pose, _part(walked, rows), travel.part(rows)))
+    return walked
+
+
+def _part(own: Passage, rows: slice) -> Passage:
+    """Return some frames of a passage, which may be in the other order."""
+    return Passage(own.rotations[rows], own.roots[rows], own.contacts[rows], own.sigmas[rows])
+
+
+def _replaced(own: Passage, rows: slice, step: Passage) -> Passage:
+    """Return a passage with the frames of a step."""
+    rotations, roots, contacts = own.rotations.copy(), own.roots.copy(), own.contacts.copy()
+    rotations[rows], roots[rows], contacts[rows] = step.rotations, step.roots, step.contacts
+    return replace(own, rotations=rotations, roots=roots, contacts=contacts)
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """Place of a walker that stands.
+
+    shift: of the root from its place in the standing pose, in the frame that travels. balls: of
+    both feet (2, 3), m.
+    """
+
+    shift: complex
+    balls: Annotated[Floats, "2 3"]
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Course of a step.
+
+    swinging: leg, by place. lift, land: frames of its swing. pose: share (F,) of the standing pose.
+    swing: share (F,) of the swing.
+    """
+
+    swinging: int
+    lift: int
+    land: int
+    pose: Frames
+    swing: Frames
+
+
+def _close(pose: StandingPose, walked: Passage, travel: Travel) -> Passage:
+    """Return a step that ends in the standing pose, from the frames of the walk on."""
+    course = _course(pose, walked, float(travel.phases[-1]))
+    balls = _balls(pose, _poses(pose, walked.rotations, walked.roots))
+    stand = _stand(pose, travel, balls, course.swinging)
+    rotations, roots = _standing(pose, travel, stand.shift)
+    rotations = blend.nlerp(walked.rotations, rotations, course.pose)
+    roots = blend.lerp(walked.roots, roots, course.pose)
+    poses = _poses(pose, rotations, roots)
+    for place, leg in enumerate(pose.legs):
+        share = course.swing if place == course.swinging else course.pose
+        ball = blend.lerp(balls[:, place], np.broadcast_to(stand.balls[place], roots.shape), share)
+        ankle = ball - (poses.position(leg.tip) - poses.position(leg.lower))
+        end = two_bone.reach(poses, leg, np.zeros_like(ankle), ankle)
+        turns = two_bone.solve(poses, leg, end)
+        for joint, turned in zip(
+            (leg.upper, leg.middle, leg.lower),
+            (turns.upper, turns.middle, turns.lower),
+            strict=True,
+        ):
+            rotations[:, joint] = turned
+    contacts = np.ones_like(walked.contacts)
+    contacts[course.lift : course.land, course.swinging] = 0.0
+    return replace(walked, rotations=rotations, roots=roots, contacts=contacts)
+
+
+def _course(pose: StandingPose, walked: Passage, phase: float) -> _Course:
+    """Return which foot swings in a step that ends at a phase, and when."""
+    swinging, last = pose.passing_at(phase).swinging, len(walked) - 1
+    up = np.flatnonzero(walked.contacts[:, swinging] <= STANDING)
+    lift = int(up[0]) if len(up) else last
+    lift = min(lift, round(LATEST_LIFT * last))
+    land = min(lift + round(pose.contacts[swinging].swing * RATE), round(LATEST_LANDING * last))
+    at, settled = np.arange(last + 1.0), min(land + SETTLING * RATE, last)
+    return _Course(
+        swinging, lift, land, _eased(at / settled), _eased((at - lift) / max(land - lift, 1))
+    )
+
+
+def _eased(share: Frames) -> Frames:
+    """Return shares from 0 to 1 whose first and second derivatives are zero at both ends."""
+    part = np.clip(share, 0.0, 1.0)
+    found: Frames = part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+    return found
+
+
+def _stand(
+    pose: StandingPose, travel: Travel, balls: Annotated[Floats, "frames 2 3"], swinging: int
+) -> _Stand:
+    """Return where a walker stands beside the foot on which the step is made.
+
+    The root ends where the walk does, give or take `MOST_BESIDE` ahead and the sway to the standing
+    foot. If that foot is farther ahead or behind, the other one is set as far to the other side, so
+    that the root is between them.
+    """
+    towards = np.exp(1j * travel.headings[-1])
+    own = travel.places[-1] + towards * pose.balls
+    foot = 1 - swinging
+    stood = complex(floor_plane.project(balls[:, foot]).mean())
+    off = complex((stood - own[foot]) / towards)
+    beside = float(np.clip(off.real, -MOST_BESIDE, MOST_BESIDE))
+    places = own + towards * complex(2.0 * beside - off.real, off.imag)
+    places[foot] = stood
+    shift = complex(beside, off.imag)
+    return _Stand(shift, floor_plane.at_height(places, pose.levels))
+
+
+def _standing(pose: StandingPose, travel: Travel, shift: complex) -> tuple[Rotations, RootPath]:
+    """Return the standing pose in all frames (F, J, 4), and its roots (F, 3), m."""
+    count = len(travel.places)
+    own = np.broadcast_to(pose.rotations, (count, *pose.rotations.shape))
+    places = travel.places + np.exp(1j * travel.headings) * (pose.place + shift)
+    heights = np.full(count, pose.height)
+    return floor_plane.turn_roots(own, travel.headings), floor_plane.at_height(places, heights)
+
+
+def _poses(pose: StandingPose, rotations: Rotations, roots: RootPath) -> LimbPoses:
+    return limbs.evaluate_poses(pose.parents, pose.bones, pose.legs, rotations, roots)
+
+
+def _balls(pose: StandingPose, poses: LimbPoses) -> Annotated[Floats, "frames 2 3"]:
+    """Return the paths of the balls of both feet (F, 2, 3), m."""
+    return np.stack([poses.position(leg.tip) for leg in pose.legs], axis=1)

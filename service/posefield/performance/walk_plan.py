@@ -1,0 +1,433 @@
+"""Plan of a walk: where a walker is at each frame, its heading, phase of the cycle and controls.
+
+The phase is tied to the distance: it advances by the distance over the length of the model's stride
+there. Below the model's slowest speed the controls stay those of the slowest, and time slows down:
+feet that stand move no more than in a steady walk, in starts and stops, too.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, PerPoint, PointControls
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
+from posefield.locomotion.floor_plane import FloorVectors
+from posefield.locomotion.gait import Gait
+from posefield.performance import (
+    speed_profile,
+    standing_pose,
+    standing_steps,
+    walk_paths,
+    walk_request,
+)
+from posefield.performance.passage import RATE, FloorMotion
+from posefield.performance.speed_profile import SpeedRamps
+from posefield.performance.standing_pose import StandingPose
+from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
+from posefield.performance.walk_paths import Destination, FloorPath, Radii
+from posefield.performance.walk_request import WalkNote, WalkRequest
+from posefield.performance.walker import Walker, find_walker
+from posefield.question.value_validation import check_number, check_range
+
+MAX_SCALING, SHORT_SCALING = 0.06, 0.15
+"""Largest changes of the stride length, as shares, with which a walk stops at a phase: of a walk
+that is long enough, and of a shorter one."""
+SCALED_CYCLES = 2.0
+"""Smallest number of cycles before a stop over which strides are scaled, of those there are."""
+SYNTHESISED = "synthesised"
+"""First word of the codes of notes about motion that no capture shows."""
+
+Phases = Annotated[Floats, "phases"]
+
+
+@dataclass(frozen=True)
+class PhasePlan:
+    """Phases of a walk (F,), without wrapping, the steps at its standing ends, and notes.
+
+    standing: None for a walk without such steps.
+    """
+
+    phases: Frames
+    standing: StandingEnds | None
+    notes: tuple[WalkNote, ...]
+
+
+def plan_phases(
+    walker: Walker, distances: Frames, ways: Frames, phase: float, ends: tuple[str, str]
+) -> PhasePlan:
+    """Return the phases of a walk and the steps at its standing ends.
+
+    distances: (F,), m. ways: lengths of the stride (F,), m. phase: at the first frame. ends:
+    whether the walk begins and ends "standing". A walk that is too short for an opening or a
+    closing step begins or ends in double support.
+    """
+    steps = np.diff(distances) * 0.5 * (1.0 / ways[1:] + 1.0 / ways[:-1])
+    gone = np.pad(np.cumsum(steps), (1, 0))
+    begin, stop = (end == "standing" for end in ends)
+    if not (begin or stop):
+        return PhasePlan(phase + gone, None, ())
+    pose = standing_pose.find_standing_pose(walker)
+    wanted = begin and pose is not None, stop and pose is not None
+    # Without room for a step, the phases are planned once more for a walk without it.
+    for _ in range(2 if any(wanted) else 1):
+        quiet = [pose.phases if pose and own else walker.double_supports for own in wanted]
+        phases, left = _tied(gone, phase, (quiet[0] if begin else None, quiet[1] if stop else None))
+        opening, closing = _frames(pose, phases, wanted)
+        if (opening > 0, closing > 0) == wanted:
+            break
+        wanted = opening > 0, closing > 0
+    standing = StandingEnds(pose, opening, closing) if pose and any(wanted) else None
+    notes = [*_standing_notes(ends, wanted), *_left_notes(left, float(ways[-1]), wanted[1])]
+    return PhasePlan(phases, standing, tuple(notes))
+
+
+def _tied(
+    gone: Frames, phase: float, quiet: tuple[Phases | None, Phases | None]
+) -> tuple[Frames, float]:
+    """Return phases (F,) from those gone since the first frame, and what is left at the end.
+
+    quiet: phases at which the walk begins and ends standing; None for an end in motion.
+    """
+    begin, stop = quiet
+    first = phase if begin is None else phase + _to_nearest(phase, begin)
+    phases = first + gone
+    if stop is None:
+        return phases, 0.0
+    return _scaled(phases, _to_nearest(float(phases[-1]), stop))
+
+
+def _frames(
+    pose: StandingPose | None, phases: Frames, wanted: tuple[bool, bool]
+) -> tuple[int, int]:
+    """Return the frames of the opening and the closing step; 0 for one without room."""
+    if pose is None:
+        return 0, 0
+    closing = standing_steps.closing_frames(pose, phases) if wanted[1] else 0
+    opening = standing_steps.opening_frames(pose, phases) if wanted[0] else 0
+    return (opening if opening + closing <= len(phases) else 0), closing
+
+
+def _to_nearest(phase: float, quiet: Phases) -> float:
+    """Return the signed difference from a phase to the nearest quiet one, in cycles."""
+    if not len(quiet):
+        return 0.0
+    gaps = (quiet - phase + 0.5) % 1.0 - 0.5
+    return float(gaps[np.argmin(np.abs(gaps))])
+
+
+def _scaled(phases: Frames, missing: float) -> tuple[Frames, float]:
+    """Return phases whose last cycles advance faster or slower by a share, and what is left.
+
+    The share has the form of a half sine over those cycles, so that it begins and ends with zero.
+    """
+    # The mean of a half sine is 2 / pi of its largest value, which is the limit.
+    mean = MAX_SCALING * 2.0 / np.pi
+    cycles = min(max(SCALED_CYCLES, abs(missing) / mean), float(phases[-1] - phases[0]))
+    if cycles <= 0.0:
+        return phases, missing
+    most = SHORT_SCALING * 2.0 / np.pi * cycles
+    done = float(np.clip(missing, -most, most))
+    part = np.clip((phases - phases[-1]) / cycles + 1.0, 0.0, 1.0)
+    return phases + done * 0.5 * (1.0 - np.cos(np.pi * part)), missing - done
+
+
+def _standing_notes(ends: tuple[str, str], steps: tuple[bool, bool]) -> Iterator[WalkNote]:
+    names = ("start", "begins", "an opening step"), ("stop", "ends", "a closing step")
+    for (field, word, step), end, made in zip(names, ends, steps, strict=True):
+        if end != "standing":
+            continue
+        way = f"with {step}" if made else "by slowing down its slowest stride"
+        message = f"the walk {word} standing {way}, which is synthesised: none was captured"
+        yield WalkNote(f"{SYNTHESISED}-{field}", field, message)
+        if not made:
+            message = f"there is no room for {step}: the walk {word} with one foot ahead"
+            yield WalkNote("feet-apart", field, message)
+
+
+def _left_notes(left: float, way: float, closed: bool) -> Iterator[WalkNote]:
+    """Yield a note on a stop that strides could not be scaled for. way: of a stride, m."""
+    if closed and 2.0 * (abs(left) * way - MOST_BESIDE) > MOST_BESIDE:
+        apart = 200.0 * (abs(left) * way - MOST_BESIDE)
+        said = f"bring the feet beside each other: one stands {apart:.0f} cm ahead"
+    elif not closed and abs(left) > 0.01:
+        said = f"stop in double support: {100.0 * abs(left):.0f} % of a cycle are left"
+    else:
+        return
+    message = f"the walk is too short to {said}; a path longer by a quarter of a stride mends it"
+    yield WalkNote("stops-in-mid-stride", "stop", message)
+
+
+PIVOT = 0.3
+"""Rate of turning beyond the captured ones, rad/s, by which a walker is turned as a whole. A foot
+0.2 m from the root then slides by 6 cm/s."""
+RADIUS_SHARE = 0.9
+"""Share of the largest curvature that curves to a place use."""
+DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
+"""Clearances of ways around obstacles that are tried, as shares of the larger radius."""
+# Frames between the points at which controls are solved, and the most points of mean offsets.
+STEP, OFFSET_POINTS = 6, 12
+SECONDS_RANGE = (0.1, speed_profile.MAX_SECONDS)
+TURN_EASING = 1.0
+"""Time in which the rate of turning changes from the one at the start to that of the curve, s."""
+
+
+@dataclass(frozen=True)
+class WalkPlan:
+    """Plan of a walk in F frames at `RATE`, without poses.
+
+    path: that the root follows in the mean over a cycle. distances: (F,), along it, m. places: (F,)
+    and headings: (F,), rad, of the frame that travels with the walker. phases: (F,), of the cycle,
+    without wrapping. controls: (F, d). speeds: (F,), m/s. notes: on what is not as captured.
+    stops: whether it ends standing. standing: steps at standing ends; None without them.
+    """
+
+    walker: Walker
+    path: FloorPath
+    distances: Annotated[Floats, "frames"]
+    places: Annotated[FloorVectors, "frames"]
+    headings: Annotated[Floats, "frames"]
+    phases: Annotated[Floats, "frames"]
+    controls: Annotated[Floats, "frames controls"]
+    speeds: Annotated[Floats, "frames"]
+    notes: tuple[WalkNote, ...] = ()
+    stops: bool = False
+    standing: StandingEnds | None = None
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.distances)
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return (len(self) - 1) / RATE
+
+    def part(self, begin: int, end: int) -> "WalkPlan":
+        """Return the frames from `begin` until before `end`, on the same path."""
+        names = ("distances", "places", "headings", "phases", "controls", "speeds")
+        found = {name: getattr(self, name)[begin:end] for name in names}
+        standing = self.standing and self.standing.part(len(self), begin, end)
+        return replace(self, **found, standing=standing)
+
+    @property
+    def closes(self) -> bool:
+        """Return whether the walk ends with a closing step."""
+        return self.standing is not None and self.standing.closing > 0
+
+    @property
+    def exit_rates(self) -> tuple[float, float]:
+        """Speed, m/s, and rate of turning, rad/s, at the end."""
+        speed = float(self.speeds[-1])
+        return speed, speed * float(self.path.curvatures[-1])
+
+    @property
+    def end(self) -> FloorMotion:
+        """Place and heading of the path's end."""
+        return FloorMotion(float(self.path.headings[-1]), self.path.end)
+
+
+def plan_walk(
+    gait: Gait, request: WalkRequest, start: FloorMotion | None, phase: float
+) -> WalkPlan:
+    """Return the plan of a walk.
+
+    start: place and heading where it begins; None to begin at the first waypoint of `along`, or at
+    the origin. phase: of the cycle at the first frame, moved to a double support for a walk that
+    begins standing. Raises InvalidField, with the field of the request, for a walk that the model
+    cannot do.
+    """
+    walk_request.check_fields(request)
+    walker = find_walker(gait, request.labels, request.controls)
+    path, distances, notes = _route(gait, request, start)
+    walk_request.check_clear(path, request.obstacles)
+    speeds = np.gradient(distances, 1.0 / RATE)
+    knots = np.unique(np.append(np.arange(0, len(distances), STEP), len(distances) - 1))
+    rates, pivots = _rates(gait, request, path, distances[knots], speeds[knots])
+    own = walker.controls(*rates)
+    controls = _between(len(distances), knots, own)
+    done = walker.strides(own)
+    ways = _between(len(distances), knots, np.abs(done.travels))
+    ends = (request.start, request.stop)
+    phased = plan_phases(walker, distances, ways, phase, ends)
+    centres, tangents = path.at(distances)
+    headings = tangents - _between(len(distances), knots, done.drifts)
+    places = centres - np.exp(1j * headings) * _offsets(walker, controls)
+    fields = walker, path, distances, places, headings, phased.phases, controls, speeds
+    said = *notes, *pivots, *phased.notes
+    return WalkPlan(*fields, said, request.stop == "standing", phased.standing)
+
+
+def _route(
+    gait: Gait, request: WalkRequest, start: FloorMotion | None
+) -> tuple[FloorPath, Annotated[Floats, "frames"], list[WalkNote]]:
+    """Return the path of a walk, the distances (F,), m, at its frames, and notes."""
+    limits = gait.region.speeds
+    curve = speed_profile.check_speeds(request.speed, request.speed_over, limits)
+    ramps = _ramps(request, limits)
+    if request.seconds is not None:
+        seconds = check_number("seconds", request.seconds)
+        check_range("seconds", seconds, *SECONDS_RANGE, "s")
+        gone = speed_profile.distances_over_time(curve, request.speed_over, seconds, ramps)
+        turns = _turns(request, gone, limits[0])
+        return walk_paths.turning(start or FloorMotion(), gone, turns), gone, []
+    path, notes = _path(gait, request, start, curve[1])
+    gone = speed_profile.distances_over_length(curve, request.speed_over, path.length, ramps)
+    return path, gone, notes
+
+
+def _ramps(request: WalkRequest, limits: tuple[float, float]) -> SpeedRamps:
+    first = request.entry_speed
+    if first is not None:
+        if request.start == "standing":
+            raise InvalidField("entry_speed", "given for a walk that begins standing")
+        check_range("entry_speed", check_number("entry_speed", first), *limits, "m/s")
+    if request.start == "standing":
+        first = 0.0
+    last = 0.0 if request.stop == "standing" else None
+    return SpeedRamps(first, last, request.acceleration)
+
+
+def _turns(
+    request: WalkRequest, gone: Annotated[Floats, "frames"], slowest: float
+) -> Annotated[Floats, "frames"]:
+    """Return the changes of heading (F,), rad, of a curve of rates over time.
+
+    gone: (F,), m. Below the slowest speed, m/s, the rate falls in proportion to the speed.
+    """
+    turn = 0.0 if request.turn is None else request.turn
+    times = np.arange(len(gone)) / RATE
+    rates = np.interp(times, *speed_profile.check_curve("turn", turn))
+    if request.entry_turn is not None:
+        left = np.clip(times / TURN_EASING, 0.0, 1.0)
+        change = check_number("entry_turn", request.entry_turn) - rates[0]
+        rates += change * 0.5 * (1.0 + np.cos(np.pi * left))
+    shares = np.minimum(np.diff(gone) * RATE / slowest, 1.0)
+    return np.pad(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * shares) / RATE, (1, 0))
+
+
+def _path(
+    gait: Gait, request: WalkRequest, start: FloorMotion | None, speeds: PerPoint
+) -> tuple[FloorPath, list[WalkNote]]:
+    """Return the path of a walk that is not given by its duration, and notes."""
+    if request.along is not None:
+        points = np.asarray(request.along, dtype=float)
+        return walk_paths.through(points, start, request.end), []
+    begin, radii = start or FloorMotion(), _radii(gait, speeds)
+    path = walk_paths.to_place(begin, _destination(request), radii)
+    if not request.detour or walk_request.is_clear(path, request.obstacles):
+        return path, []
+    around = _around(request, begin, radii)
+    longer = around.length - path.length
+    message = f"leads around obstacles and is {longer:.2f} m longer than without them"
+    return around, [WalkNote("detour", "obstacles", message)]
+
+
+def _around(request: WalkRequest, begin: FloorMotion, radii: Radii) -> FloorPath:
+    """Return a path around the obstacles; InvalidField if none is found."""
+    goal = _destination(request)
+    for share in DETOUR_SHARES:
+        clearance = share * radii.larger
+        corners = walk_request.way_around(begin.shift, goal.place, request.obstacles, clearance)
+        if corners:
+            path = walk_paths.along_corners(begin, corners, goal)
+            if walk_request.is_clear(path, request.obstacles) and radii.allow(path.curvatures):
+                return path
+    raise InvalidField(
+        "obstacles",
+        "no way around them was found, expected more room for curves with a radius of "
+        f"{radii.larger:.1f} m: a lower speed, or waypoints in along",
+    )
+
+
+def _destination(request: WalkRequest) -> Destination:
+    """Return where a walk leads."""
+    if request.to is None:
+        end = request.end or FloorMotion()
+        return Destination("end", end.shift, end.turn)
+    point = np.array([check_number(f"to/{i}", value) for i, value in enumerate(request.to)])
+    heading = request.arrive_heading
+    if heading is not None:
+        heading = check_number("arrive_heading", heading)
+    return Destination("to", walk_paths.place_of(point), heading)
+
+
+def _radii(gait: Gait, speeds: PerPoint) -> Radii:
+    """Return the smallest radii, m, of curves at all of the speeds (K,) of a curve."""
+    every = np.linspace(speeds.min(), speeds.max(), 9)
+    right, left = _turning_limits(gait, every)
+    return Radii(
+        float((every / left).max()) / RADIUS_SHARE, float((every / -right).max()) / RADIUS_SHARE
+    )
+
+
+def _turning_limits(gait: Gait, speeds: PerPoint) -> tuple[PerPoint, PerPoint]:
+    right, left = gait.region.turning(speeds)
+    return right - PIVOT, left + PIVOT
+
+
+def _rates(
+    gait: Gait, request: WalkRequest, path: FloorPath, gone: PerPoint, speeds: PerPoint
+) -> tuple[tuple[PerPoint, PerPoint], list[WalkNote]]:
+    """Return the speeds, m/s, and rates of turning, rad/s, of the controls after distances (K,), m.
+
+    Raises InvalidField for a sharper turn than the model can walk.
+    """
+    low, high = gait.region.speeds
+    paced = np.clip(speeds, low, high)
+    turning = paced * np.interp(gone, path.distances, path.curvatures)
+    right, left = _turning_limits(gait, paced)
+    beyond = np.maximum(turning - left, right - turning)
+    if beyond.max() > 0.0:
+        at = int(np.argmax(beyond))
+        place = path.at(gone[at : at + 1])[0][0]
+        raise InvalidField(
+            _field(request, path, float(gone[at])),
+            f"at x {place.imag:.2f} m, z {place.real:.2f} m it turns by {turning[at]:.2f} rad/s, "
+            f"expected {right[at]:.2f} to {left[at]:.2f} rad/s at {paced[at]:.2f} m/s; positive is "
+            "left. A wider turn or a lower speed mends it",
+        )
+    own_right, own_left = gait.region.turning(paced)
+    walked = np.clip(turning, own_right, own_left)
+    return (paced, walked), _notes(request, path, gone, turning - walked)
+
+
+def _notes(
+    request: WalkRequest, path: FloorPath, gone: PerPoint, pivots: PerPoint
+) -> list[WalkNote]:
+    at = int(np.argmax(np.abs(pivots)))
+    if abs(pivots[at]) < 0.01:
+        return []
+    message = (
+        f"turns by up to {abs(pivots[at]):.2f} rad/s more than captured walkers do at this speed; "
+        "the walker is turned as a whole by the rest"
+    )
+    return [WalkNote("turns-beyond-captured", _field(request, path, float(gone[at])), message)]
+
+
+def _field(request: WalkRequest, path: FloorPath, gone: float) -> str:
+    """Return the field of the request that leads through the place after some metres."""
+    if request.along is not None:
+        nearest = walk_paths.nearest_waypoint(path, np.asarray(request.along, dtype=float), gone)
+        return f"along/{nearest}"
+    if request.seconds is not None:
+        return "turn"
+    return "to" if request.to is not None else "end"
+
+
+def _between(frames: int, knots: Floats, values: Floats) -> Floats:
+    """Return values (K, ...) of frames `knots` at all frames, by linear interpolation."""
+    every = np.arange(frames)
+    if values.ndim == 1:
+        return np.interp(every, knots, values)
+    return np.column_stack([np.interp(every, knots, column) for column in values.T])
+
+
+def _offsets(walker: Walker, controls: PointControls) -> Annotated[FloorVectors, "frames"]:
+    """Return the mean offsets (F,) of the root over a cycle at controls (F, d)."""
+    frames = len(controls)
+    rows = np.unique(np.linspace(0, frames - 1, min(frames, OFFSET_POINTS)).round().astype(int))
+    found = walker.mean_offsets(controls[rows])
+    return np.asarray(np.interp(np.arange(frames), rows, found))

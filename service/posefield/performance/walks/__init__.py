@@ -1,1 +1,0 @@
-"""Walks of a performance: paths, speeds, plans and poses of a cyclic model."""

@@ -1,1 +1,0 @@
-"""Joints of files at rest, whose rest pose has rotations, as skeletons at rest without."""

@@ -1,1 +1,0 @@
-"""Stages of USD: their skeletons and the joints at rest."""
