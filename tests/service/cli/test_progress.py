@@ -2,9 +2,6 @@
 
 import re
 import time
-from inspect import signature
-
-import pytest
 
 from posefield.console.late_progress import LateProgress
 from posefield.console.progress import ProgressBar
@@ -23,27 +20,12 @@ def test_a_line_says_how_much_is_finished(capsys):
     assert second.endswith(" left") and " a second, " in second
 
 
-def test_the_total_may_be_known_late(capsys):
-    with ProgressBar("truth", interval=0.0) as bar:
-        bar.update(1, 4)
-        bar.update(4, 4)
-    assert capsys.readouterr().err.splitlines()[0] == "truth: 1 of 4"
-
-
 def test_lines_are_some_seconds_apart(capsys):
     """Negative control of `interval`: a thousand updates at once write nothing."""
     with ProgressBar("clips", 1000) as bar:
         for _ in range(1000):
             bar.advance(1)
     assert capsys.readouterr().err == ""
-
-
-def test_no_control_sequences_are_written_for_colours(capsys, monkeypatch):
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    with ProgressBar("clips", 10, interval=0.0) as bar:
-        bar.print("[a] note at 7 of 10")
-        bar.update(5)
-    assert capsys.readouterr().err.splitlines() == ["[a] note at 7 of 10", "clips: 5 of 10"]
 
 
 def test_progress_of_short_work_shows_nothing(capsys):
@@ -72,14 +54,6 @@ def test_each_item_counts_when_the_next_is_taken(capsys):
     ]
 
 
-def test_progress_of_steps_names_work_and_step(capsys):
-    with ProgressPrinter("training", 2) as progress:
-        progress("reading")
-        progress("done")
-    assert [line[10:] for line in capsys.readouterr().err.splitlines()] == ["reading", "done"]
-    assert [name for name, _ in progress.finished] == ["reading"]
-
-
 def test_progress_of_steps_estimates_the_rest_by_the_finished_ones(capsys):
     with ProgressPrinter("training", 3) as progress:
         progress("reading")
@@ -102,8 +76,3 @@ def test_a_rest_of_a_few_seconds_is_not_told(capsys):
         progress.expect([10.0, 1.0])
         progress("writing")
     assert "left" not in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("kind", [ProgressBar, LateProgress, ProgressPrinter])
-def test_all_kinds_of_progress_begin_with_label_and_total(kind):
-    assert [*signature(kind).parameters][:2] == ["label", "total"]

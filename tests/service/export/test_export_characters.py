@@ -1,14 +1,10 @@
 """Tests of `posefield export --character`: all clips for the character of another file."""
 
 import json
-from dataclasses import replace
 
 import exporting
 import pytest
 from user_rigs import glb_rig, stage_positions, usd_rig
-
-from posefield.batch import chunks
-from posefield.common.errors import InvalidField
 
 SPEEDS = (1.1, 1.3, 1.5)
 
@@ -86,14 +82,6 @@ def test_each_file_is_that_of_a_single_clip(export, posefield, controls, rigs, t
         )
 
 
-def test_processes_give_the_same_bytes(export, rigs, tmp_path):
-    words = ("--character", rigs / "hero.usdc", "--chunk", "1")
-    for workers in (1, 2):
-        code, _, err = export("-o", tmp_path / f"by{workers}", *words, workers=workers)
-        assert code == 0, err
-    assert exporting.content(tmp_path / "by1") == exporting.content(tmp_path / "by2")
-
-
 def test_an_export_is_of_one_character(export, rigs, card, tmp_path):
     """Shards resume it with the same file; a changed file is another export, told before work."""
     hero = tmp_path / "hero.glb"
@@ -114,11 +102,7 @@ def test_an_export_is_of_one_character(export, rigs, card, tmp_path):
     ("words", "said"),
     [
         (["--layout", "tar"], "layout: 'tar' with a character, expected 'folder'"),
-        (["--layout", "zip"], "layout: 'zip' with a character, expected 'folder'"),
-        (["--layout", "library"], "layout: 'library' with a character, expected 'folder'"),
         (["-o", "s3://bucket/made"], "character: given with a URL as output, expected a folder"),
-        (["--names", "mixamo"], "names: 'mixamo' with a character, expected 'own'"),
-        (["--body", "mannequin"], "body: 'mannequin' with a character, expected none given"),
         (["--unit", "m"], "unit: 'm', expected none given: the layer has the unit, 0.01 m"),
     ],
 )
@@ -127,23 +111,3 @@ def test_what_has_no_character_is_refused(export, rigs, tmp_path, words, said):
     code, _, err = export("-o", made, "--character", rigs / "hero.usdc", *words)
     assert code != 0 and said in err, err
     assert not made.exists()
-
-
-def test_more_is_refused(posefield, export, rigs, tmp_path):
-    """A scheduler, whose workers do not read the file, roles alone, and packages."""
-    from posefield.registry import shipped_models
-
-    made, hero = tmp_path / "made", rigs / "hero.usdc"
-    walk = (shipped_models.FOLDER / "cmu_walk.onnx", "--sample", "2", "-o", made)
-    found = posefield("export", *walk, "--character", hero, "--scheduler", "tcp://localhost:1")
-    assert "character: given with --scheduler, expected --workers" in found[2]
-    assert "without --character, expected with it" in export("-o", made, "--roles", "a.toml")[2]
-    packed = posefield("export", *walk, "--character", hero, "--format", "usdz", "--workers", "1")
-    assert "a USD file with the format usdz, expected usda or usdc" in packed[2]
-    assert not made.exists()
-
-
-def test_a_model_without_legs_is_refused(card):
-    chunks.check_character_model(card)
-    with pytest.raises(InvalidField, match="no joint for leftUpperLeg"):
-        chunks.check_character_model(replace(card, roles={"hips": card.roles["hips"]}))

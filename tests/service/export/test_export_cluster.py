@@ -19,8 +19,6 @@ pytestmark = pytest.mark.system
 CLIPS, CHUNK = 240, 4
 POSEFIELD = Path(sys.executable).parent / "posefield"
 MAIN = "from posefield.cli import main; main()"
-# As where the extra is not installed.
-WITHOUT = f"import sys; sys.modules['distributed'] = None; {MAIN}"
 # Workers lack the version that is here.
 OTHER = f"from posefield.common import dask_cluster as d; d.version = lambda name: '0'; {MAIN}"
 
@@ -107,21 +105,15 @@ def test_workers_of_another_version_are_refused(words, cluster, tmp_path):
     assert re.search(r"posefield: tcp://\S+: posefield \S+, expected 0; finished", done.stderr)
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense"])
+@pytest.mark.parametrize(
+    "address",
+    [
+        "tcp://127.0.0.1:1",
+    ],
+)
 def test_a_scheduler_that_does_not_answer_is_named(words, tmp_path, address):
     done = python(MAIN, *words(tmp_path / "made", "--scheduler", address))
     assert done.returncode == 2
     said = "no Dask scheduler answers within 10 s, expected tcp://HOST:PORT; "
     assert done.stderr.startswith(f"posefield: {address}: {said}")
     assert not (tmp_path / "made").exists()
-
-
-def test_a_scheduler_has_workers_of_its_own(words, tmp_path):
-    command = words(tmp_path / "made", "--scheduler", "tcp://127.0.0.1:1", "--workers", 2)
-    done = CliRunner().invoke(cli.app, command)
-    assert "workers: 2, but a scheduler has its own" in str(done.exception)
-
-
-def test_without_the_extra_its_name_is_said(words, tmp_path):
-    done = python(WITHOUT, *words(tmp_path / "made", "--scheduler", "tcp://a:1"))
-    assert 'pip install "posefield[dask]"' in done.stderr

@@ -45,12 +45,6 @@ def test_a_table_becomes_files(export, table, tmp_path):
     ]
 
 
-def test_what_is_done_is_said_to_be(export, table, tmp_path):
-    export(table, "-o", tmp_path / "made")
-    code, out, _ = export(table, "-o", tmp_path / "made")
-    assert code == 0 and out.strip().endswith("; it was complete before")
-
-
 def test_damage_is_told_and_mended_to_verify(export, table, tmp_path):
     export(table, "-o", tmp_path / "made")
     code, out, err = export(table, "-o", tmp_path / "made", "--verify")
@@ -85,27 +79,6 @@ def test_its_facts_as_json(export, table, tmp_path):
     assert err.startswith(f"{tmp_path}/made: 3 clips")
 
 
-def test_a_grid_and_a_sampling(export, tmp_path):
-    held = [
-        word for name in ("stature=1.7", "hip_height=0.9", "turn=0,10") for word in ("--grid", name)
-    ]
-    code, out, _ = export(*held, "--grid", "target_height=0.8:1.2:5", "-o", tmp_path / "grid")
-    assert (code, out.split(",")[0]) == (0, f"{tmp_path}/grid: 10 clips")
-    code, out, _ = export("--sample", "7", "--method", "hull", "--seed", "2", "-o", tmp_path / "s")
-    assert (code, out.split(",")[0]) == (0, f"{tmp_path}/s: 7 clips")
-
-
-def test_units_and_axes_are_what_was_said(export, table, tmp_path):
-    for name, more in {"m": (), "cm": ("--unit", "cm"), "z": ("--up", "z")}.items():
-        assert export(table, "-o", tmp_path / name, *more)[0] == 0
-    kinds = {n: json.loads((tmp_path / n / "export.json").read_text()) for n in ("m", "cm", "z")}
-    assert [(kind["unit"], kind["up"]) for kind in kinds.values()] == [
-        (None, None),
-        ("cm", None),
-        (None, "z"),
-    ]
-
-
 def test_rows_at_fault_are_told_of_by_line(export, table, tmp_path):
     table.write_text(f"{TABLE}again,1.7,0.9,10,1.0,usdc,often\nlow,1.7,0.9,10,1.0,usdc,30\n")
     code, out, err = export(table, "-o", tmp_path / "made")
@@ -127,18 +100,6 @@ def test_rows_at_fault_are_skipped_if_asked_to(export, table, tmp_path):
     assert exporting.lines(tmp_path / "made/skipped.jsonl")[0]["place"] == "queries.csv:5"
 
 
-def test_rows_whose_format_has_another_law_are_at_fault(export, table, tmp_path):
-    """glTF is in metres whatever is asked for; the others of the table are written."""
-    words = (table, "-o", tmp_path / "made", "--format", "glb")
-    said = "queries.csv:4: unit: 0.01 m, expected 1 m: the law of glb"
-    code, _, err = export(*words, "--unit", "cm")
-    assert code == 2 and said in err
-    assert not (tmp_path / "made").exists()
-    code, out, err = export(*words, "--unit", "cm", "--skip-errors")
-    assert code == 0 and said in err and "2 clips, " in out
-    assert export(table, "-o", tmp_path / "law", "--format", "glb", "--unit", "m")[0] == 0
-
-
 def test_a_part_says_that_others_are_missing(export, table, tmp_path):
     words = (table, "-o", tmp_path / "made", "--chunk", "1", "--shard")
     code, out, _ = export(*words, "1/2")
@@ -155,11 +116,7 @@ def test_a_part_says_that_others_are_missing(export, table, tmp_path):
     [
         (("--layout", "heap"), "layout: 'heap', expected one of folder"),
         (("--chunk", "0"), "chunk: 0, expected 1 or more"),
-        (("--shard", "2/2"), "shard: 2/2, expected 0/N to N-1/N"),
-        (("--shard", "one"), "shard: 'one', expected I/N"),
-        (("--format", "fbx"), "format: 'fbx', expected one of"),
         (("--layout", "library"), "queries: rows that cannot be answered: 1 "),
-        (("--fps", "0"), "fps: 0 frames a second, expected"),
         (("--sample", "3"), "queries: a file and --sample, expected one of"),
     ],
 )
@@ -176,18 +133,6 @@ def test_a_target_that_names_no_place_is_refused(place, export, table):
     code, out, err = export(table, "-o", place)
     assert (code, out) == (2, "")
     assert err.startswith("posefield: output: ") and "expected " in err
-
-
-def test_the_scheme_of_a_url_may_be_in_capitals(export, table, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert export(table, "-o", f"FILE://{tmp_path}/made")[0] == 0
-    assert {path.name for path in tmp_path.iterdir()} == {"queries.csv", "made"}
-
-
-def test_a_target_of_something_else_is_a_file_that_cannot_be_used(export, table, tmp_path):
-    code, _, err = export(table, "-o", tmp_path)
-    assert code == 3
-    assert "is not empty and has no manifest of an export" in err
 
 
 @pytest.mark.system

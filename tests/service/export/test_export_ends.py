@@ -155,19 +155,6 @@ def test_a_worker_that_dies_ends_it_clearly(place, after, command, undisturbed, 
     assert exporting.content(tmp_path) == undisturbed
 
 
-def test_workers_end_with_a_parent_that_was_killed(command, tmp_path):
-    process = begun(command(tmp_path, "--workers", 2))
-    wait_for_parts(tmp_path, 5, process)
-    workers = workers_of(process)
-    assert len(workers) == 2
-    process.kill()
-    process.communicate()
-    until = time.monotonic() + 10.0
-    while any(Path(f"/proc/{worker}").exists() for worker in workers):
-        assert time.monotonic() < until, "a worker lives on"
-        time.sleep(0.01)
-
-
 @pytest.mark.parametrize("workers", [1, 2])
 def test_where_no_more_can_be_written_it_names_the_file(workers, command, undisturbed, tmp_path):
     """As on a full disk: the system writes a part of a file and refuses the rest."""
@@ -201,11 +188,3 @@ def test_where_usd_core_can_write_no_temporary_file_it_says_so(model_path, tmp_p
     assert "a temporary file of usd-core cannot be written: " in line
     assert "File too large" in line
     assert not (tmp_path / "clips").exists()
-
-
-def test_two_at_once_do_each_other_no_harm(command, undisturbed, tmp_path):
-    both = [begun(command(tmp_path, "--workers", 1)) for _ in range(2)]
-    for process in both:
-        _, err = process.communicate(timeout=60)
-        assert process.returncode == 0, err
-    assert exporting.content(tmp_path) == undisturbed

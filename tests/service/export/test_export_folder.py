@@ -51,16 +51,6 @@ def test_a_writer_that_is_killed_leaves_no_part_of_a_file(before, folder, tmp_pa
     assert set(files(tmp_path)) <= {"clips/000/a.usdc"}
 
 
-def test_pieces_that_break_off_leave_nothing(folder, tmp_path):
-    def broken():
-        yield b"half"
-        raise KeyError("no more")
-
-    with pytest.raises(KeyError):
-        folder.stream("a", broken())
-    assert files(tmp_path) == {}
-
-
 def test_two_writers_of_one_file_do_each_other_no_harm(folder, tmp_path):
     other = FolderTarget(str(tmp_path), ".state/writing")
 
@@ -102,16 +92,6 @@ def test_a_file_that_cannot_be_created_is_named(folder, tmp_path, monkeypatch):
     with pytest.raises(FileError, match="a: cannot be written or read: broken disk"):
         folder.create("a", b"first")
     assert files(tmp_path) == {}
-
-
-def test_what_is_there_is_named(folder):
-    folder.write([("clips/a", b"1"), ("clips/b", b"22")])
-    assert folder.names("clips") == {"a", "b"}
-    assert folder.names("none") == set()
-    assert folder.read("none") is None
-    assert folder.holds("clips/b", 2) and not folder.holds("clips/b", 1)
-    assert not folder.holds("none", 0)
-    assert not folder.empty(but=".state") and folder.names("") == {".state", "clips"}
 
 
 def test_a_place_that_cannot_be_written_is_named(folder, tmp_path):

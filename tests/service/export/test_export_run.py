@@ -8,7 +8,6 @@ import exporting
 import pytest
 
 from posefield.batch import process_pool, run
-from posefield.batch.layouts import path
 from posefield.batch.rows import ClipQuery, RowFault
 from posefield.batch.run import Shard
 from posefield.common.errors import FileError, InvalidField
@@ -64,20 +63,6 @@ def test_the_export_says_what_it_is(undisturbed, source, model_path):
     assert set(facts["versions"]) == {"posefield", "numpy", "onnxruntime", "usd-core"}
 
 
-def test_nothing_else_is_left(undisturbed):
-    assert {path.name for path in undisturbed.iterdir()} == {
-        "clips",
-        "manifest.jsonl",
-        "export.json",
-    }
-
-
-def test_folders_hold_a_thousand_files_at_most():
-    assert path(999, "a", "usdc") == "clips/000/a.usdc"
-    assert path(1000, "b", "usdc") == "clips/001/b.usdc"
-    assert path(1_234_567, "c", "glb") == "clips/1234/c.glb"
-
-
 @pytest.mark.system
 @pytest.mark.parametrize("workers", [2, 3])
 def test_processes_make_the_same_bytes(workers, undisturbed, source, model_path, tmp_path):
@@ -95,14 +80,6 @@ def test_shards_in_any_order_make_the_whole(order, undisturbed, source, model_pa
     ]
     assert [outcome.facts is None for outcome in outcomes] == [True, True, False]
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
-
-
-def test_what_is_complete_is_left_as_it_is(undisturbed, source, model_path):
-    before = {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")}
-    watch = exporting.Recorder()
-    outcome = run.run(exporting.work(model_path, source, undisturbed), source, watch)
-    assert (outcome.already_complete, outcome.done, watch.begun) == (True, ROWS, None)
-    assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")} == before
 
 
 @pytest.mark.parametrize("lost", ["manifest.jsonl", "a clip", "emptied"])
@@ -127,17 +104,6 @@ def test_what_was_killed_as_it_ended_is_tidied(undisturbed, source, model_path, 
     (tmp_path / ".posefield/parts/000001.jsonl").write_bytes(b"{}")
     work = exporting.work(model_path, source, tmp_path)
     assert run.run(work, source, exporting.Recorder()).already_complete
-    assert exporting.content(tmp_path) == exporting.content(undisturbed)
-
-
-def test_what_was_killed_as_its_manifest_was_written_is_ended(
-    undisturbed, source, model_path, tmp_path
-):
-    work = exporting.work(model_path, source, tmp_path)
-    run.run(work, source, exporting.Recorder(3))
-    # As far as it gets before the file that makes an export complete.
-    (tmp_path / "manifest.jsonl").write_bytes(b"the first line")
-    assert run.run(work, source, exporting.Recorder()).facts is not None
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
 
@@ -175,26 +141,12 @@ def test_another_export_is_refused_and_left(source, model_path, tmp_path):
     assert exporting.content(tmp_path) == before
 
 
-def test_a_complete_export_of_another_job_is_refused(undisturbed, model_path):
-    others = exporting.queries(ROWS - 1)
-    with pytest.raises(FileError, match="holds another export, whose queries differ"):
-        run.run(exporting.work(model_path, others, undisturbed), others, exporting.Recorder())
-
-
 @pytest.mark.parametrize("name", ["mine.txt", "export.json"])
 def test_a_folder_of_something_else_is_refused_and_left(name, source, model_path, tmp_path):
     (tmp_path / name).write_text("{}")
     with pytest.raises(FileError, match=r"has no manifest|facts cannot be read"):
         run.run(exporting.work(model_path, source, tmp_path), source, exporting.Recorder())
     assert exporting.content(tmp_path) == {name: b"{}"}
-
-
-def test_a_file_is_no_target(source, model_path, tmp_path):
-    place = tmp_path / "file"
-    place.write_text("mine")
-    with pytest.raises(FileError, match="Not a directory"):
-        run.run(exporting.work(model_path, source, place), source, exporting.Recorder())
-    assert place.read_text() == "mine"
 
 
 def spoilt(source):
@@ -215,18 +167,6 @@ def test_rows_at_fault_end_it_before_anything_is_written(source, model_path, tmp
     assert not (tmp_path / "t").exists()
 
 
-def test_rows_at_fault_are_skipped_and_listed(source, model_path, tmp_path):
-    bad = spoilt(source)
-    work = exporting.work(model_path, bad, tmp_path, skip=True)
-    outcome = run.run(work, bad, exporting.Recorder(), process_pool.runner(2))
-    assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 2)
-    skipped = exporting.lines(tmp_path / "skipped.jsonl")
-    assert [fault["place"] for fault in skipped] == ["line 6", "line 13"]
-    assert skipped[1]["message"].startswith("end: 50 s, expected")
-    names = [line["name"] for line in exporting.lines(tmp_path / "manifest.jsonl")]
-    assert len(names) == ROWS - 2 and "late" not in names
-
-
 def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp_path):
     rows = [row for row in spoilt(source).rows() if not isinstance(row, RowFault)]
     bad = exporting.Listed(rows)
@@ -243,12 +183,6 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
     assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 1)
 
 
-def test_queries_of_which_none_can_be_answered_are_refused(model_path, tmp_path):
-    bad = exporting.Listed([RowFault("line 2", "no")])
-    with pytest.raises(InvalidField, match="no row that can be answered"):
-        run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, exporting.Recorder())
-
-
 @pytest.mark.system
 def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_path, tmp_path):
     model = shutil.copy(model_path, tmp_path / "reaching.onnx")
@@ -258,12 +192,6 @@ def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_p
     assert run.run(work, source, watch, process_pool.runner(2)).facts is not None
     assert model.read_bytes() == b"another"
     assert exporting.content(tmp_path / "target") == exporting.content(undisturbed)
-
-
-@pytest.mark.parametrize(("index", "count"), [(-1, 2), (2, 2), (0, 0)])
-def test_a_shard_that_there_is_not_is_refused(index, count):
-    with pytest.raises(InvalidField, match="shard"):
-        Shard(index, count)
 
 
 def test_it_may_be_completed_by_another_while_its_queries_are_looked_at(

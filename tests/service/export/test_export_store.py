@@ -9,7 +9,6 @@ import stores
 from posefield.batch import process_pool, run
 from posefield.batch.run import Shard
 from posefield.batch.store_target import StoreTarget
-from posefield.batch.target import open_target
 from posefield.common.errors import FileError
 from posefield.registry import object_store
 
@@ -83,44 +82,10 @@ def test_shards_meet_in_a_store(source, model_path, bucket, local):
     assert content(bucket) == local["folder"]
 
 
-def test_a_store_of_something_else_is_refused_and_left(source, model_path, bucket):
-    StoreTarget(bucket).write([("mine.txt", b"mine")])
-    with pytest.raises(FileError, match="has no manifest of an export"):
-        run.run(exporting.work(model_path, source, bucket), source, exporting.Recorder())
-    assert content(bucket) == {"mine.txt": b"mine"}
-
-
 def test_a_bucket_that_there_is_not_is_named(source, model_path):
     work = exporting.work(model_path, source, "s3://nowhere/at/all")
     with pytest.raises(FileError, match=r"^s3://nowhere/at/all: cannot be written or read"):
         run.run(work, source, exporting.Recorder())
-
-
-def test_what_was_complete_and_lost_its_manifest_is_made_again_in_a_store(
-    source, model_path, bucket, local
-):
-    work = exporting.work(model_path, source, bucket)
-    run.run(work, source, exporting.Recorder())
-    whole = content(bucket)
-    target = open_target(bucket)
-    target.drop("manifest.jsonl")
-    target.drop("manifest.jsonl")
-    assert content(bucket) != whole
-    assert not run.run(work, source, exporting.Recorder()).already_complete
-    assert content(bucket) == whole
-
-
-def test_an_object_with_a_flipped_bit_is_found_to_verify(source, model_path, bucket, local):
-    work = exporting.work(model_path, source, bucket)
-    run.run(work, source, exporting.Recorder())
-    assert run.run(work, source, exporting.Recorder(), verify=True).already_complete
-    store, path = StoreTarget(bucket), "clips/000/clip-0003.json"
-    store.write([(path, store.read(path).replace(b"0", b"1", 1))])
-    assert run.run(work, source, exporting.Recorder()).already_complete
-    recorder = exporting.Recorder()
-    assert not run.run(work, source, recorder, verify=True).already_complete
-    assert recorder.notes == [f"{bucket}/{path}: missing or damaged; the export is made again"]
-    assert content(bucket) == local["folder"]
 
 
 def test_a_file_is_created_once(bucket):
@@ -142,11 +107,6 @@ def test_a_large_file_goes_in_pieces_and_what_breaks_off_is_not_there(bucket):
     with pytest.raises(KeyError):
         store.stream("broken", broken())
     assert store.read("broken") is None
-
-
-def test_an_address_of_no_store_is_refused():
-    with pytest.raises(FileError, match=r"^ftp://somewhere: cannot"):
-        open_target("ftp://somewhere")
 
 
 def test_the_address_of_a_folder_is_the_folder(source, model_path, tmp_path, local):

@@ -14,7 +14,6 @@ from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
-from posefield.synthesis.clips import ClipPreview
 from posefield.synthesis.synthesizer import Synthesizer
 
 
@@ -55,14 +54,6 @@ def test_batches_are_bounded_in_clips_and_in_poses(order):
     assert max(map(sum, made)) > POSES / 2
 
 
-def test_a_clip_that_alone_is_more_than_a_batch_is_one(order):
-    ordered, made = order
-    asked = ordered([10] * 4)
-    prospects = [ClipPreview(frames, ()) for frames in (1, POSES + 1, 1, 1)]
-    list(clip_archive.archive_members(dataclasses.replace(asked, prospects=prospects)))
-    assert [len(batch) for batch in made] == [1, 1, 2]
-
-
 def test_a_batch_is_made_when_its_first_file_is_taken(order):
     ordered, made = order
     members = clip_archive.archive_members(ordered([10] * 2 * CLIPS))
@@ -85,11 +76,3 @@ def test_the_manifest_lists_the_files_in_order(order):
     assert [(line["file"], line["sha256"]) for line in lines] == [
         (file, hashlib.sha256(data).hexdigest()) for file, data in files
     ]
-
-
-def test_it_is_said_once_that_clips_are_extrapolated(model, order):
-    asked = order[0]([10, 10])
-    assert asked.warnings == []
-    prospects = [asked.prospects[0], dataclasses.replace(asked.prospects[1], warnings=("far",))]
-    (said,) = dataclasses.replace(asked, prospects=prospects).warnings
-    assert said == "1 of 2 clips lie outside what was sampled, or in a gap of it"

@@ -119,16 +119,6 @@ def test_a_script_that_goes_on_from_poses_stands_at_their_end(models, tmp_path):
     assert np.allclose(matrix.ExtractTranslation()[::2], clip.root_path[0, ::2], atol=1e-6)
 
 
-@pytest.mark.parametrize("instancing", ["scenegraph", "flatten"])
-def test_data_are_shared_as_in_walking_crowds(instancing, models, rows, tmp_path):
-    crowd = PerformanceCrowd((models,), tmp_path / "crowd.usdc", None, instancing, "none")
-    performance_crowd.write(crowd, rows)
-    stage = Usd.Stage.Open(str(crowd.path))
-    characters = stage.GetPrimAtPath("/Crowd/Characters").GetChildren()
-    assert [each.IsInstance() for each in characters] == [instancing == "scenegraph"] * 3
-    assert not has_body(stage)
-
-
 def test_the_stage_complies(models, rows, tmp_path):
     crowd = PerformanceCrowd((models,), tmp_path / "crowd.usdc")
     performance_crowd.write(crowd, rows)
@@ -189,27 +179,17 @@ def test_levels_are_the_coarsest_that_the_view_allows(models, rows, tmp_path):
         assert [said.Get(time) for time in said.GetTimeSamples()] == [level]
 
 
-def test_without_a_camera_scripts_have_their_own_levels(models, tmp_path):
-    rows = written(tmp_path, [{"segments": [WALK]}, {"segments": [WALK], "level": 1}])
-    facts = performance_crowd.write(PerformanceCrowd((models,), tmp_path / "crowd.usdc"), rows)
-    assert facts["level_counts"][:2] == [1, 1] and facts["level_shares"][:2] == [0.5, 0.5]
-
-
 FAULTS = {
     "another rate": ({"segments": [WALK], "fps": 24}, "fps: 24, expected 30 as in scripts.jsonl:1"),
     "another skeleton": (
         {"segments": [{"kind": "act", "model": "reach"}]},
         "character: another skeleton than in scripts.jsonl:1, expected the same",
     ),
-    "other names": ({"segments": [WALK], "names": "mixamo"}, "names: 'mixamo', expected 'own'"),
     "another unit": ({"segments": [WALK], "unit": "cm"}, "unit: 'cm', expected 'm' for a crowd"),
-    "another axis": ({"segments": [WALK], "up": "z"}, "up: 'z', expected 'y' for a crowd"),
-    "a body": ({"segments": [WALK], "body": "bones"}, "body: 'bones', expected none: --body is"),
     "another model": (
         {"segments": [{**WALK, "model": "gone"}]},
         "segments/0/model: no model 'gone'",
     ),
-    "no end": ({"segments": [{"kind": "walk", "model": "walk"}]}, "segments/0: a walk without"),
     "a level": ({"segments": [WALK], "level": 1}, "level: 1, expected none: the camera chooses it"),
     "too near": (
         {"segments": [WALK], "start": {"position": [0.0, -3.0]}},
@@ -249,14 +229,8 @@ def test_the_command_writes_a_crowd(posefield, rows, models, tmp_path):
     [
         (("scripts.jsonl", "--crowd"), "output: none, expected a file for the crowd"),
         (("scripts.jsonl", "--crowd", "-o", "out"), "'out' ends in none of usd, usda, usdc, usdz"),
-        (("scripts.jsonl", "--crowd", "-o", "a.glb"), "'a.glb' ends in none of usd, usda, usdc"),
-        (("scripts.jsonl", "--crowd", "--plan"), "plan: given for many scripts, expected one"),
-        (("scripts.jsonl", "--crowd", "-o", "a.usd", "--format", "usdc"), "format: given with"),
-        (("scripts.jsonl", "--crowd", "-o", "a.usd", "--layout", "segments"), "with --crowd"),
         (("scripts.jsonl", "--crowd", "-o", "a.usd", "--pixels", 2), "pixels: given without a cam"),
-        (("scripts.jsonl", "--crowd", "-o", "a.usd", "--camera", "1,2"), "camera"),
         (("scripts.jsonl", "-o", "a", "--camera", "1,2,3"), "camera: given without --crowd"),
-        (("one.json", "-o", "a.usdc", "--body", "none"), "body: given without --crowd, expected"),
         (("one.json", "--crowd", "-o", "a.usdc"), "crowd: given for one script, expected a folder"),
     ],
 )

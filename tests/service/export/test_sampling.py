@@ -81,13 +81,6 @@ def test_a_permutation_sends_every_place_to_another(count, seed):
     assert sorted(sent.tolist()) == list(range(count))
 
 
-def test_a_permutation_is_the_same_whatever_is_asked_together():
-    places = np.arange(1000, dtype=np.uint64)
-    whole = sampling.permute(places, 1000, (5,))
-    parts = [sampling.permute(part, 1000, (5,)) for part in np.array_split(places, 7)]
-    assert np.concatenate(parts).tolist() == whole.tolist()
-
-
 def test_permutations_of_four_are_all_equally_likely():
     places = np.arange(4, dtype=np.uint64)
     found = Counter(tuple(sampling.permute(places, 4, (s,)).tolist()) for s in range(4800))
@@ -148,14 +141,6 @@ def test_points_of_the_box_are_not_all_mixtures(card):
     examples = np.array(card.examples)
     inside = [in_hull(point, examples) for point in drawn(continua(card), "latin", 200)]
     assert 0 < sum(inside) < 180
-
-
-def test_points_of_the_hull_lie_on_average_where_clips_do(card):
-    """Each corner of a simplex weighs the same, so the mean is the clips' mean."""
-    points, examples = drawn(card, "hull", 20_000), np.array(card.examples)
-    error = (points.mean(0) - examples.mean(0)) / (points.std(0) / np.sqrt(len(points)))
-    assert np.abs(error).max() < 6.0
-    assert np.all(points.std(0) < examples.std(0))
 
 
 def test_weights_are_even_in_the_simplex(card):

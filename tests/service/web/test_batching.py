@@ -81,19 +81,6 @@ def test_levels_are_not_mixed(model):
     assert rows(feeds)[2:] == [3] * len(levels)
 
 
-def test_whoever_asks_alone_is_answered_at_once(model):
-    async def alone():
-        batcher = PoseBatcher()
-        for _ in range(3):
-            asking = batcher.row(model, question(model, 4.0))
-            with pytest.raises(StopIteration):
-                asking.send(None)
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
-
-    asyncio.run(alone())
-
-
 def test_one_that_has_no_answer_harms_no_other(model):
     asked = [question(model, 4.0, time) for time in (0.1, 99.0, 0.2)]
     first, wrong, last = together(model, asked)
@@ -111,22 +98,6 @@ def test_a_fault_of_the_graph_reaches_everybody(model):
     own, _ = counted(model, refuse_three)
     with pytest.raises(RuntimeError, match="broken"):
         together(own, [question(own, 4.0)] * 3)
-
-
-def test_a_client_that_went_away_is_passed_over(model):
-    async def ask():
-        batcher = PoseBatcher()
-        asked = question(model, 4.0)
-        await asyncio.gather(*(batcher.row(model, asked) for _ in range(2)))
-        await asyncio.sleep(0)
-        tasks = [asyncio.create_task(batcher.row(model, asked)) for _ in range(3)]
-        await asyncio.sleep(0)
-        tasks[1].cancel()
-        return await asyncio.gather(*tasks, return_exceptions=True)
-
-    first, gone, last = asyncio.run(ask())
-    assert isinstance(gone, asyncio.CancelledError)
-    assert all(np.array_equal(a, b) for a, b in zip(first, last, strict=True))
 
 
 def test_a_model_that_sums_by_place_is_asked_one_by_one(model):

@@ -96,15 +96,6 @@ def test_data_for_a_connection_that_was_reset_is_dropped_without_an_error(wrappe
     assert [type(error) for error in errors] == ([] if wrapped else [RuntimeError])
 
 
-def test_all_else_is_the_transport_s_own():
-    async def play(transport, recorder):
-        assert transport.get_extra_info("socket") == "its own"
-        with pytest.raises(AttributeError):
-            transport.no_such_thing  # noqa: B018
-
-    scene(play)
-
-
 def test_the_parser_is_the_fast_one():
     """Without httptools uvicorn falls back to one that takes four times as long."""
     assert issubclass(CoalescingProtocol, HttpToolsProtocol)

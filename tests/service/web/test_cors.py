@@ -10,11 +10,6 @@ from posefield.http.middleware import cors
 ALLOWED = cors.parse_origins("https://a.example, http://localhost:5173", "ORIGINS")
 
 
-def test_none_may_if_none_is_named():
-    assert cors.parse_origins("", "ORIGINS") == cors.parse_origins(" , ", "ORIGINS") == frozenset()
-    assert cors.cors_headers(b"https://a.example", frozenset()) == []
-
-
 def test_an_origin_is_allowed_by_its_very_name():
     given = dict(cors.cors_headers(b"https://a.example", ALLOWED))
     assert given[b"access-control-allow-origin"] == b"https://a.example"
@@ -30,11 +25,7 @@ def test_an_origin_is_allowed_by_its_very_name():
         b"http://a.example",
         b"https://a.example:8443",
         b"https://a.example.evil",
-        b"https://evil/https://a.example",
-        b"https://A.example",
         b"null",
-        b"*",
-        b"",
         None,
     ],
 )
@@ -57,26 +48,13 @@ def test_credentials_of_browsers_are_never_allowed():
             assert b"credentials" not in pair[0]
 
 
-def test_a_preflight_names_methods_and_headers():
-    given = dict(cors.preflight_headers(b"GET, HEAD, POST"))
-    assert given[b"access-control-allow-methods"] == b"GET, HEAD, POST"
-    assert {b"Authorization", b"Content-Type"} <= set(
-        given[b"access-control-allow-headers"].split(b", ")
-    )
-
-
 @pytest.mark.parametrize(
     "text",
     [
-        "a.example",
         "https://a.example/",
-        "https://a.example/path",
         "https://A.example",
-        "ftp://a.example",
         "https://*.example",
-        "*, https://a.example",
         "null",
-        "https://a.example https://b.example",
     ],
 )
 def test_what_is_no_origin_is_refused(text):

@@ -24,13 +24,6 @@ def test_every_kind_is_a_client_error_but_one():
     assert problems.INTERNAL.status == 500
 
 
-def test_no_two_kinds_share_a_name():
-    names = [
-        kind.name for kind in (*problems.REQUEST_PROBLEMS, *problems.QUERY_ERROR_PROBLEMS.values())
-    ]
-    assert len(names) == len(set(names))
-
-
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [((), ""), (("times", "0"), "/times/0"), (("controls", "a/b~c"), "/controls/a~1b~0c")],

@@ -138,32 +138,3 @@ def test_a_scope_of_anyio_that_is_cancelled_waits_for_the_end_without_spinning()
         assert time.process_time() - before < 0.2
 
     asyncio.run(scene())
-
-
-def test_what_runs_without_a_request_is_never_cancelled():
-    cancellation.check()
-    with pytest.raises(Cancelled):
-        own = cancellation.Cancellation()
-        own.cancel()
-        token = cancellation.current.set(own)
-        try:
-            cancellation.check()
-        finally:
-            cancellation.current.reset(token)
-
-
-def test_the_fault_of_cancelled_work_is_no_complaint_of_the_loop():
-    complaints = []
-
-    async def scene():
-        asyncio.get_running_loop().set_exception_handler(lambda _, said: complaints.append(said))
-        work = Work()
-        task = asyncio.create_task(worker_threads.run_in_thread(work))
-        await begun(work)
-        task.cancel()
-        await cancelled(task)
-        del task
-        gc.collect()
-
-    asyncio.run(scene())
-    assert complaints == []

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import CENTIMETRES, METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.concurrency import clip_batching
@@ -141,23 +140,6 @@ def test_clips_that_are_asked_for_at_once_are_made_together(calls, model, questi
     assert sum(sizes) == len(questions) and max(sizes) == clip_batching.MAX_BATCH
     assert [own.content for own in found] == [USDC.encode(answer) for answer in answers]
     assert [own.answer.trust for own in found] == [answer.trust for answer in answers]
-
-
-def test_levels_and_limits_are_not_mixed(calls, model, questions):
-    encoder, sizes = calls
-    levels = [structs.replace(questions[0], level=level) for level in (0, 1, 1)]
-    found = made(model, levels, encoder)
-    assert sizes == [1, 2]
-    assert found[0].answer.trust.level == 0 and found[1].answer.trust.level == 1
-    with pytest.raises(InvalidField, match="expected at most 3"):
-        raise made(model, questions[:1], most=3)[0]
-
-
-def test_an_error_concerns_its_own_question_alone(model, questions, answers):
-    wrong = structs.replace(questions[1], end=-1.0)
-    first, fault, last = made(model, [questions[0], wrong, questions[2]])
-    assert isinstance(fault, InvalidField) and fault.field == "end"
-    assert first.content == USDC.encode(answers[0]) and last.content == USDC.encode(answers[2])
 
 
 def test_a_clip_that_may_be_long_is_made_alone(calls, model, questions):

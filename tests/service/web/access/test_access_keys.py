@@ -44,13 +44,6 @@ def test_what_is_nearly_a_key_is_none():
     assert known.find(key) is not None
 
 
-def test_a_hash_that_only_begins_alike_is_another_key():
-    key = api_keys.generate_key()
-    digest = hashlib.sha256(key.encode()).hexdigest()
-    forged = digest[:16] + "".join("0" if c != "0" else "1" for c in digest[16:])
-    assert api_keys.parse_keys(f"a {forged} read:*", "KEYS").find(key) is None
-
-
 def test_comments_semicolons_and_empty_lines():
     text = f"# two\n\n  a {DIGEST} read:*  # first\n;b {DIGEST[:-1]}1 metrics;\n"
     assert {who.name for _, who in api_keys.parse_keys(text, "KEYS").known.values()} >= {"b"}
@@ -61,11 +54,8 @@ def test_comments_semicolons_and_empty_lines():
     ("text", "words"),
     [
         ("a", "KEYS:1: the hash of 'a', expected 64"),
-        (f"a {DIGEST}", "KEYS:1: the scopes of 'a', expected some of"),
         (f"\na {DIGEST} write:*", "KEYS:2: the scopes of 'a'"),
-        (f"a {DIGEST} read:Reach", "KEYS:1: the scopes of 'a'"),
         (f"a {DIGEST} read:", "KEYS:1: the scopes of 'a'"),
-        (f"a {DIGEST.replace('0', 'A')} read:*", "KEYS:1: the hash of 'a'"),
         (f"a/b {DIGEST} read:*", "KEYS:1: its name"),
         (f"a {DIGEST} read:*;a {DIGEST[:-1]}1 read:*", "KEYS:2: a second key named 'a'"),
     ],
