@@ -22,9 +22,9 @@ from pathlib import Path
 
 from rows import Row, table
 
-from posefield.batch import chunks, layouts, manifest, process_pool, run
+from posefield.batch import chunks, layouts, process_pool, run
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.job import ExportJob, WorkerInput
+from posefield.batch.job import ExportJob, WorkerInput, manifest_entry, manifest_line
 from posefield.batch.process_pool import Runner
 from posefield.batch.rows import Defaults, RowSource, SourceOptions, open_source
 from posefield.batch.target import open_target
@@ -188,7 +188,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
 
 def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:
     return [
-        manifest.line(manifest.entry(query.name, "clips/000/name", content, answer))
+        manifest_line(manifest_entry(query.name, "clips/000/name", content, answer))
         for query, content, answer in zip(asked, files, answers, strict=True)
     ]
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import orjson
 
-from posefield.batch import layouts, manifest
-from posefield.batch.job import ExportJob, WorkerInput
+from posefield.batch import layouts
+from posefield.batch.job import ExportJob, WorkerInput, manifest_line
 from posefield.batch.rows import RowFault
 from posefield.batch.target import (
     STATE_FOLDER,
@@ -31,7 +31,7 @@ MANIFEST, SKIPPED, EXPORT = "manifest.jsonl", "skipped.jsonl", "export.json"
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """Result of one chunk, or of several.
+    """Result of one chunk.
 
     clips, bytes: number of clips and bytes written. warned: clips with a warning. skipped: faults
     of the rows that were left out. archives: files that contain the clips, in layouts of archives.
@@ -44,29 +44,28 @@ class ChunkResult:
     archives: list[WrittenFile] = field(default_factory=list)
 
 
-def assign_job(target: ExportTarget, place: str, job: ExportJob) -> None:
-    """Assign the target to this job.
+def assign_job(target: ExportTarget, work: WorkerInput) -> None:
+    """Assign the target to the job of this work.
 
     Raises FileError, with the target unchanged, if it belongs to another job or is not empty.
     """
     if target.read(JOB) is None:
         if not target.empty(but=STATE_FOLDER):
-            raise FileError(place, "is not empty and has no manifest of an export")
-        _record_job(target, job)
-    _check_job(place, job, target.read(JOB))
+            raise FileError(work.target, "is not empty and has no manifest of an export")
+        _record_job(target, work.job)
+    _check_job(work, target.read(JOB))
     target.prepare()
 
 
 def _record_job(target: ExportTarget, job: ExportJob) -> None:
-    """Record the job of a target that has none."""
     target.prepare()
     target.create(JOB, _json({"job": job.digest, **job.facts()}))
 
 
-def completed_facts(target: ExportTarget, place: str, job: ExportJob) -> dict[str, Any] | None:
+def completed_facts(target: ExportTarget, work: WorkerInput) -> dict[str, Any] | None:
     """Return the facts of a complete export, else None; FileError if it is another job's."""
     content = target.read(EXPORT)
-    return None if content is None else _check_job(place, job, content)
+    return None if content is None else _check_job(work, content)
 
 
 def first_damaged_file(target: ExportTarget, facts: dict[str, Any], verify: bool) -> str | None:
@@ -107,17 +106,19 @@ def reopen(target: ExportTarget, job: ExportJob) -> None:
     target.drop(EXPORT)
 
 
-def _check_job(place: str, job: ExportJob, content: bytes | None) -> dict[str, Any]:
+def _check_job(work: WorkerInput, content: bytes | None) -> dict[str, Any]:
     """Return the facts of a job or an export; FileError unless they are this job's."""
     try:
         found = orjson.loads(content or b"")
-        if found["job"] == job.digest:
+        if found["job"] == work.job.digest:
             return dict(found)
     except (ValueError, LookupError, TypeError) as fault:
-        raise FileError(place, f"holds an export whose facts cannot be read: {fault}") from fault
-    other = [name for name, fact in job.facts().items() if found.get(name) != fact]
+        raise FileError(
+            work.target, f"holds an export whose facts cannot be read: {fault}"
+        ) from fault
+    other = [name for name, fact in work.job.facts().items() if found.get(name) != fact]
     raise FileError(
-        place,
+        work.target,
         f"holds another export, whose {', '.join(other)} differ; expected an empty folder or the "
         "same export",
     )
@@ -127,7 +128,7 @@ def record_chunk(
     target: ExportTarget, number: int, part: ChunkResult, entries: Iterable[dict[str, Any]]
 ) -> None:
     """Write the part of a finished chunk, with its entries of the manifest."""
-    content = b"".join(map(manifest.line, [asdict(part), *entries]))
+    content = b"".join(map(manifest_line, [asdict(part), *entries]))
     target.write([(f"{PARTS}/{_name(number)}", content)])
 
 
@@ -164,48 +165,36 @@ def finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, An
             return _finish(target, work, chunks)
     except FileError:
         # Another process may have completed it and removed the parts.
-        if (found := completed_facts(target, work.target, work.job)) is None:
+        if (found := completed_facts(target, work)) is None:
             raise
         return found
-    return completed_facts(target, work.target, work.job)
+    return completed_facts(target, work)
 
 
 def _finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, Any]:
-    total, job = _total(target, chunks), work.job
-    entries = (entries for _, entries in _parts(target, chunks))
-    files = [*total.archives, put_file(target, MANIFEST, entries)]
-    if total.skipped:
-        files.append(put_file(target, SKIPPED, map(manifest.line, map(asdict, total.skipped))))
-    if total.clips:
-        about = layouts.find_layout(job.layout).complete(work, _entries(target, chunks))
+    parts, job = [part for part, _ in _parts(target, chunks)], work.job
+    skipped = [fault for part in parts for fault in part.skipped]
+    clips = sum(part.clips for part in parts)
+    files = [archive for part in parts for archive in part.archives]
+    files.append(put_file(target, MANIFEST, (entries for _, entries in _parts(target, chunks))))
+    if skipped:
+        files.append(put_file(target, SKIPPED, map(manifest_line, map(asdict, skipped))))
+    if clips:
+        lines = (line for _, entries in _parts(target, chunks) for line in entries.splitlines())
+        about = layouts.find_layout(job.layout).complete(work, map(orjson.loads, lines))
         files += [put_file(target, path, (content,)) for path, content in about]
-    counts = {"clips": total.clips, "bytes": total.bytes, "warned": total.warned}
     facts = {
         "job": job.digest,
         **job.facts(),
-        **counts,
-        "skipped": len(total.skipped),
+        "clips": clips,
+        "bytes": sum(part.bytes for part in parts),
+        "warned": sum(part.warned for part in parts),
+        "skipped": len(skipped),
         "files": list(map(asdict, files)),
     }
     target.write([(EXPORT, _json(facts))])
     target.remove(STATE_FOLDER)
     return facts
-
-
-def _entries(target: ExportTarget, chunks: int) -> Iterator[dict[str, Any]]:
-    for _, entries in _parts(target, chunks):
-        yield from map(orjson.loads, entries.splitlines())
-
-
-def _total(target: ExportTarget, chunks: int) -> ChunkResult:
-    parts = [part for part, _ in _parts(target, chunks)]
-    return ChunkResult(
-        sum(part.clips for part in parts),
-        sum(part.bytes for part in parts),
-        sum(part.warned for part in parts),
-        [fault for part in parts for fault in part.skipped],
-        [archive for part in parts for archive in part.archives],
-    )
 
 
 def _parts(target: ExportTarget, chunks: int) -> Iterator[tuple[ChunkResult, bytes]]:

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from posefield.batch import checkpoint, layouts, manifest
+from posefield.batch import checkpoint, layouts
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.job import WorkerInput, open_model_of
-from posefield.batch.layouts import ClipFile, Layout, ManifestEntry, path
+from posefield.batch.job import WorkerInput, manifest_entry, open_model_of
+from posefield.batch.layouts import ClipFile, Layout, path
 from posefield.batch.rows import ClipQuery, RowFault
 from posefield.batch.target import open_target
 from posefield.common.errors import InvalidField, QueryError
@@ -57,15 +57,15 @@ def make_chunk(
     Raises InvalidField, which names the rows at fault, unless they are skipped; FileError if the
     target cannot be written; Stop if the work should stop. None of these records a part.
     """
-    target = open_target(work.target)
-    layout = layouts.find_layout(work.job.layout)
-    chunk = _ChunkInProgress(work, layout, open_model_of(work), task, [])
-    entries, archives = layout.write(target, task.number, chunk.batches(stopped))
-    if chunk.faults and not work.skip:
-        raise invalid_rows_error(len(chunk.faults), chunk.faults)
+    target, layout = open_target(work.target), layouts.find_layout(work.job.layout)
+    faults: list[RowFault] = []
+    batches = _batches(work, layout, task, faults, stopped)
+    entries, archives = layout.write(target, task.number, batches)
+    if faults and not work.skip:
+        raise invalid_rows_error(len(faults), faults)
     warned = sum(bool(entry["warnings"]) for entry in entries)
     size = sum(file.bytes for file in archives) or sum(entry["bytes"] for entry in entries)
-    part = ChunkResult(len(entries), size, warned, chunk.faults, archives)
+    part = ChunkResult(len(entries), size, warned, faults, archives)
     checkpoint.record_chunk(target, task.number, part, entries)
     return part
 
@@ -81,118 +81,103 @@ def invalid_rows_error(count: int, faults: Sequence[RowFault]) -> InvalidField:
     return InvalidField("queries", f"{found}:{listed}{more}")
 
 
-@dataclass(frozen=True)
-class _SynthesizedClip:
-    path: str
-    query: ClipQuery
-    answer: ClipAnswer
+_Clip = tuple[str, ClipQuery, ClipAnswer]
+"""Path, query and answer of a clip."""
 
 
-@dataclass(frozen=True)
-class _ChunkInProgress:
-    """A chunk in progress. faults: those found so far."""
+def _batches(
+    work: WorkerInput,
+    layout: Layout,
+    task: ChunkTask,
+    faults: list[RowFault],
+    stopped: StopCheck,
+) -> Iterator[list[ClipFile]]:
+    """Yield batches of files of the valid rows, in order; append the other rows to `faults`."""
+    batch: list[_Clip] = []
+    poses = 0
+    for clip in _synthesized_clips(work, task, faults):
+        batch.append(clip)
+        poses += len(clip[2].clip)
+        if len(batch) == CLIPS or poses >= POSES:
+            yield _files(work, layout, batch)
+            batch, poses = [], 0
+            if stopped():
+                raise ChunkAbandoned
+    yield _files(work, layout, batch)
 
-    work: WorkerInput
-    layout: Layout
-    synthesizer: Synthesizer
-    task: ChunkTask
-    faults: list[RowFault]
 
-    def batches(self, stopped: StopCheck) -> Iterator[list[ClipFile]]:
-        """Yield batches of files of the valid rows, in order."""
-        made: list[_SynthesizedClip] = []
-        poses = 0
-        for one in self._synthesized_clips():
-            made.append(one)
-            poses += len(one.answer.clip)
-            if len(made) == CLIPS or poses >= POSES:
-                yield self._files(made)
-                made, poses = [], 0
-                if stopped():
-                    raise ChunkAbandoned
-        yield self._files(made)
+def _files(work: WorkerInput, layout: Layout, batch: list[_Clip]) -> list[ClipFile]:
+    """Return the files of the clips; those of one format are encoded together."""
+    job = work.job
+    contents: dict[int, bytes] = {}
+    for extension in dict.fromkeys(query.format for _, query, _ in batch):
+        numbers = [index for index, (_, query, _) in enumerate(batch) if query.format == extension]
+        answers = [batch[index][2] for index in numbers]
+        if (order := delivery_of(work, extension)) is not None:
+            files = [order.encode(answer) for answer in answers]
+        else:
+            convention = CLIP_ENCODERS[extension].convention(job.unit, job.up, job.body)
+            files = layout.encode(extension)(answers, convention)
+        contents |= zip(numbers, files, strict=True)
+    return [
+        ClipFile(
+            file,
+            contents[index],
+            manifest_entry(query.name, file, contents[index], answer)
+            | layout.describe(query.name, file, answer),
+        )
+        for index, (file, query, answer) in enumerate(batch)
+    ]
 
-    def _files(self, made: list[_SynthesizedClip]) -> list[ClipFile]:
-        contents = self._contents(made)
-        return [
-            ClipFile(one.path, content, self._entry(one, content))
-            for one, content in zip(made, contents, strict=True)
-        ]
 
-    def _entry(self, one: _SynthesizedClip, content: bytes) -> ManifestEntry:
-        said = manifest.entry(one.query.name, one.path, content, one.answer)
-        return said | self.layout.describe(one.query.name, one.path, one.answer)
-
-    def _synthesized_clips(self) -> Iterator[_SynthesizedClip]:
-        for block in self._blocks():
-            queries = [row for _, row in block if isinstance(row, ClipQuery)]
-            answers = iter(
-                clips.synthesize_clips(self.synthesizer, [row.question for row in queries])
-            )
-            for number, row in block:
-                if isinstance(row, RowFault):
-                    self._record_fault(row.place, row.message)
-                    continue
-                answer = next(answers)
+def _synthesized_clips(
+    work: WorkerInput, task: ChunkTask, faults: list[RowFault]
+) -> Iterator[_Clip]:
+    model = open_model_of(work)
+    for block in _blocks(model, task):
+        questions = [row.question for _, row in block if isinstance(row, ClipQuery)]
+        answers = iter(clips.synthesize_clips(model, questions))
+        for number, row in block:
+            if isinstance(row, ClipQuery):
                 try:
-                    made = self._synthesized(number, row, answer)
-                except QueryError as fault:
-                    self._record_fault(row.place, str(fault))
+                    answer = _delivered(work, model, row, next(answers))
+                except QueryError as error:
+                    row = RowFault(row.place, str(error))
                 else:
-                    yield made
+                    yield path(number, row.name, row.format), row, answer
+                    continue
+            # The table's folder is not part of the job and must not affect its files.
+            faults.append(RowFault(row.place.rpartition("/")[2], row.message))
 
-    def _blocks(self) -> Iterator[list[tuple[int, ClipQuery | RowFault]]]:
-        """Yield the rows with their indices, in blocks that are synthesised together."""
-        block: list[tuple[int, ClipQuery | RowFault]] = []
-        poses = 0.0
-        for number, row in enumerate(self.task.rows, self.task.first):
-            frames = self._most_frames(row) if isinstance(row, ClipQuery) else 0.0
-            if block and (len(block) == CLIPS or poses + frames > POSES):
-                yield block
-                block, poses = [], 0.0
-            block.append((number, row))
-            poses += frames
-        yield block
 
-    def _most_frames(self, query: ClipQuery) -> float:
-        """Return the number of frames of the longest clip; 0 for a rate that is refused."""
-        rate, longest = query.question.fps, self.synthesizer.session.bounds.duration_limits[1]
-        slowest, fastest = frame_times.FPS_RANGE
-        return rate * longest if slowest <= rate <= fastest else 0.0
+def _blocks(
+    model: Synthesizer, task: ChunkTask
+) -> Iterator[list[tuple[int, ClipQuery | RowFault]]]:
+    """Yield the rows with their indices, in blocks that are synthesised together."""
+    longest, (slowest, fastest) = model.session.bounds.duration_limits[1], frame_times.FPS_RANGE
+    block: list[tuple[int, ClipQuery | RowFault]] = []
+    poses = 0.0
+    for number, row in enumerate(task.rows, task.first):
+        # A rate that is refused has no frames.
+        rate = row.question.fps if isinstance(row, ClipQuery) else 0.0
+        frames = rate * longest if slowest <= rate <= fastest else 0.0
+        if block and (len(block) == CLIPS or poses + frames > POSES):
+            yield block
+            block, poses = [], 0.0
+        block.append((number, row))
+        poses += frames
+    yield block
 
-    def _synthesized(
-        self, number: int, query: ClipQuery, answer: ClipAnswer | QueryError
-    ) -> _SynthesizedClip:
-        """Return the clip of a query; raises QueryError for one that cannot be delivered."""
-        if isinstance(answer, QueryError):
-            raise answer
-        delivery = delivery_of(self.work, query.format)
-        if delivery is not None:
-            roles = self.synthesizer.session.card.roles
-            answer = delivery.clip(answer, query.question, roles)
-        noted = CLIP_ENCODERS[query.format].noted(answer)
-        return _SynthesizedClip(path(number, query.name, query.format), query, noted)
 
-    def _record_fault(self, place: str, message: str) -> None:
-        # The table's folder is not part of the job and must not affect its files.
-        self.faults.append(RowFault(place.rpartition("/")[2], message))
-
-    def _contents(self, made: list[_SynthesizedClip]) -> list[bytes]:
-        """Return the files of the clips; those of one format are encoded together."""
-        contents: dict[int, bytes] = {}
-        for extension in dict.fromkeys(one.query.format for one in made):
-            own = [index for index, one in enumerate(made) if one.query.format == extension]
-            files = self._encoded(extension, [made[index].answer for index in own])
-            contents |= zip(own, files, strict=True)
-        return [contents[index] for index in range(len(made))]
-
-    def _encoded(self, extension: str, answers: Sequence[ClipAnswer]) -> list[bytes]:
-        delivery = delivery_of(self.work, extension)
-        if delivery is not None:
-            return [delivery.encode(answer) for answer in answers]
-        job = self.work.job
-        convention = CLIP_ENCODERS[extension].convention(job.unit, job.up, job.body)
-        return self.layout.encode(extension)(answers, convention)
+def _delivered(
+    work: WorkerInput, model: Synthesizer, query: ClipQuery, answer: ClipAnswer | QueryError
+) -> ClipAnswer:
+    """Return the clip of a query; raises QueryError for one that cannot be delivered."""
+    if isinstance(answer, QueryError):
+        raise answer
+    if (order := delivery_of(work, query.format)) is not None:
+        answer = order.clip(answer, query.question, model.session.card.roles)
+    return CLIP_ENCODERS[query.format].noted(answer)
 
 
 CHARACTER_LAYOUT = "folder"

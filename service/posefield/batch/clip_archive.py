@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from posefield.batch import manifest
+from posefield.batch.job import manifest_entry, manifest_line
 from posefield.batch.rows import ClipQuery
 from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
@@ -80,7 +80,7 @@ def _files(
         contents = [order.delivery.encode(answer) for answer in answers]
     for query, answer, content in zip(queries, answers, contents, strict=True):
         file = f"{query.name}.{query.format}"
-        lines += manifest.line(manifest.entry(query.name, file, content, answer))
+        lines += manifest_line(manifest_entry(query.name, file, content, answer))
         yield file, content
 
 

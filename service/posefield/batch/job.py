@@ -1,4 +1,4 @@
-"""Job of an export: all parameters that determine its bytes, so that two runs of one job agree."""
+"""Job of an export, all parameters that determine its bytes, and the entries of its manifest."""
 
 import hashlib
 from dataclasses import asdict, dataclass, field
@@ -14,6 +14,8 @@ from posefield.common.units import LengthUnit, UpAxis
 from posefield.inference import session
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import BodyKind
+from posefield.question.performance_report import PerformanceAnswer
+from posefield.question.results import ClipAnswer
 from posefield.synthesis.synthesizer import Synthesizer
 
 if TYPE_CHECKING:
@@ -50,12 +52,12 @@ class ExportJob:
 
     def facts(self) -> dict[str, Any]:
         """Return the fields as plain values, with the versions of the packages used."""
-        versions = {
-            "posefield": __version__,
-            **{maker: version(maker) for maker in VERSIONED_PACKAGES},
+        versions = {name: version(name) for name in VERSIONED_PACKAGES}
+        return {
+            **asdict(self),
+            "character": list(self.character),
+            "versions": {"posefield": __version__, **versions},
         }
-        plain = {**asdict(self), "character": list(self.character)}
-        return {**plain, "versions": versions}
 
     @cached_property
     def digest(self) -> str:
@@ -85,3 +87,22 @@ def open_model_of(work: WorkerInput) -> Synthesizer:
     """Return the model of a job, cached so that a process opens it once for many chunks."""
     identity = work.job.model
     return Synthesizer(identity.partition("@")[0], session.open_bytes(work.model, identity))
+
+
+def manifest_entry(
+    name: str, file: str, content: bytes, answer: ClipAnswer | PerformanceAnswer
+) -> dict[str, Any]:
+    """Return the manifest entry of an answer as plain values: path, checksum, frames and trust.
+
+    file: path relative to the manifest. content: the file's bytes.
+    """
+    facts: dict[str, Any] = {"name": name, "file": file, "bytes": len(content)}
+    facts["sha256"] = hashlib.sha256(content).hexdigest()
+    if isinstance(answer, ClipAnswer):
+        facts |= {"frames": len(answer.clip), "fps": answer.clip.rate}
+    return facts | answer.trust.document()
+
+
+def manifest_line(entry: dict[str, Any]) -> bytes:
+    """Return an entry as a line of JSON Lines."""
+    return orjson.dumps(entry, option=orjson.OPT_APPEND_NEWLINE)

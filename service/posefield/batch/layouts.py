@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from posefield.batch import manifest
-from posefield.batch.job import ExportJob, WorkerInput, open_model_of
+from posefield.batch.job import ExportJob, WorkerInput, manifest_line, open_model_of
 from posefield.batch.rows import ClipQuery
 from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField
@@ -44,9 +43,6 @@ archives that contain them.
 """
 
 
-ClipsEncoder = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
-
-
 @dataclass(frozen=True)
 class Layout:
     """Paths and contents of the files of an export.
@@ -60,7 +56,9 @@ class Layout:
 
     chunk: int
     write: ChunkWriter
-    encode: Callable[[str], ClipsEncoder] = lambda extension: CLIP_ENCODERS[extension].write
+    encode: Callable[[str], Callable[[Sequence[ClipAnswer], Convention], list[bytes]]] = (
+        lambda extension: CLIP_ENCODERS[extension].write
+    )
     misfit: Callable[[ExportJob, ClipQuery], str | None] | None = None
     describe: Callable[[str, str, ClipAnswer], ManifestEntry] = lambda name, path, answer: {}
     complete: Callable[[WorkerInput, Iterable[ManifestEntry]], Iterable[tuple[str, bytes]]] = (
@@ -91,22 +89,19 @@ def archive_chunk_writer(pack: ArchiveWriter) -> ChunkWriter:
         target: ExportTarget, number: int, batches: Iterable[list[ClipFile]]
     ) -> tuple[list[ManifestEntry], list[WrittenFile]]:
         entries: list[ManifestEntry] = []
+
+        def members() -> Iterator[tuple[str, bytes]]:
+            for files in batches:
+                for file in files:
+                    entries.append(file.entry)
+                    yield file.path, file.content
+            yield f"manifest-{number:06d}.jsonl", b"".join(map(manifest_line, entries))
+
         path = f"clips-{number:06d}.{pack.extension}"
-        archive = put_file(target, path, pack.write(_archive_members(number, batches, entries)))
+        archive = put_file(target, path, pack.write(members()))
         return [{**entry, "archive": path} for entry in entries], [archive]
 
     return archived
-
-
-def _archive_members(
-    number: int, batches: Iterable[list[ClipFile]], entries: list[ManifestEntry]
-) -> Iterator[tuple[str, bytes]]:
-    """Yield the files by path, then the manifest of their entries, which are added to `entries`."""
-    for files in batches:
-        for file in files:
-            entries.append(file.entry)
-            yield file.path, file.content
-    yield f"manifest-{number:06d}.jsonl", b"".join(map(manifest.line, entries))
 
 
 STAGE, LIBRARY_FORMAT = "character.usd", "usdc"

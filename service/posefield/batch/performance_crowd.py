@@ -36,7 +36,7 @@ from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 from posefield.question.performance_batch_question import CrowdStageQuestion
-from posefield.question.performance_question import PerformanceQuestion, Start
+from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
@@ -120,9 +120,19 @@ def write(
         for motion in process_pool.results(work, list(enumerate(rows)), workers):
             staged.append(motion)
             advance(1)
-        made = _crowd_clip(cast, rows, staged)
-        crowd_writer.write(made, crowd.path, crowd.instancing, crowd.body)
-    return {"file": str(crowd.path), **_facts(made, cast, staged)}
+        clip = _crowd_clip(cast, rows, staged)
+        crowd_writer.write(clip, crowd.path, crowd.instancing, crowd.body)
+    levels = [motion.level for motion in staged]
+    return {
+        "file": str(crowd.path),
+        "models": clip.facts["models"],
+        "characters": len(staged),
+        "frames": clip.frames,
+        "rate": clip.rate,
+        "level_counts": np.bincount(levels, minlength=cast.levels).tolist(),
+        "level_shares": clip.facts["level_shares"],
+        "warned": sum(bool(motion.report.warnings) for motion in staged),
+    }
 
 
 def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> _Cast:
@@ -133,9 +143,17 @@ def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> _Cast:
     for row in rows:
         try:
             script = resolve_script(row.script, find)
-            own = _Cast(_skeleton(script), row.script.fps, len(level_errors(script)))
-            cast = own if cast is None else _joined(cast, own, rows[0].place)
-            _check_convention(row)
+            character = script.character
+            skeleton = joint_roles.rename_joints(
+                character.skeleton, character.roles, script.question.names
+            )
+            new = _Cast(skeleton, row.script.fps, len(level_errors(script)))
+            cast = new if cast is None else _joined(cast, new, rows[0].place)
+            for field, value, usual in (("unit", row.script.unit, "m"), ("up", row.script.up, "y")):
+                if value not in (None, usual):
+                    raise InvalidField(field, f"{value!r}, expected {usual!r} for a crowd")
+            if (body := row.script.body) is not None:
+                raise InvalidField("body", f"{body!r}, expected none: --body is that of a crowd")
         except QueryError as fault:
             faults.append(f"{row.place}: {fault}")
     if faults or cast is None:
@@ -143,33 +161,17 @@ def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> _Cast:
     return cast
 
 
-def _skeleton(script: Script) -> Skeleton:
-    """Return the skeleton of a performance's clip."""
-    character = script.character
-    return joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
-
-
-def _joined(cast: _Cast, own: _Cast, first: str) -> _Cast:
-    if own.rate != cast.rate:
-        raise InvalidField("fps", f"{own.rate:g}, expected {cast.rate:g} as in {first}")
-    same = own.skeleton.same_tree(cast.skeleton)
-    if not (same and np.array_equal(own.skeleton.offsets, cast.skeleton.offsets)):
+def _joined(cast: _Cast, new: _Cast, first: str) -> _Cast:
+    if new.rate != cast.rate:
+        raise InvalidField("fps", f"{new.rate:g}, expected {cast.rate:g} as in {first}")
+    same = new.skeleton.same_tree(cast.skeleton)
+    if not (same and np.array_equal(new.skeleton.offsets, cast.skeleton.offsets)):
         raise InvalidField(
             "character",
             f"another skeleton than in {first}, expected the same: name one model as the "
             "`character` of all scripts",
         )
-    return _Cast(cast.skeleton, cast.rate, max(cast.levels, own.levels))
-
-
-def _check_convention(row: ScriptRow) -> None:
-    """Raise InvalidField for a script with a unit, axis or body of its own."""
-    script = row.script
-    for field, value, usual in (("unit", script.unit, "m"), ("up", script.up, "y")):
-        if value not in (None, usual):
-            raise InvalidField(field, f"{value!r}, expected {usual!r} for a crowd")
-    if script.body is not None:
-        raise InvalidField("body", f"{script.body!r}, expected none: --body is that of a crowd")
+    return _Cast(cast.skeleton, cast.rate, max(cast.levels, new.levels))
 
 
 def stage_motion(crowd: PerformanceCrowd, folder: Path, job: tuple[int, ScriptRow]) -> StagedMotion:
@@ -183,20 +185,19 @@ def stage_motion(crowd: PerformanceCrowd, folder: Path, job: tuple[int, ScriptRo
         answer, level = perform_at_level(row.script, find, crowd.view, MAX_FRAMES)
     except QueryError as fault:
         raise scripts.faulty_scripts([f"{row.place}: {fault}"]) from fault
-    place = _place(row.script.start, answer.clip)
-    rotations, roots = _from_place(place, answer.clip)
+    clip, start = answer.clip, row.script.start
+    place = start.position, start.heading
+    if start.poses:
+        first = floor_plane.project(clip.root_path[0])
+        place = (
+            (float(first.imag), float(first.real)),
+            float(quat.twist(clip.rotations[0, 0], UP)),
+        )
+    rotations, roots = _from_place(place, clip)
     file = folder / f"{index}.npz"
-    bones = answer.clip.translations[0].astype(np.float32)
+    bones = clip.translations[0].astype(np.float32)
     np.savez(file, rotations=rotations, roots=roots, bones=bones)
     return StagedMotion(file, level, place, answer.trust)
-
-
-def _place(start: Start, clip: Clip) -> Place:
-    """Return where a script begins: its start, or the root of the first frame after given poses."""
-    if not start.poses:
-        return start.position, start.heading
-    first = floor_plane.project(clip.root_path[0])
-    return (float(first.imag), float(first.real)), float(quat.twist(clip.rotations[0, 0], UP))
 
 
 def _from_place(place: Place, clip: Clip) -> tuple[Singles, Singles]:
@@ -214,6 +215,10 @@ def _crowd_clip(
     cast: _Cast, rows: Sequence[ScriptRow], staged: Sequence[StagedMotion]
 ) -> CrowdClip:
     frames = max(motion.report.frames for motion in staged)
+    # Frames of each level, without those that keep the last pose.
+    shown = np.zeros(cast.levels)
+    for motion in staged:
+        shown[motion.level] += motion.report.frames
     places = np.array([motion.place[0] for motion in staged], dtype=np.float64)
     placement = Placement(
         np.stack([places[:, 0], np.zeros(len(places)), places[:, 1]], axis=1),
@@ -231,7 +236,7 @@ def _crowd_clip(
             "models": list(models),
             "scripts": [row.name for row in rows],
             "durations": [motion.report.duration for motion in staged],
-            "level_shares": _level_shares(cast, staged),
+            "level_shares": [float(f"{share:.4g}") for share in shown / shown.sum()],
         },
     )
 
@@ -247,27 +252,6 @@ def _batches(frames: int, staged: Sequence[StagedMotion]) -> Iterator[Motions]:
                 own["bones"][None],
                 np.full((1, frames), motion.level),
             )
-
-
-def _level_shares(cast: _Cast, staged: Sequence[StagedMotion]) -> list[float]:
-    """Return the share of the poses that has each level, without those that are kept."""
-    frames = np.zeros(cast.levels)
-    for motion in staged:
-        frames[motion.level] += motion.report.frames
-    return [float(f"{share:.4g}") for share in frames / frames.sum()]
-
-
-def _facts(made: CrowdClip, cast: _Cast, staged: Sequence[StagedMotion]) -> dict[str, Any]:
-    levels = [motion.level for motion in staged]
-    return {
-        "models": made.facts["models"],
-        "characters": len(staged),
-        "frames": made.frames,
-        "rate": made.rate,
-        "level_counts": np.bincount(levels, minlength=cast.levels).tolist(),
-        "level_shares": made.facts["level_shares"],
-        "warned": sum(bool(motion.report.warnings) for motion in staged),
-    }
 
 
 def report_text(facts: dict[str, Any]) -> str:

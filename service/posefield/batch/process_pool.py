@@ -1,4 +1,4 @@
-"""Work in this process or in a pool of processes: chunks of an export, and many scripts.
+"""Work in this process, in a pool or on a Dask cluster: chunks of an export, and many scripts.
 
 docs/decisions/0015-process-pool.md compares the pools that were tried and gives the reason for each
 precaution around `concurrent.futures`.
@@ -19,12 +19,13 @@ from multiprocessing import connection
 from multiprocessing.connection import Connection
 from typing import TypeVar
 
-from posefield.batch import chunks
+from posefield.batch import checkpoint, chunks
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.chunks import ChunkAbandoned, ChunkTask, StopCheck
-from posefield.batch.job import WorkerInput
+from posefield.batch.job import VERSIONED_PACKAGES, WorkerInput
+from posefield.batch.target import open_target
 from posefield.common.cpu_cores import SINGLE_THREAD_ENV
-from posefield.common.errors import WorkerDied
+from posefield.common.errors import ClusterError, FileError, WorkerDied
 
 POLL_INTERVAL = 0.1
 """Seconds between two checks for a stop."""
@@ -86,9 +87,18 @@ def _run_in_pool(
     stop_seen, stop = context.Pipe(duplex=False)
     # Small arguments only: a write beyond a pipe's capacity to a dead worker never returns.
     pool = ProcessPoolExecutor(workers, context, _start_worker, (stop_seen,))
+    pending: set[Future[ChunkResult | None]] = set()
     try:
-        submit = partial(_submit, pool, work)
-        yield from _finished_parts(submit, 2 * workers, tasks, stopped, stop.close)
+        while not stopped():
+            ahead = islice(tasks, 2 * workers - len(pending))
+            pending |= {_submit(pool, work, task) for task in ahead}
+            if not pending:
+                return
+            done, pending = wait(pending, POLL_INTERVAL, FIRST_COMPLETED)
+            yield from _completed_results(done)
+        stop.close()
+        left = [future for future in pending if not future.cancel()]
+        yield from _completed_results(wait(left).done)
     except BrokenProcessPool as fault:
         # The pool waits for ever for a worker that was being started when another died.
         for child in multiprocessing.active_children():
@@ -103,27 +113,8 @@ def _run_in_pool(
         stop_seen.close()
 
 
-def _finished_parts(
-    submit: Callable[[ChunkTask], "Future[ChunkResult | None]"],
-    ahead: int,
-    tasks: Iterator[ChunkTask],
-    stopped: StopCheck,
-    stop: Callable[[], None],
-) -> Iterator[ChunkResult]:
-    """Yield the part of each finished task, with `ahead` of them submitted at any time."""
-    pending: set[Future[ChunkResult | None]] = set()
-    while not stopped():
-        pending |= {submit(task) for task in islice(tasks, ahead - len(pending))}
-        if not pending:
-            return
-        done, pending = wait(pending, POLL_INTERVAL, FIRST_COMPLETED)
-        yield from _completed_results(done)
-    stop()
-    yield from _completed_results(wait([future for future in pending if not future.cancel()]).done)
-
-
 def _completed_results(done: "Iterable[Future[ChunkResult | None]]") -> Iterator[ChunkResult]:
-    """Yield the results of futures, except those of abandoned tasks."""
+    # An abandoned task has no result.
     return (part for future in done if (part := future.result()) is not None)
 
 
@@ -206,3 +197,36 @@ def results(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) ->
         raise WorkerDied("a worker process has died; the same command resumes") from fault
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def cluster_runner(address: str) -> Iterator[Runner]:
+    """Connect to the scheduler at an address such as tcp://host:8786, and yield the runner.
+
+    Raises ClusterError if it cannot be used, also while the runner is at work.
+    """
+    # Imported here because distributed is an optional extra.
+    from posefield.common import dask_cluster
+
+    def run(
+        work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
+    ) -> Iterator[ChunkResult]:
+        packages = ("posefield", *VERSIONED_PACKAGES)
+        for part in dask_cluster.results(client, _make_on_cluster, (work,), zip(tasks), packages):
+            yield part
+            if stopped():
+                return
+
+    try:
+        with dask_cluster.connect(address) as client:
+            yield run
+    except ClusterError as fault:
+        raise ClusterError(fault.address, f"{fault.message}; {RESUMES}") from fault
+
+
+def _make_on_cluster(work: WorkerInput, task: ChunkTask) -> ChunkResult:
+    """Make a chunk on a worker; FileError if it does not see the target."""
+    if open_target(work.target).read(checkpoint.JOB) is None:
+        expected = "expected a folder that all machines share, or an object store's URL"
+        raise FileError(work.target, f"holds no export on a worker; {expected}")
+    return chunks.make_chunk(work, task)

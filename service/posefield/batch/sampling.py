@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
-from posefield.model_file.model_card import Control, ModelCard
+from posefield.model_file.model_card import ModelCard
 
 BLOCK_SIZE = 4096
 """Points of a block; larger blocks are no faster."""
@@ -49,19 +49,13 @@ def latin_hypercube(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
             rows = np.arange(first, first + size, dtype=np.uint64)
             parts = permute(rows, count, (seed, place, 1))
             jitter = within[place].random(size)
-            points[:, place] = _control_values(control, parts, jitter, count)
+            if control.values:
+                chosen = parts.astype(np.int64) * len(control.values) // count
+                points[:, place] = np.array(control.values)[chosen]
+            else:
+                share = (parts + jitter) / count
+                points[:, place] = control.minimum + share * (control.maximum - control.minimum)
         yield points
-
-
-def _control_values(control: Control, parts: Positions, jitter: Floats, count: int) -> Floats:
-    """Return the values (n,) of a control in parts (n,) of `count`.
-
-    jitter: (n,), position in each part, 0 to 1.
-    """
-    if control.values:
-        return np.array(control.values)[parts.astype(np.int64) * len(control.values) // count]
-    share = (parts + jitter) / count
-    return control.minimum + share * (control.maximum - control.minimum)
 
 
 def permute(places: Positions, count: int, seed: tuple[int, ...]) -> Positions:

@@ -22,8 +22,8 @@ import msgspec
 import orjson
 
 from posefield import __version__
-from posefield.batch import checkpoint, manifest, process_pool, tables
-from posefield.batch.job import VERSIONED_PACKAGES
+from posefield.batch import checkpoint, process_pool, tables
+from posefield.batch.job import VERSIONED_PACKAGES, manifest_entry, manifest_line
 from posefield.batch.target import (
     STATE_FOLDER,
     ExportTarget,
@@ -82,7 +82,10 @@ def read_scripts(path: Path) -> tuple[ScriptRow, ...]:
     faults: list[str] = []
     for place, name, content in _contents(path):
         try:
-            row = _row(place, name, content)
+            if len(content) > MAX_LINE_BYTES:
+                raise InvalidField("", f"{len(content)} bytes, expected at most {MAX_LINE_BYTES}")
+            script = json_decoding.decode_question(NamedScript, content)
+            row = ScriptRow(place, script.name or name, script)
             if row.name in rows:
                 other = rows[row.name].place
                 raise InvalidField("name", f"{row.name!r} is that of {other}, expected another")
@@ -102,13 +105,6 @@ def faulty_scripts(faults: list[str]) -> InvalidField:
     more = len(faults) - MAX_SHOWN_FAULTS
     rest = f"\n  and {more} more" if more > 0 else ""
     return InvalidField("scripts", f"{len(faults)} that cannot be performed:{shown}{rest}")
-
-
-def _row(place: str, name: str, content: bytes) -> ScriptRow:
-    if len(content) > MAX_LINE_BYTES:
-        raise InvalidField("", f"{len(content)} bytes, expected at most {MAX_LINE_BYTES}")
-    script = json_decoding.decode_question(NamedScript, content)
-    return ScriptRow(place, script.name or name, script)
 
 
 def _contents(path: Path) -> Iterator[tuple[str, str, bytes]]:
@@ -180,22 +176,9 @@ def archive_members(order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
     for own in order.scripts:
         cancellation.check()
         answer, content = order.file(own)
-        lines += manifest.line(manifest_entry(own.name, own.file, content, answer))
+        lines += manifest_line(manifest_entry(own.name, own.file, content, answer))
         yield own.file, content
     yield MANIFEST, bytes(lines)
-
-
-def manifest_entry(
-    name: str, file: str, content: bytes, answer: PerformanceAnswer
-) -> dict[str, Any]:
-    """Return the manifest entry of a performance as plain values: path, checksum and report."""
-    return {
-        "name": name,
-        "file": file,
-        "bytes": len(content),
-        "sha256": hashlib.sha256(content).hexdigest(),
-        **answer.trust.document(),
-    }
 
 
 MAX_FRAMES = 10 * MAX_POSES
@@ -229,7 +212,7 @@ class PerformanceBatch:
         if self.character is None:
             convention = form.convention(question.unit, question.up, question.body)
             answer = composition.perform(script, MAX_FRAMES)
-            return answer, self.encode(answer, convention)
+            return answer, performance_files.encoder(form, self.layout)(answer, convention)
         order = delivery.deliver(self.character, form, question)
         made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
         return made, order.encode(made)
@@ -243,11 +226,6 @@ class PerformanceBatch:
             order = delivery.deliver(self.character, form, question)
             order.check_layout(self.layout)
             order.check(question, own.skeleton, own.roles)
-
-    @property
-    def encode(self) -> PerformanceEncoder:
-        """Return the function that encodes a performance."""
-        return performance_files.encoder(CLIP_ENCODERS[self.form], self.layout)
 
 
 @dataclass(frozen=True)
@@ -300,7 +278,7 @@ def run(
         found[entry["name"]] = entry
         advance(1)
     entries = tuple(found[row.name] for row in rows)
-    put_file(target, MANIFEST, map(manifest.line, entries))
+    put_file(target, MANIFEST, map(manifest_line, entries))
     target.remove(STATE_FOLDER)
     return BatchOutcome(entries, len(rows) - len(left))
 
@@ -351,7 +329,9 @@ def _finished(
             name: entry
             for name, entry in known.items()
             if entry["made_of"] == digests.get(name)
-            and is_intact(target, WrittenFile(*_written(entry)), verify=False)
+            and is_intact(
+                target, WrittenFile(entry["file"], entry["bytes"], entry["sha256"]), verify=False
+            )
         }
     except (ValueError, LookupError, TypeError) as fault:
         raise FileError(
@@ -372,29 +352,21 @@ def _recorded(target: ExportTarget, rows: Iterable[ScriptRow]) -> Iterator[Entry
         yield orjson.loads(target.read(f"{PARTS}/{name}.json") or b"")
 
 
-def _written(entry: Entry) -> tuple[str, int, str]:
-    return entry["file"], entry["bytes"], entry["sha256"]
-
-
 def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
     """Write the file of a script and return its entry; QueryError names the script.
 
     job: the script and the digest of what makes its performance.
     """
     row, digest = job
-    script = row.script
     try:
-        answer, content = batch.file(resolve_script(script, open_models(batch.models).find))
+        answer, content = batch.file(resolve_script(row.script, open_models(batch.models).find))
     except QueryError as fault:
         raise faulty_scripts([f"{row.place}: {fault}"]) from fault
     path = f"{FOLDER}/{row.name}.{batch.form}"
     target = open_target(batch.place)
     put_file(target, path, [content])
-    entry = {
-        **manifest_entry(row.name, path, content, answer),
-        "made_of": digest,
-    }
-    target.write([(f"{PARTS}/{row.name}.json", manifest.line(entry))])
+    entry = {**manifest_entry(row.name, path, content, answer), "made_of": digest}
+    target.write([(f"{PARTS}/{row.name}.json", manifest_line(entry))])
     return entry
 
 

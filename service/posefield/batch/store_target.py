@@ -48,7 +48,6 @@ class StoreTarget:
                     raise result
 
     def stream(self, path: str, pieces: Iterable[bytes]) -> None:
-        """Write one file from an iterable of pieces."""
         with _store_errors(self._url(path)):
             asyncio.run(self._stream(path, _async_pieces(pieces)))
 
@@ -63,7 +62,6 @@ class StoreTarget:
         )
 
     def create(self, path: str, content: bytes) -> bool:
-        """Write a file if none exists; return whether it was written."""
         with _store_errors(self._url(path)):
             try:
                 obstore.put(self._store, path, content, mode="create")
@@ -72,7 +70,6 @@ class StoreTarget:
         return True
 
     def read(self, path: str) -> bytes | None:
-        """Return the content of a file; None if it does not exist."""
         with _store_errors(self._url(path)):
             try:
                 return bytes(obstore.get(self._store, path).bytes())
@@ -80,12 +77,10 @@ class StoreTarget:
                 return None
 
     def pieces(self, path: str) -> Iterator[bytes]:
-        """Yield the content of a file in pieces; none if it does not exist."""
         with _store_errors(self._url(path)), suppress(FileNotFoundError):
             yield from map(bytes, obstore.get(self._store, path).stream(min_chunk_size=PART_SIZE))
 
     def names(self, folder: str) -> set[str]:
-        """Return the names of the files in a folder."""
         with _store_errors(self._url(folder)):
             batches = obstore.list(self._store, f"{folder}/", chunk_size=LIST_PAGE_SIZE)
             return {meta["path"].rpartition("/")[2] for batch in batches for meta in batch}
@@ -95,18 +90,15 @@ class StoreTarget:
         return True
 
     def empty(self, but: str) -> bool:
-        """Return whether the store contains nothing except, possibly, one folder."""
         with _store_errors(self.url):
             found = obstore.list_with_delimiter(self._store)
         return not found["objects"] and set(found["common_prefixes"]) <= {but}
 
     def drop(self, path: str) -> None:
-        """Remove a file, if it exists."""
         with _store_errors(self._url(path)):
             obstore.delete(self._store, path)
 
     def remove(self, folder: str) -> None:
-        """Remove a folder and its content."""
         with _store_errors(self._url(folder)):
             for batch in obstore.list(self._store, f"{folder}/", chunk_size=LIST_PAGE_SIZE):
                 obstore.delete(self._store, [meta["path"] for meta in batch])

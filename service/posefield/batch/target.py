@@ -159,18 +159,15 @@ class FolderTarget:
             folder.mkdir(parents=True, exist_ok=True)
 
     def write(self, files: Iterable[tuple[str, bytes]]) -> None:
-        """Write files, replacing those of the same names."""
         for path, content in files:
             self.stream(path, (content,))
 
     def stream(self, path: str, pieces: Iterable[bytes]) -> None:
-        """Write one file from an iterable of pieces."""
         whole = self._path(path)
         with self._write_temporary(whole, pieces):
             os.rename(self._temporary_path, whole)
 
     def create(self, path: str, content: bytes) -> bool:
-        """Write a file if none exists; return whether it was written."""
         whole = self._path(path)
         with self._write_temporary(whole, (content,)):
             try:
@@ -180,7 +177,6 @@ class FolderTarget:
                     os.unlink(self._temporary_path)
 
     def read(self, path: str) -> bytes | None:
-        """Return the content of a file; None if it does not exist."""
         with _file_errors(self._path(path)):
             try:
                 return Path(self.root, path).read_bytes()
@@ -188,7 +184,6 @@ class FolderTarget:
                 return None
 
     def pieces(self, path: str) -> Iterator[bytes]:
-        """Yield the content of a file in pieces; none if it does not exist."""
         with (
             _file_errors(self._path(path)),
             contextlib.suppress(FileNotFoundError, NotADirectoryError),
@@ -196,7 +191,6 @@ class FolderTarget:
             yield from atomic_files.read_chunks(Path(self.root, path))
 
     def names(self, folder: str) -> set[str]:
-        """Return the names of the files in a folder."""
         with _file_errors(self._path(folder)):
             try:
                 return set(os.listdir(self._path(folder)))
@@ -211,11 +205,9 @@ class FolderTarget:
             return False
 
     def empty(self, but: str) -> bool:
-        """Return whether the root contains nothing except, possibly, one folder."""
         return self.names("") <= {but}
 
     def drop(self, path: str) -> None:
-        """Remove a file, if it exists."""
         with _file_errors(self._path(path)):
             Path(self._path(path)).unlink(missing_ok=True)
 

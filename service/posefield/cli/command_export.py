@@ -147,10 +147,7 @@ def _runner(execution: RunArguments) -> AbstractContextManager[Runner]:
         raise InvalidField("workers", f"{workers}, expected 1 or more")
     if scheduler is None:
         return nullcontext(process_pool.runner(workers or process_pool.usable_cores()))
-    # Imported here because distributed is an optional extra.
-    from posefield.batch import dask
-
-    return dask.runner(scheduler)
+    return process_pool.cluster_runner(scheduler)
 
 
 def _character(output: str, execution: RunArguments) -> "UserCharacter | None":
