@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 import posefield_client
 import pytest
-from posefield_client import Camera, Client, Floor, Target, generated, numbers
+from posefield_client import Client, Floor, Target, generated, numbers
 from posefield_client.errors import WrongQuestion
-from posefield_client.numbers import ClipNumbers, Pose, SigmaGrid
+from posefield_client.numbers import Pose, SigmaGrid
 from posefield_client.wire import Reply
 from requests_of import CLIENT, body, request, sent
 
@@ -35,23 +35,12 @@ def test_controls_by_keyword_and_by_mapping_are_the_same():
     assert query(lambda client: client.model("m").pose(0, controls={"turn": 1})) == expected
 
 
-@pytest.mark.parametrize("name", ["model", "self", "clips", "format", "größe", "hip height/left"])
-def test_a_control_may_have_any_name(name):
-    assert query(M.clip(**{name: 1})) == [(name, "1")]
-
-
 def test_labels_are_a_parameter_each_and_weights_a_list():
     labels = {"style": {"angry": 0.75, "happy": 0.25}, "performer": "kim"}
     expected = [("label", text) for text in ("style=angry:0.75,happy:0.25", "performer=kim")]
     assert query(lambda client: client.model("m").suggest(labels=labels)) == expected
     assert query(M.crowd_walk(count=3, labels=labels)) == [("count", "3"), *expected]
     assert body(M.crowd(0, labels=labels), "npz")["labels"] == labels
-
-
-@pytest.mark.parametrize("many", [[0.5], (0.5,), 0.5, np.float64(0.5), np.array([0.5], "f4")])
-def test_times_of_any_kind(many):
-    asked = query(lambda client: client.model("m").pose(many, turn=np.int64(3)))
-    assert asked == [("turn", "3"), ("time", "0.5")]
 
 
 @pytest.mark.parametrize(
@@ -100,33 +89,11 @@ def test_a_long_question_goes_by_post():
     }
 
 
-def test_numbers_of_numpy_are_taken_everywhere():
-    clip = {"controls": {"a": np.float32(1)}, "fps": np.float32(30), "name": np.str_("x")}
-    assert body(M.clips([clip], "glb"), "zip") == {
-        "format": "glb",
-        "clips": [{"controls": {"a": 1}, "fps": 30, "name": "x"}],
-    }
-    camera = Camera(position=np.zeros(3), fov=np.float32(1), height=10)
-    takes = {"take": np.array([3, 8]), "variety": [0.5, 1.0]}
-    crowd = M.crowd([0, 1], performer=np.array(["p", "q"]), camera=camera, **takes, a=[1, 2])
-    assert body(crowd, "npz") == {
-        "controls": {"a": [1, 2]},
-        "time": [0, 1],
-        "performer": ["p", "q"],
-        "camera": {"position": [0, 0, 0], "fov": 1, "height": 10},
-        "take": [3, 8],
-        "variety": [0.5, 1],
-    }
-
-
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
         (lambda: M.pose(float("nan"), a=1), "times is nan, expected a finite number"),
-        (lambda: M.pose(np.array([0, np.inf]), a=1), "times is inf"),
-        (lambda: M.clip(fps=np.float32("nan")), "fps is nan"),
         (lambda: M.clips([{"controls": {}, "end": float("nan")}], "glb"), "end is nan"),
-        (lambda: M.crowd(0, camera={"fov": object()}), "fov is <object"),
         (lambda: M.clip(a=1).content("fbx"), "format 'fbx', expected one of usd"),
         (
             lambda: request(M.clip(targets=[{**HAND, "time": 0}]), "usdc"),
@@ -143,12 +110,6 @@ def test_a_question_that_json_cannot_hold_is_not_sent(ask, message):
 def test_names_that_no_model_has(name):
     with pytest.raises(WrongQuestion, match="expected a name or name@hash"):
         CLIENT.model(name)
-
-
-def test_objects_show_their_model_and_question():
-    assert repr(CLIENT.model("reach")) == "Model('reach')"
-    assert repr(M.clip(turn=1, fps=30)) == "Motion('m', turn=1, fps=30)"
-    assert repr(M.crowd(np.zeros(500))) == "Motion('m', time=<500 items>)"
 
 
 def packed(answer):
@@ -176,17 +137,13 @@ POSE = {
     "root_position": np.zeros((2, 3), "f4"),
     "bone_offsets": np.zeros((5, 3), "f4"),
 }
-CLIP = {**POSE, "units": {}, "names": list("abcde"), "parents": [-1, 0, 1, 2, 3], "rate": 30.0}
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        [1, 2],
         {"dtype": "<f4", "shape": [2]},
         {"dtype": "<f4", "shape": [3, 2], "data": bytes(8)},
-        {"dtype": "O", "shape": [3, 2], "data": bytes(48)},
-        {"dtype": "fish", "shape": [1], "data": bytes(8)},
         np.ones((2, 3), "f4"),
     ],
 )
@@ -206,9 +163,6 @@ def test_an_array_that_is_none_is_refused(wrong):
     [
         {"times": np.zeros(3)},
         {"rotations": np.zeros((2, 5, 3), "f4")},
-        {"rotations": np.zeros((2, 4, 4), "f4")},
-        {"root_position": np.zeros((1, 2, 3), "f4")},
-        {"bone_offsets": np.zeros(15, "f4")},
         {"curves": np.zeros((3, 1), "f4")},
     ],
 )
@@ -217,15 +171,6 @@ def test_arrays_that_do_not_fit_each_other_are_no_answer(wrong):
     assert read(packed(POSE)).rotations.shape == (2, 5, 4)
     with pytest.raises(ValueError, match="has the shape"):
         read(packed(POSE | wrong))
-
-
-def test_curves_are_arrays_or_none():
-    read, values = numbers.decoder(ClipNumbers), np.arange(4.0).reshape(2, 2)
-    assert (read(packed(CLIP)).curves, read(packed(CLIP)).curve_names) == (None, ())
-    clip = read(packed(CLIP | {"curves": values, "curve_names": ["jawOpen", "smile"]}))
-    assert np.array_equal(clip.curves, values)
-    with pytest.raises(ValueError, match="curves has the shape"):
-        read(packed(CLIP | {"curves": values, "curve_names": ["smile"]}))
 
 
 def test_arrays_cannot_be_written_to_and_show_their_shapes(address, controls):

@@ -1,13 +1,10 @@
 """Tests of saving files: complete or absent after network errors, with progress."""
 
 import asyncio
-import gzip
 import io
-import json
 from concurrent.futures import ThreadPoolExecutor
 from stat import S_IMODE
 
-import numpy as np
 import pytest
 import scripted
 from posefield_client import NEVER, AsyncClient, Client, Progress, Retry, errors, saving
@@ -26,8 +23,6 @@ def save(address, path, ask=lambda model: model.clip(turn=1), retry=NEVER, **giv
 
 CUT = {
     "length": answer(bytes(100_000), USDC)[:-1],
-    "chunks": chunked(bytes(70_000), ended=False, kind=USDC),
-    "head": b"HTTP/1.1 200 OK\r\nContent-Ty",
     "endless": b"HTTP/1.1 200 OK\r\nContent-Type: model/vnd.usdc\r\n\r\nhalf",
 }
 
@@ -62,15 +57,6 @@ def test_a_cut_clip_is_asked_for_again_from_its_beginning(tmp_path):
     assert seen[-1] == Progress(5, 5)
 
 
-def test_whoever_watches_may_end_it(tmp_path):
-    def stop(progress):
-        raise KeyboardInterrupt
-
-    with scripted.serving(answer(b"whole", USDC)) as server, pytest.raises(KeyboardInterrupt):
-        save(server.address, tmp_path / "clip.usdc", progress=stop)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_whoever_is_cancelled_leaves_nothing(tmp_path):
     async def begin(address):
         async with AsyncClient(address) as client:
@@ -102,12 +88,6 @@ def test_threads_share_a_client(address, controls, tmp_path):
     contents = [(tmp_path / f"{turn}.usdc").read_bytes() for turn in range(40)]
     assert contents == contents[:5] * 8
     assert len(set(contents)) == 5
-
-
-def test_without_the_folder_nothing_is_asked(tmp_path):
-    with scripted.serving() as server, pytest.raises(FileNotFoundError):
-        save(server.address, tmp_path / "none/clip.usdc")
-    assert server.asked == []
 
 
 @pytest.mark.parametrize("name", ["clip.fbx", "clip", ".usdc"])
@@ -148,18 +128,6 @@ def test_what_was_chosen_and_what_is_missed_come_with_the_file(address, controls
     assert len({saved, plain}) == 2
 
 
-@pytest.mark.parametrize("ending", ["zip", "tar"])
-def test_an_archive_says_how_far_it_is_and_what_is_in_it(ending, address, controls, tmp_path):
-    clips = [
-        {"controls": {**controls, "turn": float(turn)}, "name": f"t{turn}"} for turn in range(9)
-    ]
-    seen, path = [], tmp_path / f"X.{ending.upper()}"
-    saved = save(address, str(path), lambda m: m.clips(clips, "glb"), progress=seen.append)
-    assert [entry.name for entry in saved.entries] == [clip["name"] for clip in clips]
-    assert seen[-1] == Progress(path.stat().st_size, None)
-    assert seen == sorted(seen, key=lambda progress: progress.received)
-
-
 @pytest.fixture(scope="module", params=["zip", "tar"])
 def archive(request, address, controls):
     """An archive of three clips, and its kind."""
@@ -197,15 +165,6 @@ def test_an_archive_that_is_not_whole_is_asked_for_again(archive, controls, tmp_
     assert (len(saved.entries), len(server.asked)) == (3, 2)
 
 
-def test_a_file_in_a_coding_that_was_not_asked_for_is_not_kept(tmp_path):
-    cut = gzip.compress(bytes(100_000))[:-20]
-    said = answer(cut, USDC, Content_Encoding="gzip"), answer(b"{}")
-    with scripted.serving(*said) as server, pytest.raises(errors.Unexpected, match="in gzip"):
-        save(server.address, tmp_path / "clip.usdc")
-    assert server.asked[0][1]["accept-encoding"] == "identity"
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize("said", [{"Posefield_Warning": '"half'}, {"Posefield_Sigma": "much"}])
 def test_headers_that_cannot_be_read_leave_nothing(said, tmp_path):
     said = answer(b"whole", USDC, **said), answer(b"{}")
@@ -228,33 +187,3 @@ def test_a_file_keeps_its_permissions(tmp_path):
     path.touch(0o600)
     saved_over(path)
     assert S_IMODE(path.stat().st_mode) == 0o600
-
-
-def test_a_folder_is_no_file_and_nothing_is_asked(tmp_path):
-    path = tmp_path / "clip.usdc"
-    path.mkdir()
-    with scripted.serving() as server, pytest.raises(IsADirectoryError):
-        save(server.address, path)
-    assert server.asked == []
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_crowd_that_walks_is_a_file(address, tmp_path):
-    with Client(address) as client:
-        walk = client.model("walk").crowd_walk(count=3, seconds=0.5, camera=(30, 1.7, -60))
-        saved = walk.save(tmp_path / "crowd.usdz")
-        with pytest.raises(errors.WrongQuestion, match="format 'glb', expected one of usd"):
-            walk.save(tmp_path / "crowd.glb")
-    assert (tmp_path / "crowd.usdz").read_bytes()[:2] == b"PK"
-    assert saved.model.startswith("walk@")
-
-
-def test_numbers_of_a_clip_are_those_of_its_file(address, controls):
-    with Client(address) as client:
-        clip = client.model("reach").clip(fps=10, end=0.5, **controls)
-        found, written = clip.numbers, json.loads(clip.content("json"))
-        assert clip.numbers is found
-    assert list(found.names) == written["names"]
-    assert found.rate == 10
-    assert np.abs(found.rotations - written["rotations"]).max() < 1e-6
-    assert np.abs(found.root_position - written["root_position"]).max() < 1e-5

@@ -69,13 +69,6 @@ def test_anchors_fit_the_body_to_other_bones(person, content):
     assert np.abs(points + start - wanted).max() > 0.01
 
 
-def test_the_file_says_its_model_and_has_no_motion(content):
-    said, _ = document(content)
-    assert said["asset"]["extras"]["posefield"] == {"model": "reach@0123456789abcdef"}
-    assert "animations" not in said
-    assert [node["mesh"] for node in said["nodes"] if "mesh" in node] == [0]
-
-
 def test_the_coarse_mesh_has_the_same_points(content):
     fine, coarse = (document(content)[0]["meshes"][mesh]["primitives"][0] for mesh in (0, 1))
     assert fine["attributes"] == coarse["attributes"]

@@ -56,14 +56,6 @@ def test_facts_are_read_as_those_that_usd_writes(facts):
     assert layer_metadata.crate_text(crate_template.usdc(Plain(), other)) != found
 
 
-def test_texts_of_any_length_are_read():
-    """Runs of 15 bytes, and of each 255 more, have a head that is a byte longer."""
-    for length in (*range(20), *range(250, 275), *range(505, 530)):
-        made = replace(content(1), facts={"a": "x" * length})
-        found = layer_metadata.crate_text(crate_template.usdc(Plain(), made))
-        assert f'string a = "{"x" * length}"\n' in found
-
-
 def test_values_that_are_read_where_they_lie_are_aligned():
     for length in range(8):
         made = replace(content(1), facts={"a": "x" * length, "b": [0.1] * 3, "c": 0.1 + length})

@@ -28,15 +28,3 @@ def test_a_file_is_no_larger_than_said(ending, instancing, shape):
     )
     # Of what each file begins with nothing is said.
     assert size - 40_000 < said
-
-
-def test_a_package_is_as_large_as_its_largest_layer():
-    long, many = CrowdCounts(31, 1, 1, 36_000, 1050), CrowdCounts(31, 100_000, 1, 2, 1050)
-    assert crowd_size.layer_size_bound(long, "usdz", False) == pytest.approx(
-        36_000 * 31 * 28, rel=0.1
-    )
-    assert crowd_size.layer_size_bound(many, "usdz", False) == 100_000 * crowd_size.CHARACTER
-    ten = CrowdCounts(31, 10, 10, 3_600, 1050)
-    assert crowd_size.layer_size_bound(ten, "usdc", False) > 9 * crowd_size.layer_size_bound(
-        ten, "usdz", False
-    )

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
 
-from posefield.encode import usd_crowd
-from posefield.encode.character import character, joint_names
+from posefield.encode.character import character
 from posefield.encode.tables import crowd_tables
 from posefield.encode.usd_crowd import crowd_package, crowd_size, crowd_writer
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
@@ -59,39 +58,6 @@ def test_usd_skel_reads_the_weights_of_every_character(made, ending, instancing,
         # The body of each character takes all of them.
         assert tuple(body.GetBlendShapeOrder()) == crowds.CURVES
         assert body.HasBlendShapes()
-
-
-def test_without_a_body_the_motions_have_their_weights_still(made, tmp_path):
-    stage = written(made, tmp_path / "crowd.usda", "references", "none")
-    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Crowd/Motions/m00001"))
-    times = animation.GetBlendShapeWeightsAttr()
-    found = np.array([times.Get(frame) for frame in times.GetTimeSamples()])
-    assert np.abs(found - made.curves[1]).max() < FLOAT32
-
-
-def test_the_shapes_of_the_body_have_legal_names(made, tmp_path):
-    stage = written(made, tmp_path / "crowd.usda", "references")
-    body = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Crowd/Characters/c00000/Body"))
-    targets = [path.name for path in body.GetBlendShapeTargetsRel().GetForwardedTargets()]
-    assert targets == list(joint_names.legal_names(crowds.CURVES))
-
-
-@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
-def test_a_crowd_without_curves_has_no_shapes(made, instancing):
-    def text(own):
-        return b"".join(crowd_writer.stream(crowd(own), "usda", instancing))
-
-    assert b"lendShape" not in text(replace(made, curves=None))
-    assert b"lendShape" in text(made)
-
-
-def test_curves_that_the_crowd_does_not_name_are_refused(made, tmp_path):
-    nameless = replace(crowd(made), curves=())
-    with pytest.raises(ValueError, match=r"curves of \(2, 7, 3\), expected \(\)"):
-        crowd_writer.write(nameless, tmp_path / "crowd.usdc")
-    missing = replace(crowd(replace(made, curves=None)), curves=crowds.CURVES)
-    with pytest.raises(ValueError, match=r"curves of \(\), expected \(2, 7, 3\)"):
-        crowd_writer.write(missing, tmp_path / "crowd.usdc")
 
 
 def test_npz_has_the_curves_of_every_character(made, tmp_path):

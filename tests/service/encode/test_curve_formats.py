@@ -14,8 +14,6 @@ from posefield.encode.files.file_convention import METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd import usd_animation, usd_clip, usd_library
 from posefield.encode.usd_layers import (
-    crate_template,
-    layer_content,
     layer_metadata,
 )
 from posefield.motion.curves import Curve, CurveValues
@@ -107,16 +105,6 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
         assert layer_metadata.crate_text(binary).encode() == expected
 
 
-def test_weights_are_filled_in_a_template(walk):
-    made = with_curves(walk, curves(52, len(walk.clip)))
-    ((author, content),) = usd_clip.builders_and_contents([made], METRES)
-    pattern = layer_content.first_frame(content).pattern
-    assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
-    # Other weights have other files.
-    (other,) = usd_clip.usdc([with_curves(walk, curves(52, len(walk.clip), seed=1))], METRES)
-    assert other != usd_clip.usdc([made], METRES)[0]
-
-
 def test_a_library_binds_the_weights_of_its_clips_to_shapes_of_its_body(face, tmp_path):
     (content,) = usd_animation.usdc([face], METRES)
     (tmp_path / "laugh.usdc").write_bytes(content)
@@ -162,15 +150,3 @@ def test_json_and_tables_name_the_curves(face):
     assert clip["curve_names"] == packed["curve_names"] == list(NAMES)
     assert np.abs(np.array(clip["curves"]) - expected).max() < 1e-6
     assert packed["curves"]["shape"] == list(expected.shape)
-
-
-@pytest.mark.parametrize("ending", ["json", "msgpack", "usda", "glb"])
-def test_files_of_a_clip_without_curves_name_none(walk, face, ending):
-    words = (b"curve", b"lendShape", b"targetNames", b'"weights"')
-    assert not any(word in CLIP_ENCODERS[ending].encode(walk) for word in words)
-    assert any(word in CLIP_ENCODERS[ending].encode(face) for word in words)
-
-
-def test_a_clip_refuses_curves_of_another_number_of_frames(walk):
-    with pytest.raises(ValueError, match="curves"):
-        replace(walk.clip, curves=curves(3, len(walk.clip) - 1))

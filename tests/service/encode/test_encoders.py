@@ -13,21 +13,6 @@ from posefield.motion import skeleton
 from posefield_train.source import bvh
 
 
-def test_the_table_names_each_format_once():
-    assert {key: found.media_type for key, found in CLIP_ENCODERS.items()} == {
-        "usda": "model/vnd.usda",
-        "usdc": "model/vnd.usdc",
-        "usdz": "model/vnd.usdz+zip",
-        "json": "application/json",
-        "bvh": "application/x-bvh",
-        "glb": "model/gltf-binary",
-        "npz": "application/x-npz",
-        "arrow": "application/vnd.apache.arrow.stream",
-        "msgpack": "application/vnd.msgpack",
-    }
-    assert all(found.extension == key for key, found in CLIP_ENCODERS.items())
-
-
 @pytest.fixture(scope="module")
 def keyframes(walk):
     return orjson.loads(CLIP_ENCODERS["json"].encode(walk))
@@ -45,19 +30,6 @@ def test_json_holds_the_clip(keyframes, walk):
     assert keyframes["bone_offsets"][0] == [0.0, 0.0, 0.0]
 
 
-def test_json_is_enough_to_place_the_joints(keyframes, walk):
-    offsets = np.tile(keyframes["bone_offsets"], (45, 1, 1))
-    offsets[:, 0] = keyframes["root_position"]
-    rotations = np.array(keyframes["rotations"])
-    positions, _ = skeleton.forward_kinematics(tuple(keyframes["parents"]), rotations, offsets)
-    np.testing.assert_allclose(positions, walk.clip.positions(), atol=1e-5)
-
-
-def test_json_states_its_units_and_trust(keyframes, walk):
-    assert keyframes["units"]["rotation"].startswith("unit quaternion w x y z")
-    assert keyframes["trust"] == walk.trust.document()
-
-
 def test_json_never_holds_nan(walk):
     unknown = dataclasses.replace(walk.trust, sigma=float("nan"))
     data = CLIP_ENCODERS["json"].encode(dataclasses.replace(walk, trust=unknown))
@@ -70,29 +42,6 @@ def test_bvh_is_in_centimetres(walk):
     # A BVH file lists joints depth first.
     order = [walk.clip.skeleton.names.index(name) for name in clip.skeleton.names]
     np.testing.assert_allclose(clip.positions(), walk.clip.positions()[:, order], atol=1e-5)
-
-
-@pytest.fixture(scope="module")
-def arrays(walk):
-    with np.load(io.BytesIO(CLIP_ENCODERS["npz"].encode(walk)), allow_pickle=False) as found:
-        return dict(found)
-
-
-def test_npz_holds_the_clip(arrays, walk):
-    clip = walk.clip
-    assert tuple(arrays["names"]) == clip.skeleton.names
-    assert tuple(arrays["parents"]) == clip.skeleton.parents
-    assert arrays["rate"] == clip.rate
-    assert np.array_equal(arrays["times"], np.arange(45) / 29.97)
-    assert np.array_equal(arrays["rotations"], clip.rotations.astype(np.float32))
-    assert np.array_equal(arrays["root_position"], clip.root_path.astype(np.float32))
-    assert np.array_equal(arrays["bone_offsets"][1:], clip.translations[0, 1:].astype(np.float32))
-
-
-def test_npz_says_what_json_says(arrays, keyframes):
-    assert orjson.loads(str(arrays["units"])) == keyframes["units"]
-    assert orjson.loads(str(arrays["trust"])) == keyframes["trust"]
-    assert set(arrays) == set(keyframes) - {"frames"}
 
 
 def positions(found):
@@ -142,24 +91,12 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
     assert np.abs(lying.positions() - walk.clip.positions()[:, order]).max() > 0.1
 
 
-def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
-    """Its front is -Y where Z is up."""
-    found = file_convention.convert_clip(STAGE, walk.clip).skeleton
-    meant = on_stage(walk.clip.skeleton.offsets)
-    np.testing.assert_allclose(found.offsets, meant, atol=1e-12)
-    np.testing.assert_allclose(
-        found.tip_offsets, on_stage(walk.clip.skeleton.tip_offsets), atol=1e-12
-    )
-
-
 @pytest.mark.parametrize(
     ("unit", "up", "usual", "meant"),
     [
         (None, None, CENTIMETRES, CENTIMETRES),
-        (None, "z", CENTIMETRES, Convention(0.01, "z")),
         ("m", None, CENTIMETRES, METRES),
         ("cm", "z", METRES, STAGE),
-        ("m", "y", Convention(0.01, "z"), METRES),
     ],
 )
 def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):

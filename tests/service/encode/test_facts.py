@@ -49,8 +49,3 @@ def plain(value):
     if isinstance(value, dict):
         return {name: plain(entry) for name, entry in value.items()}
     return value if isinstance(value, str | bool | int | float) else list(value)
-
-
-def test_what_is_no_plain_fact_is_an_error():
-    with pytest.raises(TypeError, match="a fact of type object, expected text, a number or"):
-        layer_metadata.usd_dictionary({"what": object()})

@@ -71,15 +71,6 @@ def test_every_clip_poses_the_character(answers, convention, tmp_path):
     assert np.abs(other).max() > 0.1
 
 
-def test_the_first_clip_is_bound_and_the_longest_gives_the_times(answers, tmp_path):
-    stage = Usd.Stage.Open(str(build(tmp_path, answers)))
-    assert stage.GetDefaultPrim().GetPath() == "/Character"
-    relation = stage.GetRelationshipAtPath("/Character/Skel.skel:animationSource")
-    assert relation.GetTargets() == ["/Character/Clips/walk_1"]
-    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, 58)
-    assert stage.GetTimeCodesPerSecond() == 30.0
-
-
 @pytest.mark.parametrize("convention", [METRES, INCHES], ids=str)
 def test_our_own_check_has_nothing_to_say(answers, convention, tmp_path):
     assert defects(build(tmp_path, answers[:2], convention, 29.97)) == []
@@ -128,23 +119,6 @@ def test_the_text_is_what_usd_writes_of_it(answers, tmp_path):
     layer = Sdf.Layer.CreateAnonymous("again.usda")
     assert layer.ImportFromString(path.read_text())
     assert layer.ExportToString() == path.read_text()
-
-
-def test_a_library_of_no_clips_is_a_character_at_rest(tmp_path):
-    path = tmp_path / "character.usd"
-    path.write_bytes(usd_library.library_stage(conftest.person(), METRES, 30.0, []))
-    stage = Usd.Stage.Open(str(path))
-    assert stage.GetEndTimeCode() == 0
-    assert not stage.GetPrimAtPath("/Character/Clips").GetAllChildren()
-
-
-def test_layers_say_what_their_clips_are_worth(answers, tmp_path):
-    path = build(tmp_path, answers).parent / "clips/00@/ok.usdc"
-    layer = Sdf.Layer.FindOrOpen(str(path))
-    facts = layer.customLayerData["posefield"]
-    assert facts | {"warnings": list(facts["warnings"])} == answers[2].trust.facts()
-    assert layer.defaultPrim == "Anim"
-    assert len(layer.rootPrims) == 1
 
 
 @pytest.mark.parametrize("convention", [METRES, INCHES], ids=str)

@@ -19,14 +19,6 @@ def data():
     return layer_metadata.crate_bytes(made)
 
 
-def at_table(data, form, value):
-    made = bytearray(data)
-    struct.pack_into(
-        form, made, *struct.unpack_from("<q", data, crate_sections.TABLE_OFFSET_POSITION), value
-    )
-    return bytes(made)
-
-
 def with_table(data, place):
     return (
         data[: crate_sections.TABLE_OFFSET_POSITION]
@@ -40,11 +32,6 @@ def test_pieces_are_put_together_again(data):
     assert crate_sections.join_crate(bytearray(found.values), found.sections) == data
 
 
-@pytest.mark.parametrize("count", [0, -1, 1, 2**40])
-def test_a_table_that_counts_otherwise_is_refused(data, count):
-    assert crate_sections.split_crate(at_table(data, "<q", count)) is None
-
-
 def test_a_layer_that_breaks_off_is_refused(data):
     assert not any(crate_sections.split_crate(data[:size]) for size in range(len(data)))
 
@@ -54,7 +41,3 @@ def test_a_table_elsewhere_is_refused(data):
     places = [*range(-50, len(data) + 50), *(rng.randrange(-(2**63), 2**63) for _ in range(200))]
     places.remove(*struct.unpack_from("<q", data, crate_sections.TABLE_OFFSET_POSITION))
     assert not any(crate_sections.split_crate(with_table(data, place)) for place in places)
-
-
-def test_more_behind_the_table_is_refused(data):
-    assert crate_sections.split_crate(data + b"\0") is None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, max_poses
+from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS
 from posefield.inference import session
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import ClipQuestion
@@ -66,8 +66,3 @@ def company(model, count):
         "warn",
         None,
     )
-
-
-def test_as_many_poses_are_allowed_as_surely_fit():
-    assert max_poses(4800, 9, 48) == 10
-    assert max_poses(4799, 9, 48) == 9

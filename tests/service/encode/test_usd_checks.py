@@ -47,13 +47,9 @@ def narrow(layer):
     ("damage", "words"),
     [
         (lambda layer: layer.pseudoRoot.ClearInfo("upAxis"), "no upAxis"),
-        (lambda layer: layer.pseudoRoot.ClearInfo("defaultPrim"), "no default prim"),
         (renamed, "illegal"),
-        (cleared("/Character/Skel", "restTransforms"), "restTransforms"),
-        (cleared("/Character/Anim", "scales"), "scales"),
         (lambda layer: layer.EraseTimeSample("/Character/Anim.rotations", 3), "frames without"),
         (flipped, "changes of sign"),
-        (heavy, "weights of a point"),
         (narrow, "outside the extent"),
         (lambda layer: layer.GetPrimAtPath("/Character/Skel").ClearInfo("apiSchemas"), "API"),
     ],

@@ -23,10 +23,6 @@ def test_the_archive_holds_the_binary_layer_alone(archive, walk):
         assert found.read(entry) == CLIP_ENCODERS["usdc"].encode(walk)
 
 
-def test_the_data_are_aligned(archive, walk):
-    assert archive.index(CLIP_ENCODERS["usdc"].encode(walk)) % 64 == 0
-
-
 def test_data_are_aligned_after_a_name_of_any_length():
     for length in range(1, 65):
         data = b"".join(zip_archive.zip_chunks([zip_archive.whole("n" * length, b"data")]))
