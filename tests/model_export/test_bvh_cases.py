@@ -183,19 +183,15 @@ def test_words_in_any_case():
     assert_plain(text)
 
 
-def test_utf8_byte_order_mark():
+def test_encodings():
     clip = assert_plain(b"\xef\xbb\xbf" + PLAIN.encode())
     assert clip.skeleton.names[0] == "hips"
-
-
-def test_japanese_names_in_cp932_even_where_a_byte_is_a_brace():
+    # A byte of cp932 may be a brace.
     name = "センター ボーン"
     assert b"\x83{" in name.encode("cp932")
     clip = assert_plain(PLAIN.replace("hips", name).encode("cp932"))
     assert clip.skeleton.names[0] == name
-
-
-def test_names_in_latin1_where_neither_unicode_nor_cp932_decodes():
+    # Where neither Unicode nor cp932 decodes, names are in Latin-1.
     clip = assert_plain(PLAIN.replace("hips", "H\xfcfte \xff").encode("latin-1"))
     assert clip.skeleton.names[0] == "Hüfte ÿ"
 

@@ -133,12 +133,6 @@ def test_fault_is_named_with_its_line(content, line, message):
     assert (error.line, error.message) == (line, message)
 
 
-@pytest.mark.parametrize(("content", "line", "message"), FAULTS[::9])
-def test_line_is_the_same_with_carriage_returns(content, line, message):
-    error = refused(content.replace("\n", "\r\n"))
-    assert (error.line, error.message) == (line, message)
-
-
 def nested(levels):
     head = "".join(
         f"{'JOINT' if level else 'ROOT'} j{level}\n{{\nOFFSET 0 1 0\nCHANNELS 1 Xrotation\n"

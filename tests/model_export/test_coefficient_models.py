@@ -61,9 +61,3 @@ def test_noise_is_answered_with_its_mean_and_a_field_is_not(laid):
         assert np.abs(answered).mean() < 0.4 * np.abs(noise).mean()
     kept = coefficient_models.fit(Kriging(nugget=0.1), POSE, laid, noise)
     assert isinstance(kept.field, Field)
-
-
-def test_values_that_never_change_are_a_constant(laid):
-    found = coefficient_models.fit(Kriging(), POSE, laid, np.full((24, 2), 3.0))
-    assert isinstance(found.field, ConstantModel)
-    assert found.explained == 0.0 and not found.residuals.any()

@@ -2,11 +2,10 @@
 
 import json
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from families import quadruped_walk, sample_walk
+from families import sample_walk
 from joblib import parallel_config
 
 from posefield.common.errors import RecipeError
@@ -14,15 +13,11 @@ from posefield.inference import session
 from posefield.inference.graph_ports import CONTACTS
 from posefield.motion import bvh_writer
 from posefield_train import train
-from posefield_train.adapt import adaptation, canonical_clips
-from posefield_train.adapt.adaptation import adapt
 from posefield_train.contacts import contact_labels, held_out_contacts
 from posefield_train.contacts.held_out_contacts import FRAMES, SHARES, HeldOutClips
 from posefield_train.evaluate import protocol, summary
-from posefield_train.graph import onnx_export
 from posefield_train.parallel.jobs import ProcessJobs
-from posefield_train.sample import sample_files
-from posefield_train.source import ingest, recipe
+from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 
 # Joint that is no foot, whose contacts only a table can give.
@@ -48,27 +43,6 @@ def stance(shares, landing):
     since = (shares - landing) % 1.0
     sure = (np.abs(since - sample_walk.STANCE) > 0.12) & (since > 0.05) & (since < 0.92)
     return sure, since < sample_walk.STANCE
-
-
-def test_four_feet_of_a_quadruped_are_labelled(tmp_path):
-    own = recipe.read(sample_files.write_folder(tmp_path / "q", quadruped_walk.files()))
-    examples, _ = ingest.ingest(own, tmp_path / "q")
-    trained = train.train(own, examples, lambda _: None)
-    assert len(trained.contacts.statistics) == 4
-    assert trained.contacts.accuracy.agreement > 0.93
-    assert trained.contacts.accuracy.brier < trained.contacts.accuracy.climatology
-    opened = session.open_bytes(onnx_export.export_model(own, trained, []).content, "quadruped")
-    assert [opened.card.skeleton.names[one.joint] for one in opened.card.contacts] == list(
-        quadruped_walk.PAWS
-    )
-    controls = np.array([[control.default for control in opened.card.controls]])
-    times = np.linspace(0.0, opened.durations(controls).item(), 40)[None]
-    for level in range(len(opened.card.levels)):
-        (found,) = opened.run(controls, times, CONTACTS, level=level)
-        standing = found[0] > 0.5
-        # Three paws stand most of the time, two at least, and each swings.
-        assert standing.sum(axis=1).min() >= 2
-        assert 0.6 < standing.mean() < 0.95 and not standing.all(axis=0).any()
 
 
 def test_a_walk_in_place_has_the_contacts_of_the_walk(models_trained, strides):
@@ -123,16 +97,6 @@ def test_a_cell_that_is_no_intervals_is_refused(rail, cell):
     assert it.value.line == 2
 
 
-def test_a_column_or_joint_that_is_missing_is_refused(rail):
-    folder, _ = rail
-    missing = walk_recipe(contacts={"columns": {RAIL: "handrail"}})
-    with pytest.raises(RecipeError, match=r"no column 'handrail' \(contacts.columns.Hips\)"):
-        ingest.ingest(missing, folder)
-    unknown = walk_recipe(contacts={"columns": {"Hand": "rail"}})
-    with pytest.raises(RecipeError, match="no joints 'Hand'"):
-        ingest.ingest(unknown, folder)
-
-
 def newcomers():
     """Strides of a third walker, by their controls."""
     return {
@@ -164,22 +128,6 @@ def test_adapting_adds_the_contacts_of_the_new_clips(posefield, walk_path, tmp_p
         for foot, (_, landing) in enumerate(sample_walk.SIDES.values()):
             sure, stands = stance(shares, landing)
             assert np.mean((found[0, sure, foot] > 0.5) == stands[sure]) > 0.97
-
-
-def test_adapting_leaves_out_contacts_of_the_table_with_a_note(rail):
-    folder, own = rail
-    examples, _ = ingest.ingest(own, folder)
-    trained = train.train(own, examples[3:], lambda _: None)
-    known = canonical_clips.adaptable(own, trained)
-    adapted = adapt(known, examples[:3], "new")
-    assert [one.joint for one in adapted.contacts.statistics] == [3, 6]
-    assert adapted.model.contacts.values.shape[1] == 2
-    (note,) = adaptation.contact_notes(known, adapted.contacts)
-    assert note.startswith("contacts of Hips were left out")
-    handless = replace(known, feet=())
-    assert adapt(handless, examples[:3], "new").contacts is None
-    (note,) = adaptation.contact_notes(known, None)
-    assert "LeftFoot, RightFoot, Hips" in note
 
 
 @pytest.fixture(scope="module")

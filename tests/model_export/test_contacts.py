@@ -141,21 +141,6 @@ def test_the_parity_check_refuses_wrong_contacts(walk_exported):
         onnx_export.check_parity(replace(model, contacts=wrong), content, card)
 
 
-@pytest.mark.parametrize(
-    "change, said",
-    [
-        (lambda own: own * 2, "contacts is .*, expected each entry once"),
-        (lambda own: (replace(own[0], longest_swing=0.01), own[1]), "at least its swing"),
-        (lambda own: own[:1], "constant 'contact_table' has shape"),
-    ],
-)
-def test_a_card_that_contradicts_itself_or_its_graph_is_refused(walk_exported, change, said):
-    card = replace(walk_exported.card, contacts=change(walk_exported.card.contacts))
-    content = walk_exported.model.onnx(model_card.dump(card), {})
-    with pytest.raises(ModelError, match=said):
-        session.open_bytes(content, "odd.onnx")
-
-
 def test_a_card_with_contacts_needs_a_graph_with_them(walk_exported, opened):
     model = walk_exported.model
     bare = replace(model, contacts=None, bank=replace(model.bank, contacts=None))
@@ -170,16 +155,3 @@ def test_a_card_with_contacts_needs_a_graph_with_them(walk_exported, opened):
     for own, other in zip(*answers, strict=True):
         assert np.array_equal(own, other)
     assert old.run_trial() == opened.run_trial()
-
-
-def test_inspect_prints_the_contacts(posefield, walk_path, model_path):
-    code, out, _ = posefield("inspect", walk_path)
-    card = session.load(walk_path).card
-    own, accuracy = card.contacts[0], card.diagnostics["contacts"]
-    assert code == 0
-    assert (
-        f"contacts of LeftFoot: {100 * own.height:.1f} cm high, swings of {own.swing:.2f} s" in out
-    )
-    assert f"{accuracy['agreement']:.0%} of frames agree" in out
-    code, out, _ = posefield("inspect", model_path)
-    assert code == 0 and "contacts" not in out

@@ -65,13 +65,6 @@ def test_the_hand_that_a_family_depends_on_is_its_event_and_its_control(seed):
     assert found.remaining[0] < 0.2 and list(found.remaining) == sorted(found.remaining)[::-1]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_equal_motions_have_no_event(seed):
-    """Only offsets of joints differ, which no measure of another joint predicts."""
-    found = control_proposals.propose_controls(reaching(seed, moving=False))
-    assert not found.remaining or found.remaining[-1] > 0.5
-
-
 def test_strides_are_controlled_by_their_gait():
     rng = np.random.default_rng(0)
     own = reaching(1)

@@ -94,16 +94,6 @@ def test_curves_follow_the_warp_of_their_clip(face):
     assert np.abs(opened - strengths[:, None] * mixed).max() > NEAR
 
 
-def test_sigma_of_curves_alone_is_that_of_their_errors(alone, models_trained):
-    content = models_trained.exported("curves").content
-    model = Synthesizer("curves", session.open_bytes(content, "curves"))
-    missed = float(np.sqrt(np.mean(alone.warped_errors)))
-    sigma = clips.synthesize_clip(model, ClipQuestion(controls=LAUGH)).trust.sigma
-    assert 0.1 * missed < sigma < 10 * missed
-    # A clip left out is missed by a few hundredths of a unit at most.
-    assert 0.0 < missed < 0.05 * alone.tensor.curves[0].distance
-
-
 @pytest.mark.parametrize(
     "change, said",
     [

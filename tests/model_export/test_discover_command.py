@@ -143,13 +143,6 @@ def test_a_recipe_takes_the_rows_that_a_person_accepted(posefield, folder):
     assert (row.first_frame, row.last_frame) == (144, 216)
 
 
-def test_swings_in_place_are_counted_and_left_out(posefield, tmp_path):
-    write(tmp_path / "a.bvh", discover_takes.take("a", 6.0, **(WALK | {"speed": 0.0})))
-    code, out, err = posefield("discover", tmp_path, "--strides", "-o", tmp_path / "s.csv")
-    assert code == 0 and "0 clips" in out
-    assert "left out: 3 swings of the legs that do not travel" in err
-
-
 def test_takes_are_compared_in_the_roles_of_all_and_the_others_are_told(posefield, folder):
     path = folder / "a.bvh"
     path.write_text(path.read_text().replace("Hand", "Hook"))

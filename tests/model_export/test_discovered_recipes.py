@@ -126,13 +126,3 @@ def test_performers_are_told_by_bones_and_named_by_files():
         "performer_2",
         "performer_1",
     ]
-
-
-def test_a_table_beside_the_recipe_counts_if_the_data_folder_has_none(made, takes, tmp_path):
-    data = tmp_path / "data"
-    shutil.copytree(takes, data)
-    own = recipe.read(made / "family_01.toml")
-    beside = clip_table.read(own, data)
-    lines = (made / "family_01.csv").read_text().splitlines()
-    (data / "family_01.csv").write_text("\n".join(lines[:3]) + "\n")
-    assert len(clip_table.read(own, data)) == 2 < len(beside)

@@ -50,18 +50,6 @@ def test_cost_and_path_are_those_of_the_plain_recursion(rng):
         assert np.max(np.abs(phase - np.linspace(0.0, 1.0, 12))) > 1e-2
 
 
-def test_each_sequence_may_have_a_reference_of_its_own(rng):
-    sequences, references = wandering(rng, 5, 20), wandering(rng, 5, 20)
-    together = dtw.warp(sequences, references)
-    pairs = list(zip(sequences, references, strict=True))
-    assert np.array_equal(together, [dtw.warp(own[None], other)[0] for own, other in pairs])
-    totals = [dtw.total_cost(own[None], other)[0] for own, other in pairs]
-    assert np.array_equal(dtw.total_cost(sequences, references), totals)
-    same = np.broadcast_to(references[0], references.shape)
-    assert np.array_equal(dtw.warp(sequences, same), dtw.warp(sequences, references[0]))
-    assert not np.array_equal(together, dtw.warp(sequences, references[::-1]))
-
-
 def test_slope_keeps_within_a_third_and_three(rng):
     sequences, (reference,) = wandering(rng, 30, 40), wandering(rng, 1, 40)
     slopes = np.diff(dtw.warp(sequences, reference), axis=1) * 39

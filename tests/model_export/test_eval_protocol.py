@@ -135,11 +135,6 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
     assert all(seen[name] < 0.95 * measured[name] for name in DEFINITIONS)
 
 
-def test_an_unknown_performer_is_trusted_less(results):
-    clips, performers = results[0]
-    assert performers.sigma.mean() > clips.sigma.mean()
-
-
 class Backwards:
     """Jobs whose results come as they finished, and when run again, in the reverse order."""
 

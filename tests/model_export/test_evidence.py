@@ -55,14 +55,6 @@ def test_bones_of_another_performer_are_named(offsets):
     )
 
 
-def test_sides_are_known_by_their_names():
-    assert take_groups.mirrored_joints(NAMES) == (0, 2, 1, 4, 3, 5)
-    assert take_groups.mirrored_joints(("root", "left", "relay")) == (0, 1, 2)
-    blender = ("hips", "arm_R", "arm_L", "mixamorig:LeftFoot", "mixamorig:RightFoot", "tail_l")
-    assert take_groups.mirrored_joints(blender) == (0, 2, 1, 4, 3, 5)
-    assert take_groups.right_joints(blender) == [1, 4]
-
-
 def body(rng):
     """Joints (T, J, 3) of a body that is not like its mirror image."""
     left = np.array([0.0, 0.4, -0.4, 0.1, -0.1, 0.0])[None, :, None] * [1.0, 0.0, 0.0]

@@ -81,16 +81,6 @@ def test_planted_motions_are_found_as_families_of_their_own(corpus):
     assert all(len({tuple(own) for own in members if own}) == 1 for members in found), found
 
 
-def test_families_share_few_frames_and_begin_with_the_most_similar_clip(corpus):
-    families = family_search.find_families(corpus)
-    spans = [member.span for family in families for member in family.members]
-    for at, span in enumerate(spans):
-        assert all(span.overlap(other) <= 0.5 for other in spans[:at])
-    for family in families:
-        costs = [member.cost for member in family.members]
-        assert costs == sorted(costs) and len(costs) >= family_search.FEWEST
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_hand_that_wanders_without_a_pattern_is_not_offered(seed):
     wandering = moving([], noise=0.2, seed=10 * seed)

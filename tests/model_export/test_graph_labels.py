@@ -7,15 +7,12 @@ import onnx
 import onnxruntime
 import pytest
 from label_kernels import performers
-from model_files import written
 from numpy.random import PCG64, Generator
 from running import bank_values, outputs
 
-from posefield.common.errors import ExportRefused, ModelError
+from posefield.common.errors import ExportRefused
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.model_file import model_card
-from posefield.model_file.model_card import LabelSet
 from posefield_train.graph import onnx_export
 from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.kriging import universal_kriging
@@ -222,21 +219,3 @@ def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, la
 
 
 # --- files that do not fit ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("names", [("ada", "bob"), ("ada", "bob", "cyd", "dee")])
-def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_path, opened, names):
-    kernels = (replace(opened.card.kriging.labels[0], count=len(names)),)
-    entries = model_card.dump(
-        replace(
-            opened.card,
-            labels=(LabelSet("performer", names, (0,) * 46),),
-            kriging=replace(opened.card.kriging, labels=kernels),
-        )
-    )
-    graph = onnx.load(labelled_path)
-    for entry in graph.metadata_props:
-        entry.value = entries.get(entry.key, entry.value)
-    said = f"constant 'labels' has shape .1, 3., expected .1, {len(names)}. by its card"
-    with pytest.raises(ModelError, match=said):
-        session.open_bytes(written(graph), "damaged")

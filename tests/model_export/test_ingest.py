@@ -108,14 +108,6 @@ def test_lengths_are_scaled_to_metres(read):
     assert np.abs(twice.positions() - 2.0 * metres.positions()).max() < WRITTEN
 
 
-def test_offsets_are_the_performers_bones_with_none_for_the_root(read):
-    longer = replace(small_clip(), translations=1.1 * small_clip().translations)
-    (example, tall), _ = read(small_clip(), longer)
-    assert np.abs(example.offsets - SKELETON.offsets).max() < WRITTEN
-    assert np.abs(tall.offsets - 1.1 * SKELETON.offsets).max() < WRITTEN
-    assert not example.offsets[0].any()
-
-
 def test_frames_are_cut_and_count_from_zero(read, tmp_path):
     source = small_clip()
     write_clips(tmp_path, [source])
@@ -234,18 +226,6 @@ def test_clips_of_other_skeletons_are_refused_with_both_files(read, tmp_path):
         f"{tmp_path / '2.bvh'} has other joints than {tmp_path / '0.bvh'} of line 2: "
         "only one of them has ['LeftHand', 'LeftPaw']; of people, say skeleton.topology = 'roles'"
     )
-
-
-def test_bones_that_stretch_are_noted_and_their_mean_is_kept(read):
-    source = small_clip()
-    translations = source.translations.copy()
-    translations[:, 2, 1] += np.linspace(0.0, 0.02, len(source))
-    elastic = {"motion": {"bones": "stretch"}}
-    examples, notes = read(replace(source, translations=translations), **elastic)
-    assert [note.partition(": ")[2] for note in notes] == [
-        "bones stretch by up to 0.0200 m; their mean is kept"
-    ]
-    assert examples[0].offsets[2, 1] == pytest.approx(0.31, abs=WRITTEN)
 
 
 def with_root_offset(file):

@@ -112,23 +112,6 @@ def test_weights_are_the_best_unbiased_ones(hyper, samples, values, points, rng)
         assert np.all(error(constant.weights(points)) < error(best))
 
 
-def test_two_drifts_predict_the_mean_of_both(hyper, samples, values, points):
-    field = universal_kriging.solve(replace(hyper, drifts=(0, 1)), samples, values)
-    alone = [
-        universal_kriging.solve(own, samples, values)
-        for own in each_drift(replace(hyper, drifts=(0, 1)))
-    ]
-    predicted = [own.predict(points) for own in alone]
-    weighed = [own.weights(points) for own in alone]
-    assert far(field.predict(points), np.mean(predicted, axis=0)) < TOLERANCE
-    assert far(field.weights(points), np.mean(weighed, axis=0)) < TOLERANCE
-    assert min(far(field.predict(points), own) for own in predicted) > 1e-3
-    # Nor is the variance a mean: what the two err in common alone stays whole.
-    mean = np.mean([own.variance(points) for own in alone], axis=0)
-    assert far(field.variance(points), mean) > 1e-6
-    assert np.all(field.variance(points) < mean + TOLERANCE)
-
-
 def left_out_one_by_one(hyper, samples, values, groups):
     """Residuals and variances of every sample by fields from all other groups, solved anew."""
     residuals, variances = np.empty_like(values), np.empty(len(samples))

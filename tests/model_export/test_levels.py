@@ -1,6 +1,5 @@
 """Tests of levels of detail: nested, increasingly coarse, each within its error limit."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,10 +9,8 @@ import pytest
 from posefield.common.errors import TrainingError
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.model_file import subgraph
 from posefield.motion import skeleton
 from posefield_train.graph import levels
-from posefield_train.kriging import thinning
 from posefield_train.source.recipe_sections import Detail
 
 HAND = "LeftHand"
@@ -54,16 +51,6 @@ def test_errors_keep_the_budgets_times_what_the_level_may_cost(small_recipe, exp
         assert level.rms < level.p99 < level.max
 
 
-def test_the_order_of_samples_changes_no_answer(trained, rng):
-    bank = trained.model.bank
-    points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
-    before, after = bank.numpy(points), thinning.sort_samples(bank).numpy(points)
-    for name, values in before.items():
-        assert np.abs(after[name] - values).max() < 1e-9
-    other = replace(bank, pose=replace(bank.pose, samples=bank.pose.samples[::-1]))
-    assert np.abs(other.numpy(points)["pose"] - before["pose"]).max() > 1e-3
-
-
 def test_joints_that_a_level_drops_do_not_move(still, trained):
     names, parents = trained.skeleton.names, trained.skeleton.parents
     arm, hand = names.index("LeftArm"), names.index(HAND)
@@ -87,11 +74,6 @@ def test_joints_that_cannot_be_dropped_are_named(small_recipe, trained, joint):
     asked = with_levels(small_recipe, Detail(times=2.0, drop_joints=[joint]))
     with pytest.raises(TrainingError, match=rf"drop_joints \['{joint}'\], expected some of "):
         levels.build_levels(asked, trained)
-
-
-def test_a_model_of_one_level_has_one(small_recipe, trained):
-    found = levels.build_levels(with_levels(small_recipe), trained)
-    assert len(found.levels) == 1 and found.model.bank.coarse == ()
 
 
 # --- the file -------------------------------------------------------------------------------------
@@ -121,9 +103,3 @@ def test_a_level_fed_to_the_file_is_the_level_of_the_service(model_path, questio
         # Weights laid out beforehand are summed in another order.
         assert max(np.abs(a - b).max() for a, b in zip(fed, found, strict=True)) < 1e-5
         assert max(np.abs(a - b).max() for a, b in zip(fed, other, strict=True)) > 1e-3
-
-
-@pytest.mark.parametrize("cut", [1, 10_000])
-def test_half_a_file_cannot_be_frozen(model_path, cut):
-    with pytest.raises(ValueError):
-        subgraph.fix_level(model_path.read_bytes()[:-cut], 0)
