@@ -1,7 +1,5 @@
 """Tests of comparisons with equal information: standard errors over takes, verdicts and rivals."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from evaluation import equal_information
@@ -73,28 +71,3 @@ def test_rivals_have_the_information_of_posefield():
     assert found["known"]["best"]["relative"]["peer"] == "gp"
     assert found["open"]["best"]["relative"]["difference"] == pytest.approx(1.0)
     assert found["known"]["takes"] == 4
-
-
-def test_without_an_event_no_effector_is_compared():
-    own = result({"posefield": OURS, "gp": OURS})
-    bare = {
-        name: tuple(replace(one, effector=np.nan) for one in row)
-        for name, row in own.errors.items()
-    }
-    found = equal_information.facts(replace(own, errors=bare))
-    assert set(found["open"]["best"]) == {"relative", "global", "duration"}
-    # Negative control.
-    assert "effector" in equal_information.facts(own)["open"]["best"]
-
-
-def test_durations_are_compared_by_their_squares():
-    own = result({"posefield": OURS, "gp": OURS})
-    far = {
-        "posefield": tuple(error(0.01, duration=0.1) for _ in TAKES),
-        "gp": tuple(error(0.01, duration=0.2 + 0.01 * (take % 2)) for take in TAKES),
-    }
-    one = equal_information.facts(replace(own, errors=far))["open"]["best"]["duration"]
-    assert one["posefield"] == pytest.approx(10.0)
-    assert 20.0 < one["error"] < 21.0
-    assert one["verdict"] == equal_information.BETTER
-    assert one["standard_error"] > 0.0

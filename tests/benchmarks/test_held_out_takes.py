@@ -1,7 +1,5 @@
 """Tests of the takes and standing feet of held-out clips, and of their figures."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from evaluation import field_statistics, standing_feet, takes
@@ -53,18 +51,6 @@ def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
         assert own.take.weighted_skate < own.sliding.weighted_skate + 1e-3
         # All time functions of a cycle vary, and this model has no detail.
         assert own.unlimited is own.detailed is own.detailed_take is None
-
-
-def test_facts_of_takes_are_ratios_of_means(found):
-    facts = takes.facts(found.clips, [found.fields])
-    captured = sum(one.captured.acceleration for one in found.clips)
-    taken = sum(one.take.acceleration for one in found.clips)
-    assert facts["acceleration"]["take"] == pytest.approx(taken / captured, rel=1e-5)
-    assert facts["clips"] == 3 and facts["frames_per_second"] == takes.RATE
-    # A fold whose model has no detail counts with its prediction and its take.
-    one = replace(found.clips[0], detailed=found.clips[0].take, detailed_take=found.clips[0].take)
-    detailed = takes.facts([one, *found.clips[1:]], ())["acceleration"]
-    assert detailed["detailed_take"] == facts["acceleration"]["take"]
 
 
 @pytest.fixture(scope="module")

@@ -40,15 +40,6 @@ def test_a_file_of_one_motion_has_no_animation_to_choose(tmp_path):
         motion_readers.read(folder / "0.bvh", ReadOptions(animation="walk"))
 
 
-def test_motion_files_of_all_formats_are_found(tmp_path):
-    names = ("b.GLB", "a.bvh", "sub/c.usdz", "sub/d.amc")
-    for name in (*names, "e.txt", "sub/f.asf"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_bytes(b"")
-    found = [path.relative_to(tmp_path).as_posix() for path in motion_readers.find_files(tmp_path)]
-    assert sorted(found) == sorted(names)
-
-
 def write_arm(folder, *skeletons, motion="07_01.amc"):
     for name in skeletons:
         (folder / name).write_text(ARM_ASF)

@@ -66,12 +66,8 @@ def test_cycles_cut_anywhere_begin_at_one_moment(cuts):
     assert abs(np.angle(np.exp(2j * np.pi * shifts).mean())) < 2 * np.pi * HALF_A_FRAME
     assert np.abs(shifts).max() > 10 * HALF_A_FRAME, "negative control: there are shifts"
     assert disagreement(found) < 0.1 * disagreement(family)
-
-
-def test_sizes_do_not_tell_the_time(cuts, rng):
-    sizes = rng.uniform(0.7, 1.3, CLIPS)
-    found = begun([cycle(cut, size) for cut, size in zip(cuts, sizes, strict=True)])
-    assert np.ptp([e.shift + cut for e, cut in zip(found, cuts, strict=True)]) < 4 * HALF_A_FRAME
+    same = phase_alignment.shift_start(family[0], 0.3 * HALF_A_FRAME)
+    assert same is family[0], "less than half a frame is no shift"
 
 
 def test_half_a_cycle_away_is_found_too(cuts):
@@ -109,12 +105,6 @@ def test_the_line_of_the_heading_goes_on():
     assert canonical.heading(quarter.clip)[0] == pytest.approx(expected, abs=1e-6)
     fitted = canonical.heading(canonical.straighten_gait(quarter.clip))[0]
     assert abs(fitted - expected) > 0.01
-
-
-def test_a_whole_cycle_later_is_the_same_clip():
-    whole = cycle(0.0)
-    assert phase_alignment.shift_start(whole, 1.0) is whole
-    assert phase_alignment.shift_start(whole, 0.3 * HALF_A_FRAME) is whole
 
 
 def test_landmarks_move_with_the_cycle():

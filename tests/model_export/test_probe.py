@@ -283,19 +283,6 @@ def test_what_init_cannot_use_is_refused(posefield, tmp_path, words, code, said)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_table_without_motion_files_is_refused(tmp_path):
-    path = tmp_path / "t.csv"
-    path.write_text("a,b\n1,2\n")
-    with pytest.raises(RecipeError, match=r"t\.csv:1: no column of the motion files"):
-        recipe_draft.read_table(path)
-    assert clip_table.open_table(path).records
-
-
-def test_the_names_of_a_folder_become_names_of_recipes():
-    assert recipe_draft.recipe_name("My Kicks (2026)") == "my_kicks_2026"
-    assert recipe_draft.recipe_name("!!!") == "motion"
-
-
 GUIDE = Path(__file__).parents[2] / "docs/guide/landmarks.md"
 
 

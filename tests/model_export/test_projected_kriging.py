@@ -18,7 +18,6 @@ from posefield_train.kriging.sample_kriging import ProjectedProcess
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.source import canonical
 from posefield_train.source.recipe_sections import Kriging
 
 SAME = 1e-8
@@ -186,21 +185,6 @@ def test_a_draw_keeps_inner_products_and_the_coordinates_of_the_effector(family,
     assert small.drawn(0) is small
 
 
-def test_parameters_of_a_large_family_are_tuned_twice(rng):
-    """On draws without a common clip, which agree where clips abound, and not of pure noise."""
-    points = rng.uniform(-1.0, 1.0, (520, 2))
-    smooth = np.sin(points @ rng.normal(size=(2, 3))) + 0.05 * rng.normal(size=(520, 3))
-    inducing = sample_points.choose_inducing(points, 2, ())
-    settings = Kriging(covariance="matern52")
-    family = large(points, inducing)
-    tuned = coefficient_models.choose_covariance(settings, family, smooth)
-    assert tuned.residuals.shape == smooth.shape
-    assert 0.0 <= tuned.disagreement < 0.02
-    assert tuned.unexplained < 0.05
-    few = coefficient_models.choose_covariance(settings, family.subset(np.arange(90)), smooth[:90])
-    assert few.disagreement is None
-
-
 def _mean_square(residuals):
     """Mean and standard error of the squared residuals of clips."""
     squares = np.sum(np.square(residuals), axis=1)
@@ -241,13 +225,3 @@ def test_tunings_that_disagree_are_noted(trained):
     assert notes(None) == notes(0.02) == []
     (said,) = notes(0.031)
     assert "3.1 % farther away than with the other" in said
-
-
-def test_motions_are_restored_in_blocks_that_cover_all_clips():
-    for clips in (1, 300, 301, 900, 901):
-        blocks = canonical.clip_blocks(clips)
-        assert np.concatenate([np.arange(clips)[own] for own in blocks]).tolist() == list(
-            range(clips)
-        )
-        assert max(own.stop - own.start for own in blocks) <= 300
-    assert len(canonical.clip_blocks(300)) == 1

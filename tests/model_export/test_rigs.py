@@ -9,7 +9,7 @@ from minimal import recipe_with, write_clips
 
 from posefield.common.errors import RecipeError
 from posefield.common.units import UP
-from posefield.motion import quat, skeleton
+from posefield.motion import quat
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source import facing, ingest, skeleton_checks
@@ -177,11 +177,6 @@ def test_bones_that_stretch_by_centimetres_are_refused_unless_the_recipe_says_so
     assert "bones stretch by up to" in notes[0] and notes[0].endswith("their mean is kept")
 
 
-def test_bones_that_stretch_by_millimetres_are_noted(read):
-    _, notes = read(stretched(2, 0.004))
-    assert len(notes) == 1 and "bones stretch by up to 0.00" in notes[0]
-
-
 @pytest.mark.parametrize(
     ("clips", "cause"),
     [
@@ -202,21 +197,6 @@ def test_the_likely_cause_is_told(read, clips, cause):
     assert cause in refusal(read, clips())
 
 
-def test_a_joint_within_a_limb_carries_motion(read):
-    assert "position channels carry motion" in refusal(read, spined())
-
-
-def spined():
-    """Clips of a chain of six joints whose fourth slides."""
-    chain = Skeleton(
-        tuple("abcdef"), (-1, 0, 1, 2, 3, 4), np.tile([0.0, 0.3, 0.0], (6, 1)), (), np.zeros((0, 3))
-    )
-    clips = family(body=chain)
-    for clip in clips:
-        clip.translations[:, 3, 1] += 0.1 * np.sin(np.linspace(0, 6, len(clip)))
-    return clips
-
-
 # --- bodies and rest poses
 
 
@@ -232,15 +212,6 @@ def test_two_performers_under_one_name_are_a_sentence(read):
     assert len(read(clips, ["ann"] * 3 + ["ben"] * 3)[0]) == 6
     # One clip is an outlier, not a second body.
     assert len(read(clips[:4], ["ann"] * 4)[0]) == 4
-
-
-def test_small_differences_are_one_body():
-    rng = np.random.default_rng(1)
-    offsets = BODY.offsets * (1.0 + 0.01 * rng.standard_normal((8, len(BODY), 1)))
-    assert skeleton_checks.find_two_bodies(offsets, ["ann"] * 8) is None
-    offsets[4:] *= 1.2
-    assert skeleton_checks.find_two_bodies(offsets, ["ann"] * 8).counts == (4, 4)
-    assert skeleton_checks.find_two_bodies(offsets, [""] * 8) is None
 
 
 def test_a_rest_pose_in_one_point_is_a_sentence(read):
@@ -317,22 +288,3 @@ def test_a_family_without_a_facing_keeps_the_axes_of_its_files(read):
     assert found[0].facing is None and notes == []
     wanted = clips[0].positions() - clips[0].root_path[0] * (1.0 - UP)
     assert np.abs(found[0].clip.positions() - wanted).max() < WRITTEN
-
-
-def test_a_note_tells_that_nothing_tells_the_facing(tmp_path):
-    names = tuple("abcdefg")
-    clips = [replace(clip, skeleton=replace(BODY, names=names)) for clip in family()]
-    still = [
-        replace(
-            clip,
-            translations=skeleton.translations(clip.translations[0], 0.9 * UP + 0 * clip.root_path),
-        )
-        for clip in clips
-    ]
-    folder = write_clips(tmp_path, still)
-    ahead = {"quantity": "forward", "joint": "c", "at": "end"}
-    plain = recipe_with().model_dump(by_alias=True)
-    asked = {**plain, "controls": [{"name": "ahead", "description": "x", "auto": ahead}]}
-    (note,) = ingest.ingest(type(recipe_with()).model_validate(asked), folder)[1]
-    assert note == "nothing tells the facing: +z of the root is taken; say motion.facing"
-    assert ingest.ingest(recipe_with(), folder)[1] == []

@@ -311,12 +311,6 @@ def test_spread_at_a_sample_is_never_less_than_the_nugget():
     assert away > 2.0 * found.max()
 
 
-def test_times_outside_the_clip_count_as_its_ends():
-    stage, logs = CanonicalTiming(WarpBasis(6), 60), 0.3 * rng().normal(size=(1, 6))
-    _, place = stage.numpy(np.zeros((1, 1)), logs, np.array([[-5.0, 0.0, 1.0, 9.0]]))
-    assert np.max(np.abs(place - [0.0, 0.0, 59.0, 59.0])) < 1e-9
-
-
 def test_poses_at_whole_frames_are_those_of_the_tensor():
     stage = decoder_stage()
     coefficients = stage.reduced.bases[2]
@@ -356,32 +350,3 @@ def test_poses_in_several_batches_are_those_of_a_few():
         assert np.array_equal(all_[:5], one)
         assert np.max(np.abs(all_[-1] - one[last])) < 1e-12
         assert np.max(np.abs(all_[-1] - one[last - 1])) > 1e-3
-
-
-def test_between_frames_the_root_goes_straight():
-    stage, coefficients = decoder_stage(), rng().normal(size=(3, 6))
-    at = np.tile([4.0, 4.25, 5.0], (3, 1))
-    root = stage.numpy(coefficients, at)[1]
-    assert np.max(np.abs(root[:, 1] - (0.75 * root[:, 0] + 0.25 * root[:, 2]))) < 1e-12
-
-
-def test_at_full_ranks_and_without_nugget_the_clips_come_back_at_their_controls(trained):
-    points = trained.model.bank.pose.samples
-    hyper = replace(trained.pose.hyper, nugget=0.0)
-    exact = universal_kriging.solve(hyper, points, trained.full.bases[2])
-    own = trained.tensor
-    whole = Decoder(trained.full, own.mean, own.unwhiten, own.chart)
-    numbers = own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T
-    rotations, root = own.chart.poses(numbers)
-    frames = np.tile(np.arange(float(root.shape[1])), (len(points), 1))
-
-    def away(stage, coefficients):
-        found = stage.numpy(coefficients, frames)
-        turns = quat.to_matrix(found[0]) - quat.to_matrix(rotations)
-        return max(np.max(np.abs(turns)), np.max(np.abs(found[1] - root)))
-
-    assert away(whole, exact.predict(points)) < 1e-6
-    smoothed = universal_kriging.solve(trained.pose.hyper, points, trained.full.bases[2])
-    assert away(whole, smoothed.predict(points)) > 1e-3
-    cut = replace(trained.model.decoder, event=None)
-    assert away(cut, cut.reduced.bases[2]) > 1e-3

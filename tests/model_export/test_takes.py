@@ -10,8 +10,6 @@ from minimal import ingested, recipe_with, small_clip
 from posefield.common.errors import RecipeError
 from posefield.common.units import UP
 from posefield.motion import quat
-from posefield.motion.clip import Clip, assemble
-from posefield.motion.skeleton import Skeleton
 from posefield_train import train
 from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
 from posefield_train.adapt.adapted_file import NewPerformer
@@ -93,18 +91,6 @@ def test_loops_and_held_poses_tell_nothing(rng):
     assert relations(*held) == []
 
 
-def test_features_differ_no_more_than_joints_do(rng):
-    """A candidate is never missed: features change at most as much as positions."""
-    one = wandering(rng)
-    other = one + 0.02 * rng.normal(size=one.shape)
-    other[:, 0] = one[:, 0]
-    features = take_groups.frame_features
-    apart = np.sqrt(np.mean(np.sum(np.square(one - other), axis=-1), axis=-1))
-    assert np.all(np.linalg.norm(features(one) - features(other), axis=1) <= apart + 1e-12)
-    for same in (seen_elsewhere(one), one * [-1.0, 1.0, 1.0]):
-        assert np.abs(features(one) - features(same)).max() < 1e-12
-
-
 EIGHT = tuple(small_clip(0.1 * i, 21 + i % 3) for i in range(8))
 
 
@@ -168,39 +154,6 @@ def test_clips_of_one_file_and_of_one_recording_are_grouped_with_a_note(read):
     assert notes == [
         "8 of 8 clips share their file with others: clips of one file are left out together as one "
         "take (clips.take states takes)"
-    ]
-
-
-BOTH_SIDES = Skeleton(
-    ("Hips", "Spine", "LeftArm", "RightArm"),
-    (-1, 0, 1, 1),
-    np.array([(0, 0, 0), (0, 0.4, 0), (0.2, 0.1, 0), (-0.2, 0.1, 0)]),
-    (),
-    np.zeros((0, 3)),
-)
-
-
-def two_armed(phase):
-    """A clip of a body with two arms that swing differently."""
-    clip = small_clip(phase)
-    return assemble(BOTH_SIDES, clip.rotations[:, :4], clip.root_path, BOTH_SIDES.offsets, 30.0)
-
-
-def image(clip):
-    """The mirror image of a clip, by the plane between its sides."""
-    swapped = [0, 1, 3, 2]
-    turned = clip.rotations[:, swapped] * [1.0, 1.0, -1.0, -1.0]
-    return Clip(BOTH_SIDES, turned, clip.translations[:, swapped] * [-1.0, 1.0, 1.0], clip.rate)
-
-
-def test_a_mirrored_copy_is_left_out_with_its_original(read):
-    eight = [two_armed(0.1 * i) for i in range(8)]
-    assert read(eight)[1:] == (list(range(8)), [])
-    _, takes, notes = read([*eight, image(eight[3])])
-    assert takes[3] == takes[8] and len(set(takes)) == 8
-    assert notes == [
-        "line 10, 8.bvh mirrors line 5, 3.bvh: such clips are left out together as one take "
-        "(clips.take states takes)"
     ]
 
 

@@ -245,9 +245,3 @@ def test_a_budget_is_kept_and_not_wasted(trained, small_recipe):
     other = train.train(small_recipe.model_copy(update={"size": tight}), trained.examples, quiet)
     assert 0.0018 < other.truncation_errors.rms <= 0.002 < trained.truncation_errors.rms
     assert trained.truncation_errors.rms <= 0.01 * small_recipe.size.rms_budget_cm
-
-
-def test_progress_is_told_step_by_step(small_recipe, few):
-    told = []
-    train.train(with_size(small_recipe, 0.1, [5, 5, 5]), few, told.append)
-    assert told == ["aligning 23 clips", "decomposing the motion tensor", "fitting the fields"]

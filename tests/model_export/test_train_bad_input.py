@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from minimal import SKELETON, TOML, recipe_with, small_clip, write_clips
+from minimal import TOML, recipe_with, small_clip, write_clips
 
 from posefield.common.errors import RecipeError, TrainingError
-from posefield.motion import quat
-from posefield.motion.clip import assemble
 from posefield_train import train
 from posefield_train.graph import onnx_export, trained_card
 from posefield_train.graph.trained_model import Outlier
@@ -49,45 +47,6 @@ def test_a_plain_family_has_nothing_to_be_noted(model):
     trained, exported = model(EIGHT)
     assert notes(exported) == []
     assert trained.explained["pose"] > 0.9
-
-
-def test_equal_controls_with_different_motion_are_met_by_a_nugget(model):
-    """Pairs at one speed, of which half of the motion is not the speed's."""
-    trained, _ = model(EIGHT)
-    apart = [small_clip(0.1 * (i // 2) + 0.5 * (i % 2), 21 + i % 3) for i in range(8)]
-    twins, exported = model(apart, speeds(0, 0, 1, 1, 2, 2, 3, 3))
-    # Eight clips leave a nugget near its prior, whose mean is 0.1.
-    assert twins.pose.hyper.nugget > 0.1 > 2.0 * trained.pose.hyper.nugget
-    assert exported.card.samples == 8
-    # Neither of a pair is met: the answer lies between.
-    points = twins.model.bank.pose.samples
-    coefficients = twins.model.bank.pose.predict(points)
-    assert np.max(np.abs(coefficients[0] - coefficients[1])) < 1e-12
-    gaps = twins.model.decoder.reduced.bases[2] - coefficients
-    assert np.all(np.linalg.norm(gaps, axis=1) > 1e-2)
-
-
-def turning_arm(angle):
-    """A clip whose arm is turned by that angle at its end, and not at its beginning."""
-    clip = small_clip()
-    rotations = clip.rotations.copy()
-    share = np.linspace(0.0, 1.0, len(clip))
-    rotations[:, 3] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), share * angle)
-    return assemble(SKELETON, rotations, clip.root_path, SKELETON.offsets, 30.0)
-
-
-def test_a_joint_far_from_its_mean_is_named_with_its_clip(model):
-    # Given, for with the least nugget a clip that is so unlike all others asks too much of float32.
-    nugget = {"kriging": {"nugget": 0.05}}
-    still = [turning_arm(0.3) for _ in range(7)]
-    _, exported = model([*still, turning_arm(0.98 * np.pi)], **nugget)
-    (said,) = [note for note in notes(exported) if "half a turn" in note]
-    assert re.fullmatch(
-        r"line 9, 7\.bvh: close to half a turn from the family's mean: LeftArm by 16\d degrees",
-        said,
-    )
-    _, near = model([*still, turning_arm(0.8 * np.pi)], **nugget)
-    assert not [note for note in notes(near) if "half a turn" in note]
 
 
 def spoil(tmp_path, old, new):
@@ -184,14 +143,6 @@ def test_poses_of_all_files_together_are_bounded(tmp_path):
     )
 
 
-def test_a_trend_needs_two_samples(model):
-    trained, exported = model(EIGHT[:2])
-    assert exported.card.samples == 2
-    assert np.isfinite(trained.left_out_errors).all()
-    with pytest.raises(TrainingError, match="1 samples, expected at least 2 for 1 control"):
-        model(EIGHT[:1])
-
-
 def test_two_performers_are_told_apart(model):
     rows = [f"{i}.bvh,{i // 2},{'ann' if i % 2 else 'bob'}" for i in range(8)]
     apart = [small_clip(0.1 * (i // 2) + 0.5 * (i % 2), 21 + i % 3) for i in range(8)]
@@ -207,12 +158,6 @@ def test_a_control_of_few_values_is_taken_and_they_are_listed(model):
     assert exported.card.controls[0].values == (0.0, 1.0)
     assert np.isfinite(trained.left_out_errors).all()
     assert np.isfinite([*trained.pose.hyper.scales, trained.pose.hyper.nugget]).all()
-
-
-def test_a_control_of_many_values_is_a_continuum(model):
-    eleven = [small_clip(0.1 * i) for i in range(11)]
-    _, exported = model(eleven)
-    assert exported.card.controls[0].values == ()
 
 
 def test_motions_that_are_all_the_same_are_refused(model):

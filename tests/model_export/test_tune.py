@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from label_kernels import performers, vary
 
-from posefield_train.kriging import kriging_tuning, tuning_loss, universal_kriging
+from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import PRIORS, SCALE_PRIOR, LeaveOneOutLoss, TuningProblem
@@ -168,24 +168,6 @@ def test_the_tuned_loss_is_no_greater_than_around_it_and_at_other_starts(samples
             assert loss.value_and_slope(in_search_units(start))[0] > least
 
 
-def test_tuned_parameters_keep_within_the_bounds(samples, people, rng):
-    tuned = [
-        tuned_at(samples, own).hyper for own in (wave(samples), samples, rng.normal(size=(50, 2)))
-    ]
-    tuned += [
-        tuned_for(samples, people, own_ways(samples, people, rng, apart)).hyper
-        for apart in (0.0, 100.0)
-    ]
-    for hyper in tuned:
-        logs = np.log(hyper.scales)
-        assert np.all((logs > SCALE_PRIOR.low - 1e-9) & (logs < SCALE_PRIOR.high + 1e-9))
-        for name in ("nugget", "trend"):
-            assert (
-                PRIORS[name].low - 1e-9 <= np.log(getattr(hyper, name)) <= PRIORS[name].high + 1e-9
-            )
-    assert [hyper.labels for hyper in tuned[:3]] == [()] * 3
-
-
 def test_the_prior_decides_where_data_do_not(samples, rng):
     """Of a control that changes nothing the scale is small; of few samples it is the prior's."""
     problem = TuningProblem(alone(samples[:4]), rng.normal(size=(4, 1)))
@@ -202,36 +184,6 @@ def test_the_prior_decides_where_data_do_not(samples, rng):
     assert np.log(many.nugget) < PRIORS["nugget"].mean - 1.5 * PRIORS["nugget"].deviation
 
 
-def test_the_prior_without_names_is_that_of_two_unknown_performers(samples, people):
-    """Of the prior's means: what is left of the sill between performers, relative to it."""
-    usual = Hyper(
-        "matern52",
-        (0,),
-        np.exp([SCALE_PRIOR.mean] * 2),
-        np.exp(PRIORS["nugget"].mean),
-        0.0,
-        performers(2, 0.5, np.exp(PRIORS["offset"].mean)),
-    )
-    here = np.hstack([np.zeros((2, 2)), np.eye(2)])
-    between = universal_kriging.noisy(usual, here)
-    expected = between[0, 0] / between[0, 1] - 1.0
-    assert np.exp(tuning_loss.UNNAMED_NUGGET.mean) == pytest.approx(expected)
-    assert expected == pytest.approx(1.8)
-    problem = TuningProblem(alone(samples), wave(samples), unnamed=True)
-    assert problem.prior("nugget") == tuning_loss.UNNAMED_NUGGET
-    assert problem.prior("trend") == PRIORS["trend"]
-    assert replace(problem, unnamed=False).prior("nugget") == PRIORS["nugget"]
-
-
-def test_control_that_matters_more_gets_the_larger_scale(samples):
-    values = wave(samples)
-    x, y = tuned_at(samples, values).hyper.scales
-    assert x > 1.5 * y
-    swapped = samples[:, ::-1]
-    x, y = tuned_at(swapped, values).hyper.scales
-    assert y > 1.5 * x
-
-
 def test_nugget_is_worth_the_variance_of_the_noise(samples, rng):
     smooth = tuned_at(samples, wave(samples))
     noisy = wave(samples) + 0.5 * rng.normal(size=(50, 2))
@@ -246,13 +198,6 @@ def test_given_nugget_is_kept(samples):
     tuned = tuned_at(samples, values, 0.037)
     assert tuned.hyper.nugget == 0.037
     assert tuned_at(samples, values).hyper.nugget != 0.037
-
-
-def test_values_that_never_change_count_as_unexplained(samples):
-    hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 0.0)
-    assert (
-        kriging_tuning.evaluate_fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
-    )
 
 
 def test_groups_are_left_out_together(samples, people, rng):

@@ -53,13 +53,6 @@ def test_constant_added_to_the_logs_changes_nothing(basis, logs):
     assert np.max(np.abs(moved - basis.evaluate(logs, FIT_TIMES))) < TOLERANCE
 
 
-def test_own_times_of_each_warp_are_its_own(basis, logs, rng):
-    times = rng.uniform(size=(20, 7))
-    together = basis.evaluate(logs, times)
-    for row, own, u in zip(together, logs, times, strict=True):
-        assert np.max(np.abs(row - basis.evaluate(own, u))) < TOLERANCE
-
-
 def test_power_form_is_the_same_basis(basis):
     # The hinges of 24 knots are nearly alike: their solution loses four digits.
     found = basis.powers(FIT_TIMES) @ basis.power_form

@@ -114,19 +114,6 @@ def test_the_isotropic_variogram_is_that_of_scaled_controls(trained, controls):
     assert other.distances != pytest.approx(expected.distances)
 
 
-def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
-    found = kriging.measure_variograms(trained, controls)
-    points = trained.samples.half_ranges
-    for axis, direction in enumerate(found[:-1]):
-        counted = 0
-        for i in range(len(points)):
-            for j in range(i):
-                way = np.abs(points[i] - points[j])
-                counted += bool(way[axis] ** 2 >= 0.5 * np.sum(way**2))
-        assert len(direction.distances) == counted > 0
-        assert direction.name == controls[axis].name
-
-
 def test_a_control_with_one_value_a_performer_is_named(trained, controls):
     values = np.stack([example.controls for example in trained.examples])
     performers = [example.row.performer for example in trained.examples]
@@ -203,19 +190,6 @@ def test_sigma_is_right_on_average_by_construction(trained):
     # Sigma is less at a known clip than where it is left out.
     bank = trained.model.bank
     assert np.all(bank.sigma(bank.numpy(bank.pose.samples)[VARIANCE]) < predicted)
-
-
-def test_calibration_statistics(rng):
-    predicted, actual = rng.uniform(1.0, 2.0, (2, 50))
-    statistics = chapters.calibration_statistics(predicted, actual)
-    assert statistics["within_one_sigma"] == np.mean(actual <= predicted)
-    for errors, sigma, expected in (
-        (predicted**3, predicted, 1.0),
-        (1.0 / predicted, predicted, -1.0),
-        (actual, np.ones(50), 0.0),
-    ):
-        correlation = chapters.calibration_statistics(sigma, errors)["rank_correlation"]
-        assert correlation == pytest.approx(expected)
 
 
 def test_an_outlier_is_listed_with_the_evidence(trained, controls):
