@@ -105,18 +105,6 @@ def test_a_foot_leaves_the_floor_and_comes_back_at_rest():
     assert low.sum() >= 4 and moved[low].max() < 0.005 < moved[9]
 
 
-def test_a_path_goes_through_the_points_to_which_it_is_led(rng):
-    places = np.cumsum(rng.normal(size=(80, 3)), axis=0) * 0.003 + [0.0, 0.1, 0.0]
-    path, goal = FootPath(places, RATE), np.full((80, 3), np.nan)
-    goal[30] = places[30] + [0.02, 0.3, 0.01]
-    found = (Interval(0, 20), Interval(45, 66))
-    planned = plan_path(path, found, FOOT, goal).positions
-    assert planned[30] == pytest.approx(goal[30], abs=1e-12)
-    assert np.abs(plan_path(path, found, FOOT).positions[30] - goal[30]).max() > 0.1
-    # The change is as smooth as one that stands.
-    assert np.abs(np.diff(planned - places, 2, axis=0)).max() < 0.05
-
-
 # Stances begin in the first and in the last frames of a cycle, and lie all around it.
 BEGINS = (0, 1, 30, 47, 48, 49)
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import one_foot
-import pytest
 from few_feet import discipline, foot_rows, frame_rows
 from hypothesis import given
 from hypothesis import strategies as st
@@ -81,13 +80,6 @@ def test_of_a_stance_out_of_reach_the_longest_part_stays(down, beyond, cyclic):
     assert listed(found) == expected
 
 
-def test_rows_that_lost_frames_are_found():
-    whole = stance_rows.runs(np.ones(FRAMES, bool), rows(False))
-    less = stance_rows.runs(np.arange(FRAMES) != 70, rows(False))
-    assert stance_rows.changed_rows(whole, less, rows(False)).tolist() == [1]
-    assert not len(stance_rows.changed_rows(whole, whole, rows(False)))
-
-
 FOOT_RATE = 60.0
 
 
@@ -123,11 +115,3 @@ def test_a_long_swing_within_a_walk_stays():
     assert discipline(held, replace(path_of(forward), walking=walking), FOOT) == held
     walking[80:] = False
     assert discipline(held, replace(path_of(forward), walking=walking), FOOT) != held
-
-
-def test_places_go_on_over_the_end_of_a_cycle():
-    cycle = Cycle(1.0 + 0.5j, 0.3)
-    found = path_of(np.linspace(0.0, 1.0, 10), cycle=cycle).places([9, 10, 11])
-    assert found[0] == pytest.approx(1.0)
-    assert found[1] == pytest.approx(cycle.way)
-    assert found[2] == pytest.approx(cycle.way + np.exp(0.3j) / 9.0)

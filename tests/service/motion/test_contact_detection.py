@@ -94,14 +94,6 @@ def test_the_ground_of_a_motion_in_place_moves_under_its_feet():
         assert not contact_detection.detect_contacts(still, RATE, False).any()
 
 
-def test_runs_are_all_frames_of_the_mask_in_order():
-    mask = np.array([True, True, False, True, False, False, True])
-    assert [run.tolist() for run in contact_detection.runs(mask, False)] == [[0, 1], [3], [6]]
-    assert [run.tolist() for run in contact_detection.runs(mask, True)] == [[3], [6, 0, 1]]
-    assert contact_detection.runs(np.zeros(3, bool), True) == []
-    assert [run.tolist() for run in contact_detection.runs(np.ones(3, bool), True)] == [[0, 1, 2]]
-
-
 FPS = 30.0
 
 
@@ -128,7 +120,3 @@ def test_only_the_ground_counts():
 def test_every_motion_of_a_crowd_has_its_own_floor():
     low, high = foot(0.0, 0.1 * SECONDS), foot(7.0, 0.2 * SECONDS)
     assert foot_skate.mean_skate_speed(np.stack([low, high]), FPS) == pytest.approx([0.1, 0.2])
-
-
-def test_without_feet_nothing_slides():
-    assert foot_skate.mean_skate_speed(np.zeros((2, 31, 0, 3)), FPS).tolist() == [0.0, 0.0]

@@ -93,19 +93,6 @@ def test_a_stroll_is_as_fast_and_turns_as_much_as_it_was_made_to():
     assert arc - chord > 1e-3, "negative control: an arc is longer than its chord"
 
 
-def test_a_step_of_the_stroll_is_half_its_stride():
-    seen, clip = strolled(1.1, 0.0)
-    feet = Measure("step_length", (3, 6))
-    length = measures.evaluate(Measure("stride_length"), seen)
-    # Walking straight, a foot that came down half a stride after the other is that far ahead, when
-    # it has stopped; the frames of 1/60 s see that within what the foot moves in one.
-    assert measures.evaluate(feet, seen) == pytest.approx(0.5 * length, rel=0.02)
-    ahead = clip.positions()[:, 3, 2] - clip.positions()[:, 6, 2]
-    assert abs(ahead.mean()) < 0.1 * length < np.abs(ahead).max(), "negative control"
-    swapped = Measure("step_length", (6, 3))
-    assert measures.evaluate(swapped, seen) == measures.evaluate(feet, seen)
-
-
 @pytest.mark.parametrize(
     "asked",
     [Measure("height", (4, 5), "landmark", 0.25), Measure("turn")],

@@ -61,14 +61,6 @@ def test_orientations_are_those_that_carry_the_children(pose):
         assert np.max(np.abs(positions[:, parent] + own - positions[:, joint])) > 0.1
 
 
-def test_rotations_broadcast_against_bone_offsets(pose):
-    rotations, translations = pose
-    still = np.broadcast_to(translations[:1], translations.shape)
-    broadcast = skeleton.forward_kinematics(PARENTS, rotations, translations[0])
-    assert np.array_equal(broadcast[0], skeleton.forward_kinematics(PARENTS, rotations, still)[0])
-    assert broadcast[1].shape == (7, 6, 4)
-
-
 def test_poses_in_several_blocks_are_those_one_by_one(rng):
     count = 2 * skeleton.POSES_PER_BLOCK + 1
     rotations = quat.normalize(rng.normal(size=(count, 1, 6, 4)))
@@ -80,16 +72,6 @@ def test_poses_in_several_blocks_are_those_one_by_one(rng):
         assert np.array_equal(positions[pose], alone[0])
         assert np.array_equal(orientations[pose], alone[1])
     assert not np.array_equal(positions[0], positions[skeleton.POSES_PER_BLOCK])
-
-
-def test_descendants_are_the_joints_whose_way_up_passes_by():
-    expected = np.zeros((6, 6))
-    for joint in range(6):
-        above = joint
-        while above >= 0:
-            expected[above, joint] = 1.0
-            above = PARENTS[above]
-    assert np.array_equal(skeleton.descendant_matrix(PARENTS), expected)
 
 
 def test_trees_of_different_size_are_the_same_tree():

@@ -59,14 +59,6 @@ def test_a_join_begins_and_ends_as_its_passages(kind):
     assert found.phases is None
 
 
-def test_a_motion_that_goes_on_into_itself_is_kept():
-    whole = smooth(7, 120)
-    cut = joins.find_cut(character(), whole, whole.part(50, 120), range(50, 90), range(1, 2))
-    found = joins.join(whole, whole.part(50, 120), cut, "hermite")
-    assert cut.exit == 51
-    assert joints_of(found) == pytest.approx(joints_of(whole), abs=1e-6)
-
-
 def test_sigma_is_that_of_a_mixture():
     before, after, cut, _ = joined("dead")
     before = replace(before, sigmas=np.full(len(before), 0.02))

@@ -45,14 +45,6 @@ def judged(before, after, kind, motion=None):
     return judgement, cut
 
 
-def test_a_motion_that_goes_on_is_an_easy_join():
-    whole = smooth(2, 120)
-    facts, cut = judged(whole, whole.part(30, 120), "dead")
-    assert not facts.hard
-    assert facts.cut.distance == cut.distance
-    assert facts.cut.drop == pytest.approx(0.0, abs=1e-9)
-
-
 def test_a_plain_cut_is_hard():
     facts, _ = judged(smooth(3), smooth(4), "cut")
     assert facts.hard

@@ -7,7 +7,6 @@ import io
 import json
 from itertools import pairwise
 
-import jsonschema
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdSkel, UsdValidation
@@ -16,14 +15,11 @@ from posefield.common.errors import InvalidField
 from posefield.encode import performance_files
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd.performance_layer import segment_frames
-from posefield.http.api import contract
 from posefield.inference import session
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
 from posefield.question.performance_question import PerformanceQuestion
-from posefield.question.performance_report import PerformanceReport, SegmentReport
-from posefield.question.results import FeetResult
 from posefield.synthesis.synthesizer import Synthesizer
 
 SCRIPT = {
@@ -204,29 +200,6 @@ def test_formats_without_layouts_refuse_them(name, answer):
         encoded(answer, name)
     assert caught.value.field == "layout" and f"{name} files have no layouts" in str(caught.value)
     assert encoded(answer, name, "whole") == CLIP_ENCODERS[name].encode(answer)
-
-
-CHECK = jsonschema.Draft202012Validator(contract.schema("PerformanceReport"))
-
-
-def reported(feet):
-    """Document of a report of one walk."""
-    identity = "walk@0123456789abcdef"
-    walk = SegmentReport("walk", identity, 0.0, 1.0, (0.0, 0.0), 0.0, 0.01)
-    report = PerformanceReport((identity,), identity, 1.0, 31, 0.01, True, (walk,), (), feet)
-    return report.document()
-
-
-def test_feet_without_stances_are_told_in_full():
-    document = reported(FeetResult())
-    CHECK.validate(document)
-    assert document["feet"]["stances"] == [] and document["feet"]["left"] == []
-
-
-def test_feet_as_predicted_are_left_out():
-    document = reported(None)
-    CHECK.validate(document)
-    assert "feet" not in document
 
 
 @pytest.mark.parametrize("name", ["usda", "usdc"])

@@ -78,18 +78,6 @@ def test_soles_keep_their_turn_from_the_rest_pose():
     assert not np.allclose(tilted.rotations(before), before, atol=0.05)
 
 
-def test_heights_scale_with_the_legs_and_paths_do_not():
-    target = source().offsets.copy()
-    target[1:9] *= 1.1
-    share = passage.leg_share(PARENTS, source().offsets, target, FEET)
-    assert share == pytest.approx(1.1)
-    assert passage.leg_share(PARENTS, target, target, ()) == 1.0
-    roots = np.array([[1.0, 0.9, 2.0], [1.5, 1.0, 3.0]])
-    assert passage.scale_heights(roots, share) == pytest.approx(
-        np.array([[1.0, 0.99, 2.0], [1.5, 1.1, 3.0]])
-    )
-
-
 def test_other_trees_are_refused_in_words():
     other = Skeleton(("a", "b"), (-1, 0), np.ones((2, 3)), (), np.zeros((0, 3)))
     with pytest.raises(SkeletonsDiffer, match="10 joints, expected 2"):

@@ -179,16 +179,6 @@ def test_an_opening_step_is_a_closing_step_backwards():
     assert not np.array_equal(opened.roots, bare.roots)
 
 
-def test_a_walk_too_short_for_a_step_stops_in_double_support_and_says_so():
-    plan, _ = walked(WalkRequest(0.8, seconds=0.3, **BOTH))
-    assert plan.standing is None
-    codes = [note.code for note in plan.notes]
-    assert codes.count("feet-apart") == 2
-    whole, _ = walked(WalkRequest(0.8, seconds=4.0, **BOTH))
-    assert whole.standing.opening and whole.standing.closing
-    assert "feet-apart" not in [note.code for note in whole.notes]
-
-
 def performed(*segments):
     document = {"fps": RATE, "segments": [{"model": "cmu_walk", **own} for own in segments]}
     asked = json_decoding.decode_question(PerformanceQuestion, msgspec.json.encode(document))

@@ -69,7 +69,6 @@ def test_a_long_key_takes_no_time_that_grows_with_its_square():
             "controls/b",
             "Expected `float`, got `str` 'x'",
         ),
-        (FileQuestion, '{"controls":{"a":1e400}}', "controls/a", "Number out of range"),
         (FileQuestion, "{", "", "expected UTF-8 JSON; Input data was truncated"),
         (FileQuestion, "[" * 100_000, "", "Expected `object`, got `array`"),
         (
@@ -77,12 +76,6 @@ def test_a_long_key_takes_no_time_that_grows_with_its_square():
             '{"format":"bvh","clips":[{"controls":{}},{"controls":{"a":true}}]}',
             "clips/1/controls/a",
             "Expected `float`, got `bool` True",
-        ),
-        (
-            FileQuestion,
-            '{"controls":{},"targets":[{"joint":"a","position":[0,0,0]}]}',
-            "targets/0",
-            "neither time nor at, expected one of them",
         ),
     ],
 )

@@ -7,7 +7,6 @@ from posefield.inference import session
 from posefield.model_file import answer_bounds
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion
-from posefield.question.results import band
 from posefield.synthesis import clips
 from posefield.synthesis.explanation import explain_result
 from posefield.synthesis.synthesizer import Synthesizer
@@ -157,10 +156,3 @@ def test_weights_are_those_of_the_answer_and_shares_positive(model):
         explain_result(model, WhyQuestion(controls=c, nearest=10_000)) for c in (asked, limits)
     )
     assert {c.source: c.weight for c in one.nearest} == {c.source: c.weight for c in other.nearest}
-
-
-def test_bands_are_one_scale_for_all_models(model):
-    names = [band(sigma) for sigma in (0.0, 0.03, 0.0301, 0.075, 0.0751, 0.15, 0.1501, 9.0)]
-    assert names == ["close", "close", "near", "near", "rough", "rough", "guess", "guess"]
-    answer = trust(model, {})
-    assert answer.document() == {**answer.facts(), "band": band(answer.sigma)}

@@ -10,14 +10,13 @@ import pytest
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import UP
 from posefield.http.decoding import crowd_query
-from posefield.inference import reduced_motion
 from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.motion import quat, skeleton
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import crowd_synthesis, poses
-from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
+from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import crowd_validation
 from posefield.validation.crowd_question import Blending, CrowdQuestion
 
@@ -296,19 +295,6 @@ def test_a_character_has_the_pose_of_its_take(model):
         pose = poses.synthesize_poses(model, asked)
         assert np.abs(pose.rotations[0] - found.rotations[row]).max() < 2e-6
         assert np.abs(pose.root_position[0] - found.root_position[row]).max() < 2e-6
-
-
-def test_detail_is_sampled_by_each_seed(walk):
-    opened = walk.session
-    stored = reduced_motion.to_bytes(np.full((3, opened.card.levels[0].ranks[0]), 0.01))
-    making = replace(opened.card.making, detail=stored)
-    detailed = Synthesizer("walk", replace(opened, card=replace(opened.card, making=making)))
-    found = crowd(detailed, take="index", detail=True)
-    assert apart(found, crowd(walk, take="index")).min() > 1e-3
-    assert found.warnings == crowd(walk).warnings
-    said = crowd(walk, take="index", detail=True)
-    assert said.warnings[-1] == NO_DETAIL
-    assert apart(said, crowd(walk, take="index")).max() == 0.0
 
 
 def test_too_many_takes_are_refused(walk):

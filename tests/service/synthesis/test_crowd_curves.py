@@ -6,8 +6,8 @@ import fixture_models
 import numpy as np
 import pytest
 
-from posefield.inference import graph_ports, session
-from posefield.locomotion import gait, level_transitions, locomotion_plan, stride, walking_crowd
+from posefield.inference import session
+from posefield.locomotion import gait, level_transitions, walking_crowd
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import crowd_synthesis, poses
@@ -100,16 +100,3 @@ def test_soles_press_at_the_phases_of_the_plan(treading, plan):
     assert np.sqrt(np.mean(np.square(found - expected))) < NEAR
     # Half a stride later the other sole presses.
     assert np.sqrt(np.mean(np.square(found[..., ::-1] - expected))) > 5 * NEAR
-
-
-def test_walkers_have_the_curves_of_the_graph(treading, plan):
-    who, frames = np.arange(5), np.arange(5) * 7
-    own = treading.session
-    for level in range(len(own.card.levels)):
-        found = locomotion_plan.synthesize_poses(own, plan, who, frames, level).curves
-        controls, labels = plan.controls[who, frames], stride.labels(own, plan.who)
-        strides = stride.strides(own, controls, labels, level)
-        times = (plan.phases[who, frames] * strides.durations)[:, None]
-        (expected,) = own.run(controls, times, graph_ports.CURVES, labels=labels, level=level)
-        assert np.abs(found - expected[:, 0]).max() < FLOAT32
-        assert np.ptp(found, axis=0).max() > 0.05

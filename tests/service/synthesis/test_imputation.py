@@ -133,14 +133,6 @@ def test_the_medoid_has_the_least_sum_of_distances(rng):
     assert typical_clip.medoid(skewed) != nearest
 
 
-def test_costs_choose_the_clips_that_count(clusters):
-    costs = np.where(np.arange(60) < 40, 50.0, 0.0)
-    assert typical_clip.typical_row(clusters, costs) >= 40
-    # One clip far nearer than all others is the only candidate, wherever it lies.
-    costs[7] = -30.0
-    assert typical_clip.typical_row(clusters, costs) == 7
-
-
 def test_a_neighbourhood_holds_the_clips_and_not_the_gap(clusters):
     around = typical_clip.neighbourhood(clusters)
     assert all(around.contains(own) for own in clusters)

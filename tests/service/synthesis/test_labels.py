@@ -16,7 +16,6 @@ from posefield.registry import model_registry
 from posefield.synthesis import capture_suggestions, clips, explanation, poses, sigma_grid
 
 POINT = {"haste": 4.0, "veer": 0.0}
-BOTH = {"performer": "ann", "style": "marching"}
 
 
 @pytest.fixture(scope="module")
@@ -123,19 +122,6 @@ def test_open_controls_are_those_of_clips_with_the_asked_labels(model):
     assert card.clip_names(row) == {"performer": "ben", "style": "sneaking"}
 
 
-def test_grids_and_suggestions_depend_on_the_labels(model):
-    axes = {"across": "haste", "along": "veer", "columns": 3, "rows": 3}
-    open_ = sigma_grid.grid(model, SigmaQuestion(**axes))
-    named = sigma_grid.grid(model, SigmaQuestion(**axes, labels=BOTH))
-    assert (named.sigma < open_.sigma).all() and named.labels == BOTH
-    found = capture_suggestions.suggest(model, SuggestQuestion(count=3, labels=BOTH))
-    card = model.session.card
-    own = {card.sources[i] for i in range(36) if card.clip_names(i) == BOTH}
-    assert {each.nearest for each in found.suggestions} <= own
-    every = capture_suggestions.suggest(model, SuggestQuestion(count=3))
-    assert not {each.nearest for each in every.suggestions} <= own
-
-
 def test_over_http_labels_are_parameters_bodies_and_answers(styled_path):
     ask = asker(create_app(model_registry.load([styled_path]), Settings()))
     path = "/v1/models/styled"
@@ -192,28 +178,6 @@ def test_the_answer_for_a_name_is_that_of_its_label(reaching):
         ]
         assert np.array_equal(answer.rotations[0], rotations[0])
         assert not np.array_equal(answer.rotations[0], rotations[1])
-
-
-HINT = " (did you mean 'tall'?)"
-
-
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [("Tall", HINT), ("", ""), ("nobody", "")],
-)
-def test_an_unknown_performer_is_refused_with_those_there_are(reaching, name, hint):
-    for ask in (
-        lambda: poses.synthesize_poses(
-            reaching, PoseQuestion(controls=REACH, times=[0.0], performer=name)
-        ),
-        lambda: clips.synthesize_clip(
-            reaching, ClipQuestion(controls=REACH, fps=30.0, extrapolate="warn", performer=name)
-        ),
-    ):
-        with pytest.raises(InvalidField) as caught:
-            ask()
-        assert caught.value.field == "performer"
-        assert caught.value.message == f"{name!r}{hint}, expected one of middle, short, tall"
 
 
 def test_a_model_that_knows_nobody_refuses_every_name(plain):

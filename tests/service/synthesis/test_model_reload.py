@@ -2,11 +2,9 @@
 
 import gc
 import os
-import resource
 import shutil
 import time
 import weakref
-from pathlib import Path
 
 import model_files
 import pytest
@@ -15,7 +13,6 @@ from model_files import numbered
 from posefield.common.errors import ModelError, UnknownModel
 from posefield.inference.trial_process import TrialLimits
 from posefield.model_file import checked_file
-from posefield.registry.model_loading import ModelLoader
 from posefield.registry.model_registry import VersionLimits
 from posefield.registry.model_reload import ReloadingRegistry
 
@@ -278,21 +275,3 @@ def test_files_that_cannot_be_served_do_not_keep_others_from_being_taken(
     assert (shelf.reloads.failed, len(caplog.records)) == (len(hostile), before)
     assert len(shelf.reloads.faults) == len(hostile)
     assert time.process_time() - start < 60
-
-
-def test_a_machine_without_a_process_to_spare_tries_again(put, tmp_path):
-    put("a.onnx", 1)
-    before = resource.getrlimit(resource.RLIMIT_NOFILE)
-    intake = ModelLoader([tmp_path], most=1)
-    with Path(os.devnull).open(), Path(os.devnull).open() as second:
-        limit = second.fileno()
-    # One descriptor is left to list and read files by, and not two for a pair of sockets.
-    resource.setrlimit(resource.RLIMIT_NOFILE, (limit, before[1]))
-    try:
-        intake.scan()
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, before)
-    (fault,) = intake.faults.values()
-    assert fault.error.message == "no process to try it in: Too many open files"
-    intake.scan()
-    assert not intake.faults and intake.opened == 1

@@ -51,15 +51,6 @@ def test_a_route_leads_through_its_waypoints_without_a_kink(own):
     assert np.abs(places - complex(5.5, 1.5)).min() > 0.05
 
 
-def test_routes_of_different_lengths_go_together(own):
-    straight = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
-    both = routes.paths_through(own, [Route(BEND, 0.9), straight])
-    alone = routes.paths_through(own, [straight])
-    assert both.lengths[1] == alone.lengths[0] == pytest.approx(4.0)
-    assert np.array_equal(both.headings[1, :41], alone.headings[0, :41])
-    assert both.speeds[:, 0].tolist() == [0.9, 1.1]
-
-
 CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]
 
 

@@ -54,19 +54,6 @@ def test_candidates_that_are_given_are_ranked_and_no_others(model):
 
 
 @pytest.mark.parametrize(
-    ("asked", "field"),
-    [
-        (lambda: SuggestQuestion(count=0), "count"),
-        (lambda: SuggestQuestion(count=1, performer="somebody"), "performer"),
-    ],
-)
-def test_what_cannot_be_ranked_is_named(model, asked, field):
-    with pytest.raises(InvalidField) as caught:
-        suggest(model, asked())
-    assert caught.value.field == field
-
-
-@pytest.mark.parametrize(
     ("candidates", "field"),
     [([], "candidates"), ([{"turn": 1.0}], "candidates/0/controls/stature")],
 )

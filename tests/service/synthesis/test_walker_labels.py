@@ -1,7 +1,6 @@
 """Tests of the labels of walking crowds: by name and by weights, for each label set."""
 
 import dataclasses
-import re
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from posefield.locomotion import (
     gait,
     level_transitions,
     random_paths,
-    stride,
     walker_labels,
     walking_crowd,
 )
@@ -44,19 +42,6 @@ def test_a_name_holds_for_all_and_the_other_sets_vary(own):
     assert set(facts["labels"]["style"]) == {"plain", "marching", "sneaking"}
 
 
-def test_walkers_with_a_captured_combination_move_as_that_combination(own):
-    """A walker that draws a combination moves as one that is asked for it by name."""
-    asked = {"performer": "ann", "style": "sneaking"}
-    labelled = own.with_labels(asked)
-    row = stride.label_rows(own.session.card).index(asked)
-    drawn = random_paths.draw_characters(labelled, COUNT, 3)
-    assert set(drawn.who) == {row}
-    assert np.array_equal(labelled.labels.weights[row], own.labels.weights[row])
-    # Other combinations have these labels, too, so that they were asked for whatever is drawn.
-    assert (labelled.labels.weights[:-1] == own.labels.weights[row]).all()
-    assert not (own.labels.weights[:-1] == own.labels.weights[row]).all(axis=1).all()
-
-
 def test_a_mixture_draws_its_names_by_their_weights(own):
     labelled = own.with_labels(MIXED)
     drawn = random_paths.draw_characters(labelled, 4000, 5).who
@@ -86,18 +71,6 @@ def test_a_combination_that_was_not_captured_has_clips_of_either_label(own):
     )
     found = {tuple(rows[who].values()) for who in drawn}
     assert found == {("ann", "plain"), ("ann", "sneaking"), ("ben", "marching")}
-
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        ({"style": "marchng"}, "labels/style: 'marchng' (did you mean 'marching'?), expected"),
-        ({"style": {"marching": 0.7, "plain": 0.7}}, "labels/style: weights with a sum of 1.4"),
-    ],
-)
-def test_labels_that_the_model_does_not_have_are_refused(own, asked, said):
-    with pytest.raises(InvalidField, match=re.escape(said)):
-        own.with_labels(asked)
 
 
 def test_a_model_without_label_sets_refuses_every_label(model_file):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.inference.level_selection import Camera
 from posefield.kriging import kriging_model
@@ -172,16 +171,6 @@ def _paths(model, walk, order, apart):
     return walking_takes.deviations_along(
         model, plan, np.arange(order.count), 1 + np.arange(order.count), apart
     )
-
-
-@pytest.mark.parametrize(
-    ("asked", "field"),
-    [({"take": -1}, "take"), ({"take": 3, "variety": 1.5}, "variety")],
-)
-def test_numbers_out_of_range_are_refused(model, walk, asked, field):
-    with pytest.raises(InvalidField) as caught:
-        built(model, walk, **asked)
-    assert caught.value.field == field
 
 
 def test_variances_of_deviations_are_those_of_kriging(model, twins):

@@ -75,22 +75,6 @@ def test_a_measured_control_is_met_unless_asked_otherwise(reach):
     assert [met.what for met in held.trust.targets] == ["target_height"]
 
 
-@pytest.mark.parametrize("level", [0, 1, 3])
-def test_every_level_of_detail_meets_its_targets(reach, level):
-    controls = middle(reach)
-    free = poses.synthesize_poses(
-        reach, PoseQuestion(controls=controls, times=[0.5], level=level, **FREE)
-    )
-    root = free.root_position[0].astype(float)
-    target = Target("Hips", tuple(np.add(root, [0.003, -0.003, 0.002])), time=0.5)
-    hold = {"exact": "none", "targets": (target,)}
-    held = poses.synthesize_poses(
-        reach, PoseQuestion(controls=controls, times=[0.5], level=level, **hold)
-    )
-    assert np.linalg.norm(held.root_position[0] - root - [0.003, -0.003, 0.002]) < 1e-4
-    assert held.trust.level == level
-
-
 def test_what_is_met_already_does_not_hinder_what_is_out_of_reach(reach):
     controls = middle(reach)
     free = poses.synthesize_poses(reach, PoseQuestion(controls=controls, times=[0.5], **FREE))

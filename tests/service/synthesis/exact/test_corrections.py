@@ -9,10 +9,8 @@ from scipy.spatial import distance as apart
 from scipy.stats import chi
 
 from posefield.constraints import constraint, reachability
-from posefield.constraints.constraint import PositionConstraint
 from posefield.constraints.correction_task import CorrectionTask
 from posefield.constraints.reachability import Reachability
-from posefield.motion.measures import Measure
 
 
 def poses(begun, held):
@@ -124,21 +122,6 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
     )
     jerked = reaching.solve(uncertain, aims)
     assert (roughness(reaching, jerked) > 2.5 * before) == (apart > 0.0)
-
-
-def test_only_the_axes_that_are_asked_for_are_held(reaching):
-    joint = reaching.joint("RightHand")
-    now, _ = reaching.held.scene.position_and_gradient(reaching.held.numbers, joint, 20.0)
-    moment = Measure("height", (joint,), "landmark")
-    aim = PositionConstraint(("height",), moment, (1,), now[1:2] + 0.01, 20.0)
-    held = reaching.solve(reaching.held, [aim])
-    then, _ = held.scene.position_and_gradient(held.numbers, joint, 20.0)
-    assert then[1] - now[1] == pytest.approx(0.01, abs=1e-5)
-    assert np.abs(then - now)[[0, 2]].max() > 1e-4
-    whole = replace(aim, axes=(0, 1, 2), target=now + np.array([0.0, 0.01, 0.0]))
-    held = reaching.solve(reaching.held, [whole])
-    then, _ = held.scene.position_and_gradient(held.numbers, joint, 20.0)
-    assert np.abs(then - now)[[0, 2]].max() < 1e-5
 
 
 def looked_at(begun, aims) -> Reachability:
