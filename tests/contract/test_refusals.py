@@ -189,6 +189,12 @@ def test_another_method_is_told_which_are_allowed(path, allow, method, ask, asse
     assert ask(method, path).headers["allow"] == allow
 
 
+def test_too_many_times_are_refused(assert_refused, controls):
+    body = {"controls": controls, "times": [0] * 10_001}
+    problem = assert_refused(422, "invalid-field", "POST", POSE, json=body)
+    assert problem["errors"][0]["pointer"] == "/times"
+
+
 @pytest.mark.parametrize("time", [1e300, -1e300, 3.5e38])
 def test_a_time_that_no_float32_holds_is_refused_like_any_other(time, assert_refused, controls):
     problem = assert_refused(

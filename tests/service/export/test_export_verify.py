@@ -78,6 +78,19 @@ def test_a_flipped_bit_is_not_looked_for_without_verifying(
     assert run.run(work, source, exporting.Recorder()).already_complete
 
 
+def test_a_manifest_that_lost_a_line_is_found_without_verifying(
+    complete, source, model_path, tmp_path
+):
+    target = shutil.copytree(complete["folder"], tmp_path / "target")
+    manifest = target / "manifest.jsonl"
+    first, second, *rest = manifest.read_bytes().splitlines(keepends=True)
+    # Of the same size: spaces after a value are JSON still.
+    manifest.write_bytes(b"".join([first[:-1], b" " * len(second), b"\n", *rest]))
+    work = exporting.work(model_path, source, target, 4)
+    assert not run.run(work, source, exporting.Recorder()).already_complete
+    assert exporting.content(target) == exporting.content(complete["folder"])
+
+
 @pytest.mark.parametrize(
     ("layout", "name"),
     [("folder", "clips/000/clip-0001.usdc"), ("tar", "clips-000000.tar")],
