@@ -63,12 +63,3 @@ def test_frame_is_what_scipy_interpolates(points, positions, values, rng):
         assert np.max(np.abs(found[:, frame] - expected)) < 1e-8
         exact = RBFInterpolator(points, values[:, frame], smoothing=1e-9, **given)(asked)
         assert np.max(np.abs(found[:, frame] - exact)) > 1e-4
-
-
-def test_nugget_and_range_are_those_of_each_frames_variogram(points, positions, values):
-    own = naive_kriging.fit_naive(points, positions, values, "matern52", variogram.fit_by_grid)
-    for frame, field in enumerate(own.fields):
-        left = variogram.residuals(points, positions[:, frame].reshape(SAMPLES, -1), 1)
-        fit = variogram.fit_by_grid(variogram.experimental_variogram(points, left), "matern52")
-        assert np.array_equal(field.hyper.scales, np.full(3, 1.0 / fit.range))
-        assert 1e-4 <= field.hyper.nugget <= 10.0

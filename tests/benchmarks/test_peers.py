@@ -108,14 +108,6 @@ def test_the_nearest_of_the_same_performer_is_taken(points):
     assert peers.nearest_of_performer(laid(points, labels), values, nobody) == 0
 
 
-def test_outside_the_hull_the_nearest_is_taken(points):
-    values = curved(points)
-    far = np.array([[9.0, 9.0, 9.0]])
-    nearest = np.argmin(np.linalg.norm(points - far, axis=1))
-    found = peers.linear_coefficients(laid(points), values, far)
-    assert np.array_equal(found[0], values[nearest])
-
-
 @pytest.fixture
 def two(points):
     """Two performers, of whom one stands five units beside the other, and their labels."""
@@ -133,12 +125,6 @@ def test_every_peer_has_a_use_for_the_performer(two, queries):
             for end in ("", methods.OPEN)
         )
         assert named < 0.75 * unnamed, name
-
-
-def test_offsets_are_those_of_the_performers(two):
-    own = linear_smoothers.smoother(peers.thin_plate(1.0), two[0], two[0].points)
-    found = linear_smoothers.performer_offsets(own, *two)
-    assert found[0] - found[1] == pytest.approx(np.full(2, 5.0), rel=0.1)
 
 
 def test_left_out_weights_are_those_of_a_peer_without_the_part(two):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper import errors, markdown, measurement, precomputation
+from paper import errors, markdown, measurement
 
 from posefield_train.graph import truncation_cost
 from posefield_train.tensor import truncation_error
@@ -49,14 +49,6 @@ def test_smallest_tensor_keeps_the_threshold_and_is_not_wasteful(over, made):
     for mode in range(3):
         fewer = tuple(rank - 2 * (axis == mode) for axis, rank in enumerate(found))
         assert over.truncation(full.truncated(fewer)) > threshold
-
-
-def test_precomputation_is_the_models_own(made):
-    reduced, field = precomputation.ours(made, (12, 5, 10))
-    expected = made.trained.full.truncated((12, 5, 10))
-    assert np.abs(reduced.core - expected.core).max() < 1e-9
-    assert np.abs(field.predict(made.samples[:3]) - reduced.bases[2][:3]).max() < 0.2
-    assert len(set(field.hyper.scales)) == 1, "isotropic, by the variogram"
 
 
 def test_every_size_says_what_it_costs(measured, made):

@@ -80,14 +80,6 @@ def test_gram_matrix_is_that_of_finite_differences(family, weights):
     assert np.max(np.abs(no_curvature - expected)) > 1e-2 * scale
 
 
-def test_turn_about_a_bone_counts_by_the_skin():
-    """A lone joint: only its own sphere moves, by two thirds of its squared radius."""
-    still, jacobians = np.zeros((1, 1, 3)), np.eye(3)[None, None]
-    found = motion_tensor.gram((-1,), quat.exp(still), jacobians, still, np.array([2.0]))
-    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * motion_tensor.SHELL_RADIUS**2] * 3)
-    assert np.max(np.abs(found - expected)) < 1e-15
-
-
 def test_tiny_and_vanishing_vectors_are_no_special_case(family, weights):
     chart, means, vectors, translations = family
     for size in (0.0, 1e-9, 9e-5, 1.1e-4):

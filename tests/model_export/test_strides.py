@@ -29,16 +29,6 @@ def test_mirrored_walking_begins_half_a_stride_later():
     assert cuts(take) == [(36, 108), (108, 180), (180, 252)]
 
 
-def test_noise_moves_the_cuts_by_few_frames():
-    rng = np.random.default_rng(4)
-    take = discover_takes.take("a.bvh", 60.0, **WALK)
-    noisy = {role: own + rng.normal(0.0, 0.005, own.shape) for role, own in take.places.items()}
-    found = cuts(replace(take, places=noisy))
-    assert len(found) == len(cuts(take)) == 48
-    apart = np.abs(np.array(found) - np.array(cuts(take)))
-    assert np.median(apart) <= 2 and apart.max() <= 8
-
-
 def test_a_rate_changes_frames_and_not_times():
     slow = discover_takes.take("a.bvh", 5.0, **WALK)
     places = {role: own[::2] for role, own in slow.places.items()}

@@ -200,10 +200,6 @@ def test_a_control_of_one_value_is_refused_with_its_cause(model):
     ("auto", "said"),
     [
         (
-            {"quantity": "leg_length", "joints": ["LeftArm", "LeftHand"]},
-            "leg_length is of the performer, and all clips have bones of the same size",
-        ),
-        (
             {"quantity": "forward", "joint": "Hips", "at": "start"},
             "each clip begins at the origin, so that a root is there in all of them",
         ),

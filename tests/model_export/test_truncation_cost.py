@@ -1,7 +1,5 @@
 """Tests of the cost of ranks: stored numbers and operations per pose."""
 
-from dataclasses import asdict
-
 import onnx
 import pytest
 from onnx import numpy_helper
@@ -76,13 +74,3 @@ def test_operations_are_those_of_the_products_of_one_pose(trained):
     assert truncation_cost.operation_cost(trained.tensor, 4).evaluate(*RANKS) == sum(
         products.values()
     )
-
-
-def test_the_card_tells_the_compression_and_every_distance(exported, trained):
-    told = exported.card.diagnostics
-    ranks = trained.model.decoder.reduced.core.shape
-    expected = asdict(truncation_cost.tensor_compression(trained.tensor, ranks, 4))
-    assert told["compression"] == pytest.approx(expected, rel=1e-3)
-    distances = {name: told[f"truncation_{name}_m"] for name in asdict(trained.truncation_errors)}
-    assert distances == pytest.approx(asdict(trained.truncation_errors), rel=1e-3)
-    assert distances["rms"] < distances["p99"] < distances["max"]

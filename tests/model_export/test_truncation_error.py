@@ -1,4 +1,4 @@
-"""Tests of the true errors of truncation, as joint distances rather than metric distances."""
+"""Tests of the true errors of truncation as joint distances, and of each joint's share of errors."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import TrainingError
+from posefield_train import train
 from posefield_train.align import time_alignment
 from posefield_train.graph import truncation_cost
 from posefield_train.source.recipe_sections import Event
@@ -124,6 +125,9 @@ def test_the_smaller_of_a_budget_and_its_limit_is_kept(small_recipe, trained, ju
         limit = 0.5 * getattr(free, name)
         found, price, _ = chosen(small_recipe, trained, judge, {name: limit}, **budget)
         assert 0.8 * limit < getattr(found, name) <= limit and price > cheap
+    operations = truncation_cost.operation_cost(trained.tensor, 4)
+    _, price, triple = chosen(small_recipe, trained, judge, **budget, cost="operations")
+    assert price == operations.evaluate(*triple)
 
 
 def test_training_cuts_off_little_beside_what_it_cannot_predict(small_recipe, trained):
@@ -134,19 +138,42 @@ def test_training_cuts_off_little_beside_what_it_cannot_predict(small_recipe, tr
     assert 0.7 * limit < trained.truncation_errors.rms <= limit
 
 
-def test_cost_decides_which_ranks_are_the_cheapest(small_recipe, trained, judge):
-    numbers, operations = (
-        price(trained.tensor, 4) for price in truncation_cost.RANK_COSTS.values()
-    )
-    fronts = [
-        truncation_cost.pareto_front(trained.full.core, price) for price in (numbers, operations)
-    ]
-    pairs = []
-    for error in np.geomspace(1e-4, 0.1, 12) * np.sum(trained.full.core**2):
-        stored, done = (front[front.near(error, -1, len(front.errors))] for front in fronts)
-        assert numbers.evaluate(*stored) <= numbers.evaluate(*done)
-        assert operations.evaluate(*done) <= operations.evaluate(*stored)
-        pairs.append(stored != done)
-    assert any(pairs)
-    found = chosen(small_recipe, trained, judge, rms_budget_cm=1.0, cost="operations")
-    assert found[1] == operations.evaluate(*found[2])
+def test_squares_average_to_one_and_hands_err_more_than_hips(judge, trained):
+    found = train.joint_error_shares(judge, trained.full, trained.pose, None)
+    assert np.mean(np.square(found)) == pytest.approx(1.0, abs=1e-3)
+    assert found == pytest.approx(trained.joints, rel=1e-9)
+    hand, hips = map(trained.skeleton.names.index, ("RightHand", "Hips"))
+    assert found[hand] > 1.5 * found[hips]
+
+
+def test_shares_are_of_distances_to_the_prediction_by_what_is_usual_of_each_clip(judge, trained):
+    total = np.zeros(len(trained.skeleton))
+    plain = np.zeros_like(total)
+    for clip in range(len(trained.examples)):
+        one = [clip]
+        values = trained.tensor.values[:, :, one]
+        predicted = values - trained.full.slices(trained.pose.residuals[one])
+        places = [
+            truncation_error.positions(trained.tensor, each, judge.parents, judge.offsets[one])[0]
+            for each in (values, predicted)
+        ]
+        squares = np.mean(np.sum(np.square(places[0] - places[1]), axis=-1), axis=0)
+        total += squares / trained.pose.variances[clip]
+        plain += squares
+    expected = np.sqrt(total / total.mean())
+    found = train.joint_error_shares(judge, trained.full, trained.pose, None)
+    assert found == pytest.approx(expected, rel=1e-6)
+    # Negative control: with all clips counted alike it would be another.
+    assert found != pytest.approx(np.sqrt(plain / plain.mean()), rel=1e-4)
+
+
+def test_travel_moves_all_joints_alike(judge, trained):
+    far = np.full((len(trained.examples), 3), 100.0)
+    found = train.joint_error_shares(judge, trained.full, trained.pose, far)
+    assert np.ptp(found) < 0.01 < np.ptp(trained.joints)
+
+
+def test_what_is_met_exactly_errs_evenly(judge, trained):
+    met = replace(trained.pose, residuals=np.zeros_like(trained.pose.residuals))
+    found = train.joint_error_shares(judge, trained.full, met, None)
+    assert np.array_equal(found, np.ones(len(trained.skeleton)))

@@ -9,12 +9,9 @@ import sys
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from posefield.common.errors import FileError
-from posefield.motion import quat, skeleton
 from posefield_train.sample import (
-    noise_free,
     sample_body,
     sample_controls,
     sample_family,
@@ -56,48 +53,6 @@ def motion_of(path):
     return head, float(frame_time.removeprefix("Frame Time: ")), values
 
 
-def played(head, values):
-    """Positions (F, J + tips, 3) by a reading of the file that shares no code with the project."""
-    stack, places, names, column = [], {}, [], 0
-    for line in head.splitlines():
-        word, *rest = line.split()
-        if word in ("ROOT", "JOINT", "End"):
-            names.append(rest[0] if word != "End" else names[-1] + " tip")
-        elif word == "{":
-            stack.append(None)
-        elif word == "OFFSET":
-            offset = np.array(rest, dtype=float)
-            if names[-1].endswith(" tip"):
-                place, turn = stack[-2]
-                places[names[-1]] = place + turn.apply(offset)
-        elif word == "CHANNELS":
-            kinds = rest[1:]
-            block = values[:, column : column + len(kinds)]
-            column += len(kinds)
-            parents = [level for level in stack if level is not None]
-            place, turn = parents[-1] if parents else (np.zeros(3), Rotation.identity())
-            moved = block[:, :3] if "Xposition" in kinds else offset
-            axes = "".join(kind[0] for kind in kinds if kind.endswith("rotation"))
-            place = place + turn.apply(moved)
-            turn = turn * Rotation.from_euler(axes, block[:, -len(axes) :], degrees=True)
-            stack[-1] = place, turn
-            places[names[-1]] = place
-        elif word == "}":
-            stack.pop()
-    tips = [name for name in places if name.endswith(" tip")]
-    return np.stack([places[name] for name in (*sample_body.NAMES, *tips)], axis=1)
-
-
-def meant(clip):
-    """The same positions from the clip."""
-    places, turns = skeleton.forward_kinematics(
-        clip.skeleton.parents, clip.rotations, clip.translations
-    )
-    holders = list(clip.skeleton.tip_joints)
-    tips = places[:, holders] + quat.rotate(turns[:, holders], clip.skeleton.tip_offsets)
-    return np.concatenate([places, tips], axis=1)
-
-
 @pytest.mark.system
 def test_files_are_the_same_in_every_process(folder, tmp_path):
     script = "import sys, pathlib; from posefield_train.sample import sample_files; "
@@ -135,30 +90,6 @@ def test_samples_of_any_number_can_be_reached(count):
     for where in found:
         values = [where.stature, where.hip_height, where.turn, where.target_height]
         assert sample_controls.parse_controls(values) == where
-
-
-def test_every_degree_of_freedom_of_the_truth_moves():
-    """Noise apart: each of the 94 changes along the motion or from one to another."""
-    phases = np.linspace(0.0, 1.0, 9)
-    stacks = []
-    for _, where in list(sample_family.design())[::4]:
-        rotations, root_path, _ = noise_free.poses(
-            [where.stature, where.hip_height, where.turn, where.target_height], phases
-        )
-        stacks.append(np.concatenate([root_path, rotations[..., 1:].reshape(len(phases), -1)], 1))
-    moves = np.ptp(np.concatenate(stacks), axis=0) > 1e-4
-    assert moves.sum() == 94
-
-
-@pytest.mark.parametrize("number", [1, 92])
-def test_file_read_by_another_hand_gives_the_same_positions(folder, rows, samples, number):
-    head, _, values = motion_of(folder / rows[number - 1]["file"])
-    expected = meant(samples[number - 1].clip)
-    assert expected.shape[1] == 33 + 11
-    assert np.abs(played(head, values) - expected).max() < 1e-5
-    for channel in (3, 91):
-        bent = values + np.where(np.arange(94) == channel, 1.0, 0.0)
-        assert np.abs(played(head, bent) - expected).max() > 1e-4
 
 
 def test_noise_has_the_size_it_claims_and_keeps_hinges_and_feet(samples):

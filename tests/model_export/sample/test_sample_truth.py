@@ -50,13 +50,6 @@ def test_hand_reaches_the_target_at_the_end_and_no_sooner():
     assert min(miss(point, 0.8) for point in points(60)) > 1e-3
 
 
-def test_target_lies_where_the_controls_say():
-    for point in points(20):
-        x, y, z = noise_free.target(point)
-        assert np.degrees(np.arctan2(-x, z)) == pytest.approx(point[2], abs=1e-9)
-        assert y == pytest.approx(point[3], abs=1e-12)
-
-
 def test_hips_begin_at_the_hip_height():
     for point in points(20):
         assert noise_free.poses(point, np.zeros(1))[1][0, 1] == pytest.approx(point[1], abs=1e-12)
@@ -95,12 +88,6 @@ def test_hinges_turn_about_one_axis():
     for name in sample_body.HINGES:
         assert np.abs(joint(rotations, name)[:, 2:]).max() == 0.0
     assert np.abs(joint(rotations, "LeftFoot")[:, 2:]).max() > 1e-3
-
-
-def test_no_rotation_comes_near_to_half_a_turn():
-    for point in points(60):
-        angles = np.linalg.norm(quat.log(noise_free.poses(point, PHASES)[0]), axis=-1)
-        assert np.degrees(angles.max()) < 130.0
 
 
 @pytest.mark.parametrize("point", [SITTING, STANDING])
