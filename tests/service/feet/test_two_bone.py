@@ -54,14 +54,6 @@ def moved(rotations, limb, found):
     return turned
 
 
-def test_a_leg_has_an_ankle_above_the_ball_and_a_toeless_one_none():
-    assert limbs.find_limb(PARENTS, BONES, 5) == LEG
-    assert limbs.find_limb(PARENTS, BONES, 4) == Limb(2, 3, 4, 4)
-    assert limbs.find_limb(PARENTS, BONES, 11) == ARM
-    assert limbs.find_limb(PARENTS, BONES, 6) is None
-    assert limbs.find_limb(PARENTS, np.zeros((16, 3)), 5) is None
-
-
 def test_limbs_are_chosen_by_feet_and_exact_joints():
     plain = limb_choice.choose_limbs(PARENTS, BONES, (5,), ())
     assert plain.character.legs == (LEG,) and not plain.left and not plain.character.fixed

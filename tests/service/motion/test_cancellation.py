@@ -21,15 +21,6 @@ def cancellation():
     cancel.current.reset(token)
 
 
-def test_a_check_raises_from_the_moment_of_cancelling(cancellation):
-    cancel.check()
-    assert not cancellation.requested
-    cancellation.cancel()
-    assert cancellation.requested
-    with pytest.raises(Cancelled):
-        cancel.check()
-
-
 def test_threads_of_anyio_see_the_cancellation_of_the_task():
     async def ask() -> None:
         own = Cancellation()

@@ -137,13 +137,6 @@ def test_presets_are_read_as_they_were_written():
     )
 
 
-def test_a_file_without_presets_keeps_its_bytes_and_is_read():
-    written = entries(())
-    assert "posefield.presets" not in written
-    assert card_reader.decode(written).presets == ()
-    assert model_card.plain_values(CARD)["presets"] == ()
-
-
 @pytest.mark.parametrize(
     ("preset", "said"),
     [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefield.inference.level_selection import HYSTERESIS, LevelTable
+from posefield.inference.level_selection import LevelTable
 from posefield.locomotion import gait, level_transitions, walking_crowd
 from posefield.motion import skeleton
 from posefield.registry import model_registry
@@ -54,23 +54,6 @@ def test_a_switch_takes_its_time_and_ends_before_the_next():
             assert np.all(np.diff(way) > 0.0) and way[0] < 0.1
             assert len(way) < SWITCH + 1 or way[-1] == 1.0
     assert np.any(np.diff(shown.levels, axis=1))
-
-
-def test_who_trembles_about_a_threshold_does_not_flicker():
-    frames = np.arange(600)
-    # The limit of level 1, met and missed by a tenth every second.
-    scale = (1.0 / LADDER.errors[1]) * (1.0 + 0.1 * np.sin(frames / 5.0))[None]
-    switches = np.count_nonzero(
-        np.diff(level_transitions.schedule_levels(LADDER, scale, 1.0, RATE).levels)
-    )
-    assert switches <= 1
-    # Negative control: more than hysteresis allows for.
-    wide = (1.0 / LADDER.errors[1]) * (1.0 + 0.5 * np.sin(frames / 20.0))[None]
-    assert wide.min() < (1.0 - HYSTERESIS) / LADDER.errors[1]
-    assert (
-        np.count_nonzero(np.diff(level_transitions.schedule_levels(LADDER, wide, 1.0, RATE).levels))
-        > 4
-    )
 
 
 # --- a real walk ----------------------------------------------------------------------------------

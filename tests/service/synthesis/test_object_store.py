@@ -84,7 +84,3 @@ def test_a_store_that_cannot_be_reached_leaves_what_there_was(model_path, tmp_pa
     assert list(shelf.registry.models) == ["walk"]
     (fault,) = shelf.reloads.faults
     assert fault.error.message.startswith("cannot be read: ")
-
-
-def test_a_url_of_a_file_is_a_path(model_path):
-    assert model_registry.load([model_path.as_uri()]).models.keys() == {model_path.stem}

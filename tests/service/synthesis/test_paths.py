@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP
 from posefield.inference import session
 from posefield.locomotion import floor_plane, gait, random_paths, routes
 from posefield.locomotion.paths import POINT_SPACING, Paths
 from posefield.locomotion.routes import Route
-from posefield.motion import quat
 
 
 @pytest.fixture(scope="module")
@@ -121,16 +119,6 @@ def test_a_character_hangs_on_its_number_and_the_seed_alone(own):
 
 
 ROUNDING = 1e-12
-
-
-def test_a_heading_turns_as_the_quaternion_does(rng):
-    points = rng.normal(size=(20, 3)) * (1.0 - UP)
-    headings = rng.uniform(-4.0, 4.0, 20)
-    expected = quat.rotate(quat.from_axis_angle(UP, headings), points)
-    found = floor_plane.at_height(
-        floor_plane.project(points) * floor_plane.unit_vectors(headings), np.zeros(20)
-    )
-    assert np.abs(found - expected).max() < ROUNDING
 
 
 def test_an_arc_is_many_small_steps():

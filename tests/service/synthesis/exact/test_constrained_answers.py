@@ -104,13 +104,8 @@ def test_a_speed_is_met_by_way_and_duration(walk):
 
 def test_a_held_cycle_closes(walk):
     controls = middle(walk)
-    place = joint(walk, clips.synthesize_clip(walk, ClipQuestion(controls=controls)), "LeftFoot")[
-        0
-    ] + [
-        0.02,
-        0.02,
-        0.0,
-    ]
+    plain = clips.synthesize_clip(walk, ClipQuestion(controls=controls))
+    place = joint(walk, plain, "LeftFoot")[0] + [0.02, 0.02, 0.0]
     hold = {"exact": "none", "targets": (Target("LeftFoot", tuple(place), time=0.2),)}
     loop = clips.synthesize_clip(
         walk, ClipQuestion(controls=controls, root="in_place", loop=True, **hold)
