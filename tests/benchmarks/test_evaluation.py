@@ -5,12 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluation import (
-    ground_truth,
-    methods,
-    new_performers,
-    protocol,
-)
+from evaluation import ground_truth, methods, new_performers, protocol
 from evaluation.methods import ADAPTATION_COUNTS, ASKED_OPEN, EXACT, NO_PERFORMER, OPEN
 from joblib import parallel_config
 from minimal import plain_recipe, small_clip, write_clips

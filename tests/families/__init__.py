@@ -1,1 +1,1 @@
-"""Procedural families of the tests: a walk, a face, a hand and a quadruped."""
+"""Procedural families of the tests: a walk, a face and a quadruped."""

@@ -40,8 +40,7 @@ def _models(folder: Path, real: bytes) -> Path:
     folder.mkdir()
     (folder / "reaching.onnx").write_bytes(trained.family()[1])
     (folder / f"{REAL}.onnx").write_bytes(real)
-    for name in trained.FIGURES:
-        (folder / f"{name}.onnx").write_bytes(trained.figure(name)[1])
+    (folder / "quadruped.onnx").write_bytes(trained.quadruped()[1])
     return folder
 
 

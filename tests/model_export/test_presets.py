@@ -33,10 +33,7 @@ def test_presets_keep_their_order_and_name_a_value_for_each_control():
         ("[presets.stroll]\nspeed = 1.0\npace = 2.0\n", "found speed, pace, expected a"),
         ("[presets.stroll]\nspeed = nan\n", "presets.stroll.speed"),
         ("[presets.Stroll]\nspeed = 1.0\n", "presets.Stroll"),
-        (
-            "[presets.stroll]\nspeed = 1.0\nperformer = 'ada'\n",
-            "found 'ada' and no kriging.label",
-        ),
+        ("[presets.stroll]\nspeed = 1.0\nperformer = 'ada'\n", "found 'ada' and no kriging.label"),
     ],
 )
 def test_a_preset_that_is_no_point_is_refused(presets, said):

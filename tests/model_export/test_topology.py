@@ -226,10 +226,7 @@ def test_a_neck_that_carries_the_arms_is_a_spine(clips):
 
 @pytest.mark.parametrize(
     ("spine", "roles"),
-    [
-        (1, {"spine": "spine1"}),
-        (5, {"spine": "spine1", "chest": "spine3", "upperChest": "spine5"}),
-    ],
+    [(1, {"spine": "spine1"}), (5, {"spine": "spine1", "chest": "spine3", "upperChest": "spine5"})],
 )
 def test_models_tell_other_tools_their_roles(spine, roles):
     names = (

@@ -1,4 +1,4 @@
-"""Tests of the true errors of truncation as joint distances, and of each joint's share of errors."""
+"""Tests of the true errors of truncation as joint distances, and of the shares that joints have."""
 
 from dataclasses import replace
 

@@ -11,12 +11,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import FileError
-from posefield_train.sample import (
-    sample_body,
-    sample_controls,
-    sample_family,
-    sample_files,
-)
+from posefield_train.sample import sample_body, sample_controls, sample_family, sample_files
 
 
 @pytest.fixture(scope="module")

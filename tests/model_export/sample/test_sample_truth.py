@@ -157,12 +157,7 @@ def test_rest_pose_stands_on_the_floor_and_is_as_tall_as_its_stature(stature):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("hip_height", 0.40),
-        ("turn", 91.0),
-        ("target_height", float("nan")),
-    ],
+    ("name", "value"), [("hip_height", 0.40), ("turn", 91.0), ("target_height", float("nan"))]
 )
 def test_what_the_body_cannot_do_is_refused_by_name(name, value):
     with pytest.raises(InvalidField, match=r"cannot be reached, expected .* to ") as error:
