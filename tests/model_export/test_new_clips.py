@@ -100,11 +100,9 @@ def test_a_control_that_nobody_can_measure_is_asked_for(reopened, table):
     ("text", "said"),
     [
         ("file\n0.bvh\n", "no column 'speed'"),
-        ("file,speed\n0.bvh,nan\n", "cy.csv:2: column 'speed': 'nan', expected a number"),
         ("file,speed\n9.bvh,1\n", "cy.csv:2: column 'file'"),
         ("file,speed,haste\n0.bvh,1,2\n", r"columns \['haste'\], expected some of"),
         ("file,speed,last_frame\n0.bvh,1,0\n", "frames 0 to 0, expected at least two"),
-        ("file,speed\n0.bvh,1\n0.bvh,2\n", "same frames of the same file as line 2"),
     ],
 )
 def test_tables_that_cannot_be_meant(reopened, table, text, said):

@@ -81,35 +81,32 @@ def test_a_cell_that_is_no_finite_number_is_named_by_line_and_column(refused, tm
     assert fault.message == f"column 'v': {cell!r}, expected a number"
 
 
-@pytest.mark.parametrize("row", ["a.bvh", "a.bvh,1,2"])
-def test_a_ragged_row_is_refused(refused, row):
-    fault = refused(f"file,v\nb.bvh,1\n{row}\n")
-    assert (fault.line, fault.message) == (3, "not the 2 cells of the heading")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("file,v\nb.bvh,1\na.bvh\n", "not the 2 cells of the heading"),
+        ("file,v\nb.bvh,1\na.bvh,1,2\n", "not the 2 cells of the heading"),
+        ('file,v\na.bvh,"1\n', "not CSV: unexpected end of data"),
+        ("", "no rows below the heading"),
+        ("file,v\n", "no rows below the heading"),
+        ("file,v\nü.bvh,1\n".encode("latin-1"), "not UTF-8 text"),
+    ],
+)
+def test_what_is_no_table_is_refused(refused, text, said):
+    assert refused(text).message.startswith(said)
 
 
 def test_quoted_line_breaks_belong_to_their_cell_and_count_as_lines(rows, refused):
     text = 'file,v,note\na.bvh,1,"two\nlines"\nb.bvh,2,none\n'
     assert [row.controls.tolist() for row in rows(text)] == [[1.0], [2.0]]
     assert refused(text.replace("b.bvh,2", "b.bvh,x")).line == 4
-
-
-def test_a_quote_that_never_ends_is_refused(refused):
-    assert refused('file,v\na.bvh,"1\n').message.startswith("not CSV: unexpected end of data")
-
-
-@pytest.mark.parametrize("text", ["file,v\n", ""])
-def test_a_table_without_rows_is_refused(refused, text):
-    assert refused(text).message == "no rows below the heading"
+    assert refused("file,v\nb.bvh,1\na.bvh,1,2\n").line == 3
 
 
 def test_a_byte_order_mark_is_no_part_of_the_first_column(rows):
     (row,) = rows(codecs.BOM_UTF8 + b"file,v\r\na.bvh,1\r\n")
     assert row.controls.tolist() == [1.0]
     assert (row.first_frame, row.last_frame, row.performer) == (0, None, "")
-
-
-def test_text_that_is_not_utf_8_is_refused(refused):
-    assert refused("file,v\nü.bvh,1\n".encode("latin-1")).message.startswith("not UTF-8 text")
 
 
 THREE = "file,v,who,turn\na.bvh,1,ann,-5\nb.bvh,2,bob,0\nc.bvh,3,ann,7.5\n"
@@ -128,27 +125,23 @@ def test_conditions_choose_rows_and_their_bounds_count_in(rows, where, left):
     assert [row.controls[0] for row in rows(THREE, where=where)] == left
 
 
-def test_a_table_of_which_no_row_belongs_is_refused(refused):
+def test_rows_that_do_not_belong_may_hold_anything(rows, refused):
+    text = THREE.replace("b.bvh,2", "missing.bvh,?")
+    assert len(rows(text, where={"who": {"among": ["ann"]}})) == 2
     fault = refused(THREE, where={"who": {"among": ["eve"]}})
     assert fault.message == "none of 3 rows meets the conditions"
 
 
-def test_rows_that_do_not_belong_may_hold_anything(rows):
-    text = THREE.replace("b.bvh,2", "missing.bvh,?")
-    assert len(rows(text, where={"who": {"among": ["ann"]}})) == 2
-
-
-@pytest.mark.parametrize("last", [3, 2])
-def test_a_clip_has_two_frames_at_least(rows, refused, last):
-    fault = refused(f"file,v,from,to\na.bvh,1,3,{last}\n", **FRAMES)
-    assert (fault.line, fault.message) == (2, f"frames 3 to {last}, expected at least two")
+def test_a_clip_has_two_frames_at_least_of_whole_numbers(rows, refused):
+    fault = refused("file,v,from,to\na.bvh,1,3,3\n", **FRAMES)
+    assert (fault.line, fault.message) == (2, "frames 3 to 3, expected at least two")
+    for cell in ("1.5", "-1"):
+        fault = refused(f"file,v,from,to\na.bvh,1,{cell},9\n", **FRAMES)
+        assert (fault.line, fault.message) == (
+            2,
+            f"column 'from': '{cell}', expected a frame from 0",
+        )
     assert rows("file,v,from,to\na.bvh,1,3,4\n", **FRAMES)
-
-
-@pytest.mark.parametrize("cell", ["1.5", "-1"])
-def test_a_frame_is_a_whole_number_from_zero(refused, cell):
-    fault = refused(f"file,v,from,to\na.bvh,1,{cell},9\n", **FRAMES)
-    assert (fault.line, fault.message) == (2, f"column 'from': {cell!r}, expected a frame from 0")
 
 
 def test_a_motion_file_that_is_missing_is_named_by_row_and_column(refused, tmp_path):

@@ -1,12 +1,11 @@
 """Tests of training with unusual input: errors, or notes in the model."""
 
 import re
-import zipfile
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from minimal import TOML, recipe_with, small_clip, write_clips
+from minimal import recipe_with, small_clip, write_clips
 
 from posefield.common.errors import RecipeError, TrainingError
 from posefield_train import train
@@ -16,7 +15,6 @@ from posefield_train.source import ingest, recipe
 from posefield_train.source.canonical import Finding
 
 EIGHT = tuple(small_clip(0.1 * i, 21 + i % 3) for i in range(8))
-LABELLED = {"clips": {"performer": "who"}, "kriging": {"label": "performer"}}
 
 
 @pytest.fixture
@@ -49,81 +47,6 @@ def test_a_plain_family_has_nothing_to_be_noted(model):
     assert trained.explained["pose"] > 0.9
 
 
-def spoil(tmp_path, old, new):
-    """Function that puts something else into the second motion file."""
-    path = tmp_path / "1.bvh"
-    text = path.read_text()
-    assert re.search(old, text)
-    path.write_text(re.sub(old, new, text, count=1))
-
-
-def zipped(folder, spoil):
-    """Recipe beside a takes.zip with its table and motions; `spoil` changes the zip's bytes."""
-    folder.mkdir()
-    write_clips(folder, EIGHT)
-    with zipfile.ZipFile(folder / "takes.zip", "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(folder.glob("*.*")):
-            if path.suffix in (".bvh", ".csv"):
-                archive.write(path, path.name)
-                path.unlink()
-    content = (folder / "takes.zip").read_bytes()
-    (folder / "takes.zip").write_bytes(spoil(bytearray(content)))
-    text = TOML.replace('"clips.csv"', '"takes/clips.csv"')
-    (folder / "recipe.toml").write_text(text)
-    return folder / "recipe.toml"
-
-
-def in_the_data(content):
-    content[content.index(b"3.bvh") + 200] ^= 0xFF
-    return content
-
-
-def in_the_headers(offset, value):
-    """Function that changes two bytes behind the signatures of all members' headers."""
-
-    def of(content):
-        for signature, ahead in ((b"PK\3\4", 6), (b"PK\1\2", 8)):
-            at = content.find(signature)
-            while at >= 0:
-                content[at + ahead + offset : at + ahead + offset + 2] = value.to_bytes(2, "little")
-                at = content.find(signature, at + 1)
-        return content
-
-    return of
-
-
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        (in_the_data, r"takes\.zip/3\.bvh: found data that cannot be unpacked \(.*\), expected a "),
-        (in_the_headers(0, 1), r"takes\.zip/clips\.csv: found an encrypted member, expected no "),
-        (in_the_headers(2, 99), r"takes\.zip/clips\.csv: found compression method 99, expected "),
-    ],
-    ids=["damaged", "encrypted", "unknown method"],
-)
-def test_a_zip_that_cannot_be_unpacked_ends_training_with_one_sentence(
-    posefield, tmp_path, spoil, said
-):
-    words = ("train", zipped(tmp_path / "spoiled", spoil), "-o", tmp_path / "x.onnx")
-    code, out, err = posefield(*words)
-    sentence = err.splitlines()[-1]
-    assert (code, out) == (3, "")
-    assert re.search(rf"^posefield: {tmp_path}/spoiled/{said}", sentence), sentence
-    assert "Traceback" not in err
-    assert not (tmp_path / "x.onnx").exists()
-
-
-def test_a_whole_zip_trains_the_model_that_its_folder_trains(tmp_path):
-    """Check that the test above spoils a valid zip."""
-    own = zipped(tmp_path / "whole", bytes)
-    found, _ = ingest.ingest(recipe.read(own), own.parent)
-    write_clips(tmp_path, EIGHT)
-    expected, _ = ingest.ingest(recipe_with(), tmp_path)
-    for one, other in zip(found, expected, strict=True):
-        assert np.array_equal(one.clip.rotations, other.clip.rotations)
-        assert np.array_equal(one.controls, other.controls)
-
-
 def test_poses_of_all_files_together_are_bounded(tmp_path):
     """Each file is within its own bound, and each is a thousandth of what it unpacks to."""
     joints = "".join(f"JOINT j{index} {{ OFFSET 0 0 0 }}\n" for index in range(1, 1000))
@@ -141,16 +64,6 @@ def test_poses_of_all_files_together_are_bounded(tmp_path):
     assert refused.value.message == (
         f"found 40000000 poses of a joint in the files up to {place}, expected at most 30000000"
     )
-
-
-def test_two_performers_are_told_apart(model):
-    rows = [f"{i}.bvh,{i // 2},{'ann' if i % 2 else 'bob'}" for i in range(8)]
-    apart = [small_clip(0.1 * (i // 2) + 0.5 * (i % 2), 21 + i % 3) for i in range(8)]
-    trained, exported = model(apart, rows, "file,v,who", **LABELLED)
-    assert exported.card.performers == ("ann", "bob")
-    assert notes(exported) == []
-    blind, _ = model(apart, rows, "file,v,who")
-    assert trained.left_out_errors.mean() < 0.5 * blind.left_out_errors.mean()
 
 
 def test_a_control_of_few_values_is_taken_and_they_are_listed(model):
