@@ -23,8 +23,7 @@ from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import SampledClip, Trust
 from posefield.registry import shipped_models
 from posefield.retarget.retargeting import RetargetReport, retarget
-from posefield.rigs.rig import Rig
-from posefield.rigs.rig_reader import read_rig
+from posefield.rigs.rig import Rig, read_rig
 from posefield.synthesis import clips
 from posefield_train.source import clip_table, data_folder, ingest, recipe
 from posefield_train.source.recipe import Recipe

@@ -7,7 +7,7 @@ import pytest
 from user_rigs import glb_positions, glb_rig, stage_positions, usd_rig
 
 from posefield.retarget.retargeting import retarget
-from posefield.rigs.rig_reader import read_rig
+from posefield.rigs.rig import read_rig
 
 WALK = ("-c", "speed=1.3", "--fps", "15")
 SCRIPT = {"segments": [{"kind": "walk", "model": "cmu_walk", "seconds": 1.5}], "fps": 15}

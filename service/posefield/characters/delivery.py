@@ -118,8 +118,10 @@ class Delivery:
     ) -> tuple[Retargeted, dict[str, Any], tuple[str, ...]]:
         """Return the motion of the character, the facts of the report, and its warnings."""
         made = retarget(clip, self.character.rig, roles, settings)
-        facts = {"character": self.character.name, "file": self.character.target.file}
-        facts |= {name: _listed(value) for name, value in made.report.facts().items()}
+        character = self.character
+        facts: dict[str, Any] = {"character": character.name, "file": character.target.file}
+        for name, value in made.report.facts().items():
+            facts[name] = list(value) if isinstance(value, tuple) else value
         return made, facts, tuple(facts.pop("warnings"))
 
 
@@ -191,7 +193,3 @@ def _loop_note(clip: Clip) -> list[str]:
     if apart <= CLOSED:
         return []
     return [f"the last pose of the loop differs from the first by {1000.0 * apart:.1f} mm"]
-
-
-def _listed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value

@@ -15,8 +15,7 @@ from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.user_rig.rig_files import RigTarget
 from posefield.question.motion_question import LEGAL_NAME
 from posefield.rigs import rest_joints
-from posefield.rigs.rig import Rig
-from posefield.rigs.rig_reader import read_rig
+from posefield.rigs.rig import Rig, read_rig
 
 MOST_ROLES_BYTES = 128_000
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz", ".glb")

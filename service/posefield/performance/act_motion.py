@@ -1,7 +1,7 @@
 """Acts: motions of models without cycles, sampled through the moment of their event."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -78,7 +78,8 @@ def act_passage(model: Synthesizer, asked: MotionQuestion) -> Act:
     if card.cyclic:
         raise InvalidField("act", f"{model.name} is a cycle, expected a model of another motion")
     times, event = _times(model, model.question(asked))
-    answer = poses.synthesize_poses(model, _at_times(asked, times))
+    given = {name: getattr(asked, name) for name in MotionQuestion.__struct_fields__}
+    answer = poses.synthesize_poses(model, PoseQuestion(**given, times=times.tolist()))
     own = Passage(
         quat.normalize(answer.rotations.astype(np.float64)),
         answer.root_position.astype(np.float64),
@@ -117,11 +118,6 @@ def _times(model: Synthesizer, question: ValidatedQuestion) -> tuple[Frames, int
     moments = np.linspace(0.0, duration, WARP_STEPS)
     state = model.session.state(question.point, moments, question.labels, question.level)
     return times_through(float(np.interp(event.share * last, state.frames, moments)), duration)
-
-
-def _at_times(asked: MotionQuestion, times: Frames) -> PoseQuestion:
-    own = {name: getattr(asked, name) for name in MotionQuestion.__struct_fields__}
-    return PoseQuestion(**own, times=times.tolist())
 
 
 def _contacts(
@@ -174,7 +170,3 @@ class StagedAct:
     goal: complex = 0j
     facing: Callable[[float], FloorMotion] = _no_goal
     adapted: Passage | None = None
-
-    def faced(self, angle: float) -> "StagedAct":
-        """Return the act with a heading of its first frame, rad."""
-        return replace(self, by=self.facing(angle))

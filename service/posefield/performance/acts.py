@@ -70,7 +70,7 @@ def act_at(
     """Return the act of a question in the frame of a segment that `by` places in the world.
 
     world: indices of the targets whose positions are in the world; the other ones are in the frame
-    of the segment. Raises as `act_segment.act_passage` does.
+    of the segment. Raises as `act_motion.act_passage` does.
     """
     back, moved = by.inverse(), list(asked.targets)
     for index in world:
@@ -119,7 +119,7 @@ def place_by_target(model: Synthesizer, asked: MotionQuestion, world: int = 0) -
     the segment. The target's height constrains the motion; over the floor the joint stays where the
     motion without that target takes it, so that the motion does not depend on the place. Raises
     OutOfReach for a height that the motion does not reach, unless `extrapolate` is "ok", and as
-    `act_segment.act_passage` does.
+    `act_motion.act_passage` does.
     """
     target = asked.targets[world]
     height = _checked(world, target)[1]
@@ -257,22 +257,17 @@ def world_targets(own: performance_question.Act) -> list[int]:
     return [place for place, each in enumerate(own.targets) if each.frame == "world"]
 
 
-def has_place(own: performance_question.Act) -> bool:
-    """Return whether an act says where it takes place, so that a walk can lead there."""
-    return own.at is not None or bool(world_targets(own))
-
-
 def stage_after_walk(script: Script, index: int) -> StagedAct:
     """Return an act that says where it takes place, for a walk that leads there.
 
-    Raises as `act_placement` does.
+    Raises as `act_from` and `place_by_target` do.
     """
     own, source = act_of(script, index)
     asked, world = question_of(script, own), world_targets(own)
     if own.at is None:
         free = place_by_target(source.model, asked, world[0])
-        turned = StagedAct(index, free.act, None, free.goal, lambda angle: free.facing(angle).by)
-        return turned if own.facing is None else turned.faced(own.facing)
+        by = None if own.facing is None else free.facing(own.facing).by
+        return StagedAct(index, free.act, by, free.goal, lambda angle: free.facing(angle).by)
     goal = complex(own.at[1], own.at[0])
     if own.facing is None and not world:
         act = act_motion.act_passage(source.model, asked)

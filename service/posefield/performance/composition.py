@@ -19,7 +19,7 @@ from posefield.performance.join_quality import JoinFacts
 from posefield.performance.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
 from posefield.performance.timeline import Composed, Timeline, from_poses, resample
-from posefield.question.performance_question import Act, Hold, Segment, Walk
+from posefield.question.performance_question import Act, Hold, Walk
 from posefield.question.performance_report import (
     HeldJoint,
     PerformanceAnswer,
@@ -50,10 +50,12 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     times = frame_times(composed, script.question.fps, most)
     told: FeetResult | None = None
     planned: FeetPlan | None = None
+    every = PlacedFrames(composed.motion.rotations, composed.motion.roots)
     if script.question.feet == "stand" and script.character.feet:
         planned = plan_feet(script, composed)
         (told,) = standing_feet.describe([planned], script.character.skeleton.names)
-    every = _place_feet(planned, np.arange(len(composed.motion)) / RATE, composed.motion)
+        even = np.arange(len(composed.motion)) / RATE
+        every = foot_placement.place_feet(planned, even, every.rotations, every.roots)
     judged = _judge_joins(script, composed, every)
     rotations, roots = _at_times(script, composed.motion, planned, every, times)
     character = script.character
@@ -79,7 +81,7 @@ def _held_joints(timeline: Timeline, clip: Clip) -> tuple[HeldJoint, ...]:
 def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Sequence[JoinFacts]:
     """Judge the joins as they are sent: with targets met, and feet placed where they stand.
 
-    Each hard one has a warning.
+    Each hard one has a warning, and so has each act that is too fast.
     """
     timeline = composed.timeline
     joins = [(own.frame - timeline.begin, own.cut) for own in timeline.joins]
@@ -87,13 +89,7 @@ def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Seq
     for made, facts in zip(timeline.joins, found, strict=True):
         if facts.hard:
             timeline.warn(f"/segments/{made.segment}", "; ".join(facts.reasons))
-    _judge_acts(script, composed, every)
-    return found
-
-
-def _judge_acts(script: Script, composed: Composed, every: PlacedFrames) -> None:
-    """Warn of acts that are faster than captured clips, as extrapolated ones may be."""
-    timeline = composed.timeline
+    # Acts may be faster than captured clips, as extrapolated ones are.
     ends = [*(span.begin for span in timeline.spans[1:]), len(timeline.done)]
     for index, (span, end) in enumerate(zip(timeline.spans, ends, strict=True)):
         if span.kind != "act" or not timeline.captured:
@@ -103,6 +99,7 @@ def _judge_acts(script: Script, composed: Composed, every: PlacedFrames) -> None
         said = join_quality.judge_act(body, every, frames, captured)
         if said:
             timeline.warn(f"/segments/{index}", said)
+    return found
 
 
 def plan_document(report: PerformanceReport) -> bytes:
@@ -147,20 +144,20 @@ def _captured_accelerations(script: Script) -> tuple[float, ...]:
     return tuple(found)
 
 
-def _is_open(own: Segment) -> bool:
-    """Return whether a segment is a walk without an end of its own."""
-    return isinstance(own, Walk) and own.along is None and own.to is None and own.seconds is None
-
-
 def _stage_ahead(script: Script, index: int) -> StagedAct | None:
     """Return the act that a walk without an end of its own leads to; None for other segments.
 
     Its errors are of the act's segment.
     """
-    if not _is_open(script.segments[index]):
+    own = script.segments[index]
+    if not isinstance(own, Walk) or any(
+        end is not None for end in (own.along, own.to, own.seconds)
+    ):
         return None
     following = script.segments[index + 1] if index + 1 < len(script.segments) else None
-    if not isinstance(following, Act) or not acts.has_place(following):
+    if not isinstance(following, Act) or (
+        following.at is None and not acts.world_targets(following)
+    ):
         raise InvalidField(
             f"segments/{index}",
             "a walk without along, to or seconds, expected one of them, or an act with a place "
@@ -188,13 +185,6 @@ def plan_feet(script: Script, composed: Composed) -> FeetPlan:
     body, led = limb_targets.find_leads(character.body, timeline.targets, frames)
     motion = SampledMotion(own.rotations, own.roots, RATE, walking=composed.walking)
     return body_plans.plan_feet(body, motion, script.contacts, own.contacts, led=led)
-
-
-def _place_feet(planned: FeetPlan | None, times: Frames, motion: Passage) -> PlacedFrames:
-    """Return the frames of a motion at times (F,), s, with feet as planned; None as predicted."""
-    if planned is None:
-        return PlacedFrames(motion.rotations, motion.roots)
-    return foot_placement.place_feet(planned, times, motion.rotations, motion.roots)
 
 
 def _at_times(

@@ -48,12 +48,13 @@ class Gaze:
 
 
 @dataclass(frozen=True)
-class Looker:
-    """Skeleton that can look: its parents, offsets (J, 3), m, and joints by role.
+class HeldBody:
+    """Skeleton of a character that stays in a pose, and can look.
 
-    facing: of its rest pose, from +z to the left, rad.
+    bones: offsets (J, 3), m. joints: by role. facing: of the rest pose, from +z to the left, rad.
     """
 
+    names: tuple[str, ...]
     parents: tuple[int, ...]
     bones: Bones
     joints: Mapping[str, int]

@@ -8,7 +8,7 @@ met there stay met until then.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -23,7 +23,7 @@ from posefield.feet.limbs import Limb
 from posefield.kriging import philox
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
-from posefield.performance.gaze import Looker
+from posefield.performance.gaze import HeldBody
 from posefield.performance.limb_targets import WorldTarget
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.performance.script import Script
@@ -64,14 +64,13 @@ def add_sway(
 
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
-    roles = [role for role in ANGLES if role in joints]
     found = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
     swayed = roots.copy()
     swayed[:, [2, 0]] += ROOT_SWAY * found[:, :2]
     vectors = found[:, 2:].reshape(len(roots), -1, 3)
     moved = rotations.copy()
     for place, role in enumerate(ANGLES):
-        if role in roles:
+        if role in joints:
             turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, place])
             moved[:, joints[role]] = quat.mul(moved[:, joints[role]], turn)
     return moved, swayed
@@ -98,20 +97,6 @@ LOOK_RAMP = 0.5
 """Time in which the gaze turns to a point and back, s."""
 # Frames through which the one between two others is interpolated.
 WINDOW = 4
-
-
-@dataclass(frozen=True)
-class HeldBody:
-    """Skeleton of a character that stays in a pose.
-
-    bones: offsets (J, 3), m. joints: by role. facing: of the rest pose, from +z to the left, rad.
-    """
-
-    names: tuple[str, ...]
-    parents: tuple[int, ...]
-    bones: Bones
-    joints: Mapping[str, int]
-    facing: float = 0.0
 
 
 def body_of(
@@ -176,7 +161,7 @@ def hold_passage(
     turns to, in the frame of the passage, m. seed: of the sway. The passage has come to rest
     (`come_to_rest`). The held joint stays where it is, and so does its orientation; feet are to be
     planned, as their contacts go on. Raises InvalidField for a time without a frame, a joint that
-    no arm or leg leads to, and as `Looker.look_at` does.
+    no arm or leg leads to, and as `HeldBody.look_at` does.
     """
     seconds = value_validation.check_number("hold", seconds)
     count = round(seconds * RATE)
@@ -193,8 +178,7 @@ def hold_passage(
         point = np.array(
             [value_validation.check_number(f"look_at/{i}", own) for i, own in enumerate(look_at)]
         )
-        looker = Looker(body.parents, body.bones, body.joints, body.facing)
-        gaze = looker.look_at(before.rotations[-1], before.roots[-1], point)
+        gaze = body.look_at(before.rotations[-1], before.roots[-1], point)
         # A head cannot turn to a point and back in no time: a short hold turns it by a part.
         share = min(1.0, 0.5 * count / RATE / LOOK_RAMP)
         turning = _envelope(count, LOOK_RAMP) * share

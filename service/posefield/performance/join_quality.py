@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Frames
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import UP, Floats
 from posefield.feet import limbs
 from posefield.feet.contact_estimates import DECIMALS, STANDING
 from posefield.feet.foot_placement import PlacedFrames
@@ -244,7 +244,10 @@ def add_steps(
     # All at once: for so few poses each call takes longer than the poses.
     every = _balls(character, concatenate(left, right, made))
     own, there, shown = every[0], every[1 : 1 + len(right)], every[1 + len(right) :]
-    stands = [_standing(side, at) for side, at in ((before, cut.exit), (after, cut.entry))]
+    stands = [
+        np.round(side.contacts[at], DECIMALS) > STANDING
+        for side, at in ((before, cut.exit), (after, cut.entry))
+    ]
     contacts = joined.contacts.copy()
     landed = cut.exit
     for foot in np.flatnonzero(~stands[0] & stands[1]).tolist():
@@ -272,12 +275,6 @@ def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames 
     )
     balls = [poses.position(tip) for tip in tips]
     return np.stack(balls, axis=1) if balls else np.zeros((len(passage), 0, 3))
-
-
-def _standing(passage: Passage, frame: int) -> Annotated[Booleans, "feet"]:
-    """Return which feet stand in a frame."""
-    found: Booleans = np.round(passage.contacts[frame], DECIMALS) > STANDING
-    return found
 
 
 def _apart(

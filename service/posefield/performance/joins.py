@@ -96,7 +96,15 @@ def find_cut(
         raise ValueError(f"{len(exits)} exits and {len(entries)} entries, expected one or more")
     left, right = _poses(character, before, exits), _poses(character, after, entries)
     sums = _sums(left, right)
-    turns, gaps = _best_motions(sums) if motion is None else _given(left, right, motion)
+    if motion is None:
+        found = sums.products - sums.left * np.conj(sums.right) / sums.weights
+        size = np.abs(found)
+        turns = np.where(size > 0.0, found / np.maximum(size, 1e-300), 1.0)
+        gaps = (sums.left - turns * sums.right) / sums.weights
+    else:
+        given = np.exp(1j * motion.turn)
+        gaps = (given * right.roots + motion.shift)[None] - left.roots[:, None]
+        turns = np.full(gaps.shape, given)
     costs = _costs(sums, turns, gaps) / left.floor.shape[1]
     place = int(np.argmin(np.round(costs / GRAIN)))
     row, column = divmod(place, len(entries))
@@ -135,21 +143,6 @@ def _poses(character: Character, passage: Passage, frames: range) -> _Poses:
         extra[:, leg.tip] = np.sqrt(FOOT_WEIGHT - 1.0) * stands
     flow, climb = floor_plane.project(velocities), velocities @ UP
     return _Poses(roots, floor - roots[:, None], places @ UP, flow, climb, extra)
-
-
-def _best_motions(sums: "_Sums") -> tuple[PairVectors, PairVectors]:
-    """Return turns (E, B) and gaps (E, B) of the roots that make the cost of each pair least."""
-    found = sums.products - sums.left * np.conj(sums.right) / sums.weights
-    size = np.abs(found)
-    turns = np.where(size > 0.0, found / np.maximum(size, 1e-300), 1.0)
-    return turns, (sums.left - turns * sums.right) / sums.weights
-
-
-def _given(left: _Poses, right: _Poses, motion: FloorMotion) -> tuple[PairVectors, PairVectors]:
-    """Return the turns and gaps (E, B) of one floor motion."""
-    turn = np.exp(1j * motion.turn)
-    gaps = (turn * right.roots + motion.shift)[None] - left.roots[:, None]
-    return np.full(gaps.shape, turn), gaps
 
 
 def _costs(sums: "_Sums", turns: PairVectors, gaps: PairVectors) -> PairValues:

@@ -66,13 +66,13 @@ def meet_targets(
     for own in targets:
         limb = found[own.joint]
         if limb is not None:
-            others = [each for each in targets if _share_joints(found[each.joint], limb)]
+            others = [
+                each
+                for each in targets
+                if (other := found[each.joint]) and set(_chain(other)).intersection(_chain(limb))
+            ]
             passage = _moved(character, passage, limb, own, others)
     return passage, tuple(_miss(character, passage, own) for own in targets)
-
-
-def _share_joints(one: Limb | None, other: Limb) -> bool:
-    return one is not None and not set(_chain(one)).isdisjoint(_chain(other))
 
 
 def find_leads(
@@ -110,17 +110,6 @@ def _chain(limb: Limb) -> tuple[int, int, int]:
     return limb.upper, limb.middle, limb.lower
 
 
-@dataclass(frozen=True)
-class _Held:
-    """A limb in the frames in which its target holds.
-
-    way: along which its end goes there, m, as an arc. turns: of its joints then.
-    """
-
-    way: float
-    turns: LimbTurns
-
-
 def _moved(
     character: Character,
     passage: Passage,
@@ -132,9 +121,9 @@ def _moved(
 
     others: targets of joints of the same limb, at which this one does not act.
     """
-    held = _hold(_poses(character, passage, limb, range(own.begin, own.end + 1)), limb, own)
+    way, held = _hold(_poses(character, passage, limb, range(own.begin, own.end + 1)), limb, own)
     # A cosine over a time T has the acceleration 0.5 (pi / T)^2 times the way.
-    around = float(np.sqrt(0.5 * np.pi**2 * held.way / GENTLE))
+    around = float(np.sqrt(0.5 * np.pi**2 * way / GENTLE))
     frames = round(float(np.clip(around, EASING, LONGEST_EASING)) * RATE)
     before = min([frames, *(own.begin - each.end for each in others if each.end < own.begin)])
     after = min([frames, *(each.begin - own.end for each in others if each.begin > own.end)])
@@ -142,7 +131,7 @@ def _moved(
     share = _share(np.array(rows, float), own, before, after)
     poses = _poses(character, passage, limb, rows)
     rotations = passage.rotations.copy()
-    _eased(poses, limb, held.turns, share, own.begin - rows.start).apply(
+    _eased(poses, limb, held, share, own.begin - rows.start).apply(
         limb, rotations[rows.start : rows.stop]
     )
     return replace(passage, rotations=rotations)
@@ -155,8 +144,11 @@ def _poses(character: Character, passage: Passage, limb: Limb, rows: range) -> L
     )
 
 
-def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> _Held:
-    """Return a limb, in the frames in which a target holds, with its tip there or nearest to it."""
+def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> tuple[float, LimbTurns]:
+    """Return the turns of a limb, while a target holds, with its tip there or nearest to it.
+
+    First is the way along which its end goes there, m, as an arc.
+    """
     upper, lower = poses.position(limb.upper), poses.position(limb.lower)
     wanted = own.position - poses.position(limb.tip) + lower
     goal = wanted + _shortfall(poses, limb, upper, wanted)
@@ -169,7 +161,7 @@ def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> _Held:
     sine, cosine = np.linalg.norm(quat.cross(before, end[:1])), np.sum(before * end[:1])
     arc = float(np.arctan2(sine, cosine) * np.linalg.norm(end[0]))
     stretch = float(np.linalg.norm(end[0]) - np.linalg.norm(before))
-    return _Held(float(np.hypot(arc, stretch)), two_bone.solve(poses, limb, end))
+    return float(np.hypot(arc, stretch)), two_bone.solve(poses, limb, end)
 
 
 def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) -> Vector:

@@ -172,8 +172,8 @@ def _match(source: Skeleton, target: Skeleton, feet: Sequence[int]) -> SkeletonM
             # A joint without bones turns with its parent.
             turns[joint] = turns[parent] if joint and joint not in flat else quat.IDENTITY
             continue
-        angles = _angles(*arms)
-        apart[joint] = angles.max()
+        across = np.linalg.norm(np.cross(arms[0], arms[1]), axis=-1)
+        apart[joint] = np.arctan2(across, np.sum(arms[0] * arms[1], axis=-1)).max()
         if apart[joint] > LEAST_ANGLE and joint not in flat:
             turns[joint] = _turn(*arms)
     _expect_near(source, target, apart)
@@ -265,15 +265,6 @@ def _directions(
         return np.zeros((0, 3))
     long = np.min([np.linalg.norm(each, axis=-1) for each in tips], axis=0) > SHORTEST_BONE
     found: Floats = own.tip_offsets[np.array(own.tip_joints) == joint][long]
-    return found
-
-
-def _angles(
-    source: Annotated[Floats, "bones 3"], target: Annotated[Floats, "bones 3"]
-) -> Annotated[Floats, "bones"]:
-    """Return the angles (B,) between bones, rad."""
-    across = np.linalg.norm(np.cross(source, target), axis=-1)
-    found: Floats = np.arctan2(across, np.sum(source * target, axis=-1))
     return found
 
 

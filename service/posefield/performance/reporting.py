@@ -58,7 +58,8 @@ def path_errors(plan: WalkPlan, roots: RootPath, rotations: Rotations) -> PathEr
     off = _means(plan.phases, (own - centres) * np.exp(-1j * tangents))
     travel = _travel(plan, own)
     asked = _travel(plan, centres)
-    facing = _means(plan.phases, np.unwrap(_headings(rotations)) - tangents)
+    forward = floor_plane.project(quat.rotate(rotations[:, 0], np.array([0.0, 0.0, 1.0])))
+    facing = _means(plan.phases, np.unwrap(np.angle(forward)) - tangents)
     return PathErrors(
         _rms(off.imag),
         _rms(off.real),
@@ -98,12 +99,6 @@ def _cycles(
     return begins.astype(float), ends, (ends - begins) / RATE
 
 
-def _headings(rotations: Rotations) -> Annotated[Floats, "frames"]:
-    """Return the headings (F,), rad, to which the roots turn the direction z."""
-    forward = quat.rotate(rotations[:, 0], np.array([0.0, 0.0, 1.0]))
-    return np.angle(floor_plane.project(forward))
-
-
 def _rms(values: Annotated[Floats, "means"]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
@@ -122,6 +117,7 @@ def report(
     timeline = composed.timeline
     sigma = float(np.sqrt(np.mean(np.square(composed.motion.sigmas))))
     warnings = [*timeline.warnings, *_missed(composed)]
+    ends = [later.begin for _, later in pairwise(timeline.spans)] + [len(timeline.done) - 1]
     return PerformanceReport(
         script.identities,
         script.character.identity,
@@ -129,17 +125,11 @@ def report(
         frames,
         round_micrometres(sigma),
         all(span.supported for span in timeline.spans),
-        _segments(composed),
+        tuple(_segment(composed, index, end) for index, end in enumerate(ends)),
         tuple(_join(composed, *pair) for pair in zip(timeline.joins, joins, strict=True)),
         feet,
         tuple(warnings),
     )
-
-
-def _segments(composed: Composed) -> tuple[SegmentReport, ...]:
-    spans = composed.timeline.spans
-    ends = [later.begin for _, later in pairwise(spans)] + [len(composed.timeline.done) - 1]
-    return tuple(_segment(composed, index, end) for index, end in enumerate(ends))
 
 
 def _segment(composed: Composed, index: int, end: int) -> SegmentReport:
@@ -168,13 +158,10 @@ def _results(composed: Composed, index: int) -> tuple[ConstraintResult, ...]:
     targets = zip(composed.timeline.targets, composed.missed, strict=True)
     missed = {own.pointer: miss for own, miss in targets}
     return tuple(
-        _result(each, missed[f"/segments/{index}/targets/{number}"])
+        replace(each, miss=round_micrometres(miss), reached=miss <= MISS_TOLERANCE)
         for number, each in enumerate(composed.timeline.spans[index].targets)
+        for miss in [missed[f"/segments/{index}/targets/{number}"]]
     )
-
-
-def _result(each: ConstraintResult, miss: float) -> ConstraintResult:
-    return replace(each, miss=round_micrometres(miss), reached=miss <= MISS_TOLERANCE)
 
 
 def _path(composed: Composed, span: Span) -> PathReport | None:

@@ -65,15 +65,6 @@ def check_bounds(question: PerformanceQuestion) -> None:
         raise InvalidField("segments/0", "a hold, expected a walk or an act before it")
 
 
-def check_level(level: int, models: Sequence[Synthesizer | None]) -> None:
-    """Raise InvalidField for a level of detail that a model does not have."""
-    for model in models:
-        count = 0 if model is None else len(model.session.card.levels)
-        if model is not None and not 0 <= level < count:
-            name = model.session.card.name
-            raise InvalidField("level", f"{level}, expected 0 to {count - 1}, as {name} has")
-
-
 def _numbers(question: PerformanceQuestion) -> Iterator[Bounded]:
     yield "fps", question.fps, MIN_FPS, MAX_FPS, "frames/s"
     yield from _places("start/position", question.start.position)
@@ -268,7 +259,12 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
     """
     check_bounds(question)
     models = [_model(index, own, find) for index, own in enumerate(question.segments)]
-    check_level(question.level, models)
+    for card in (own.session.card for own in models if own is not None):
+        if not 0 <= question.level < len(card.levels):
+            most = len(card.levels) - 1
+            raise InvalidField(
+                "level", f"{question.level}, expected 0 to {most}, as {card.name} has"
+            )
     character = _character(question, models, find)
     # Refused here, as a plan refuses what its performance would.
     joint_roles.rename_joints(character.skeleton, character.roles, question.names)

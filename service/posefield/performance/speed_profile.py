@@ -97,7 +97,10 @@ def distances_over_length(
     if scale == "distance":
         squares = _begun(gone, np.interp(gone, *curve), ramps)
     else:
-        times = np.arange(0.0, _longest(length, curve, ramps), SECONDS)
+        # A time, s, after which the length is walked for certain.
+        slowest = float(curve[1].min())
+        late = min(length / slowest + slowest / ramps.acceleration + 1.0, MAX_SECONDS + 1.0)
+        times = np.arange(0.0, late, SECONDS)
         speeds = _begun_in_time(times, np.interp(times, *curve), ramps)
         squares = np.interp(gone, _integral(times, speeds), speeds) ** 2
     if ramps.last is not None:
@@ -107,7 +110,8 @@ def distances_over_length(
     if times[-1] > MAX_SECONDS:
         raise InvalidField("speed", f"a walk of {times[-1]:.0f} s, expected {MAX_SECONDS:g} s")
     even = np.arange(0.0, times[-1] + 0.5 * SECONDS, SECONDS)
-    return _frames(even, _at_times(even, times, gone, squares), length, ramps)
+    # Speeds are linear in time between the points, as accelerations are even.
+    return _frames(even, np.interp(even, times, np.sqrt(squares)), length, ramps)
 
 
 def distances_over_time(
@@ -120,8 +124,8 @@ def distances_over_time(
     else:
         length = seconds * float(curve[1].max())
         gone = np.linspace(0.0, length, max(int(np.ceil(length / METRES)), 8) + 1)
-        squares = _begun(gone, np.interp(gone, *curve), ramps)
-        speeds = _at_times(times, _times(gone, np.sqrt(squares)), gone, squares)
+        walked = np.sqrt(_begun(gone, np.interp(gone, *curve), ramps))
+        speeds = np.interp(times, _times(gone, walked), walked)
     if ramps.last is not None:
         speeds = np.minimum(speeds, ramps.last + ramps.acceleration * (times[-1] - times))
     return _frames(times, speeds, None, ramps)
@@ -142,20 +146,9 @@ def _begun_in_time(times: Floats, speeds: Floats, ramps: SpeedRamps) -> Floats:
     return np.clip(speeds, ramps.first - up, ramps.first + up)
 
 
-def _longest(length: float, curve: tuple[Floats, Floats], ramps: SpeedRamps) -> float:
-    """Return a time, s, after which a length is walked for certain."""
-    slowest = float(curve[1].min())
-    return min(length / slowest + slowest / ramps.acceleration + 1.0, MAX_SECONDS + 1.0)
-
-
 def _times(gone: Floats, speeds: Floats) -> Floats:
     """Return times, s, of distances at which speeds, m/s, are known, for even accelerations."""
     return np.pad(np.cumsum(2.0 * np.diff(gone) / (speeds[1:] + speeds[:-1])), (1, 0))
-
-
-def _at_times(even: Floats, times: Floats, gone: Floats, squares: Floats) -> Floats:
-    """Return speeds at even times: linear in time between the points, as accelerations are."""
-    return np.interp(even, times, np.sqrt(squares))
 
 
 def _integral(times: Floats, speeds: Floats) -> Floats:

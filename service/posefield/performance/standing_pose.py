@@ -207,6 +207,7 @@ def _standing_leg(
     rotations = blend.nlerp(before, after, share)
     roots = (1.0 - share) * cycle.roots[rows[:1]] + share * cycle.roots[rows[1:]]
     poses, limb = cycle.evaluate(rotations, roots), cycle.legs[leg]
+    chords = cycle.poses.position(limb.lower) - cycle.poses.position(limb.upper)
     hip, end, ball = (poses.position(own)[0] for own in (limb.upper, limb.lower, limb.tip))
     return _StandingLeg(
         rotations[0, _below(cycle.parents, limb)],
@@ -214,14 +215,8 @@ def _standing_leg(
         complex(floor_plane.project(ball)),
         float(ball @ UP),
         ball - end,
-        0.5 * float(np.linalg.norm(end - hip) + _chords(cycle.poses, limb).max()),
+        0.5 * float(np.linalg.norm(end - hip) + np.linalg.norm(chords, axis=-1).max()),
     )
-
-
-def _chords(poses: LimbPoses, leg: Limb) -> Annotated[Floats, "frames"]:
-    """Return the distances from the hip to the leg's end (F,), m."""
-    found: Floats = np.linalg.norm(poses.position(leg.lower) - poses.position(leg.upper), axis=-1)
-    return found
 
 
 def _below(parents: tuple[int, ...], leg: Limb) -> Indices:

@@ -113,18 +113,6 @@ def _replaced(own: Passage, rows: slice, step: Passage) -> Passage:
 
 
 @dataclass(frozen=True)
-class _Stand:
-    """Place of a walker that stands.
-
-    shift: of the root from its place in the standing pose, in the frame that travels. balls: of
-    both feet (2, 3), m.
-    """
-
-    shift: complex
-    balls: Annotated[Floats, "2 3"]
-
-
-@dataclass(frozen=True)
 class _Course:
     """Course of a step.
 
@@ -142,24 +130,24 @@ class _Course:
 def _close(pose: StandingPose, walked: Passage, travel: Travel) -> Passage:
     """Return a step that ends in the standing pose, from the frames of the walk on."""
     course = _course(pose, walked, float(travel.phases[-1]))
-    balls = _balls(pose, _poses(pose, walked.rotations, walked.roots))
-    stand = _stand(pose, travel, balls, course.swinging)
-    rotations, roots = _standing(pose, travel, stand.shift)
-    rotations = blend.nlerp(walked.rotations, rotations, course.pose)
-    roots = blend.lerp(walked.roots, roots, course.pose)
+    poses = _poses(pose, walked.rotations, walked.roots)
+    balls = np.stack([poses.position(leg.tip) for leg in pose.legs], axis=1)
+    shift, stood = _stand(pose, travel, balls, course.swinging)
+    count = len(travel.places)
+    turned = np.broadcast_to(pose.rotations, (count, *pose.rotations.shape))
+    standing = floor_plane.turn_roots(turned, travel.headings)
+    places = travel.places + np.exp(1j * travel.headings) * (pose.place + shift)
+    ends = floor_plane.at_height(places, np.full(count, pose.height))
+    rotations = blend.nlerp(walked.rotations, standing, course.pose)
+    roots = blend.lerp(walked.roots, ends, course.pose)
     poses = _poses(pose, rotations, roots)
     for place, leg in enumerate(pose.legs):
         share = course.swing if place == course.swinging else course.pose
-        ball = blend.lerp(balls[:, place], np.broadcast_to(stand.balls[place], roots.shape), share)
+        ball = blend.lerp(balls[:, place], np.broadcast_to(stood[place], roots.shape), share)
         ankle = ball - (poses.position(leg.tip) - poses.position(leg.lower))
         end = two_bone.reach(poses, leg, np.zeros_like(ankle), ankle)
         turns = two_bone.solve(poses, leg, end)
-        for joint, turned in zip(
-            (leg.upper, leg.middle, leg.lower),
-            (turns.upper, turns.middle, turns.lower),
-            strict=True,
-        ):
-            rotations[:, joint] = turned
+        turns.apply(leg, rotations)
     contacts = np.ones_like(walked.contacts)
     contacts[course.lift : course.land, course.swinging] = 0.0
     return replace(walked, rotations=rotations, roots=roots, contacts=contacts)
@@ -187,12 +175,13 @@ def _eased(share: Frames) -> Frames:
 
 def _stand(
     pose: StandingPose, travel: Travel, balls: Annotated[Floats, "frames 2 3"], swinging: int
-) -> _Stand:
+) -> tuple[complex, Annotated[Floats, "2 3"]]:
     """Return where a walker stands beside the foot on which the step is made.
 
-    The root ends where the walk does, give or take `MOST_BESIDE` ahead and the sway to the standing
-    foot. If that foot is farther ahead or behind, the other one is set as far to the other side, so
-    that the root is between them.
+    First the shift of the root from its place in the standing pose, in the frame that travels, then
+    the balls of both feet, m. The root ends where the walk does, give or take `MOST_BESIDE` ahead
+    and the sway to the standing foot. If that foot is farther ahead or behind, the other one is set
+    as far to the other side, so that the root is between them.
     """
     towards = np.exp(1j * travel.headings[-1])
     own = travel.places[-1] + towards * pose.balls
@@ -202,23 +191,8 @@ def _stand(
     beside = float(np.clip(off.real, -MOST_BESIDE, MOST_BESIDE))
     places = own + towards * complex(2.0 * beside - off.real, off.imag)
     places[foot] = stood
-    shift = complex(beside, off.imag)
-    return _Stand(shift, floor_plane.at_height(places, pose.levels))
-
-
-def _standing(pose: StandingPose, travel: Travel, shift: complex) -> tuple[Rotations, RootPath]:
-    """Return the standing pose in all frames (F, J, 4), and its roots (F, 3), m."""
-    count = len(travel.places)
-    own = np.broadcast_to(pose.rotations, (count, *pose.rotations.shape))
-    places = travel.places + np.exp(1j * travel.headings) * (pose.place + shift)
-    heights = np.full(count, pose.height)
-    return floor_plane.turn_roots(own, travel.headings), floor_plane.at_height(places, heights)
+    return complex(beside, off.imag), floor_plane.at_height(places, pose.levels)
 
 
 def _poses(pose: StandingPose, rotations: Rotations, roots: RootPath) -> LimbPoses:
     return limbs.evaluate_poses(pose.parents, pose.bones, pose.legs, rotations, roots)
-
-
-def _balls(pose: StandingPose, poses: LimbPoses) -> Annotated[Floats, "frames 2 3"]:
-    """Return the paths of the balls of both feet (F, 2, 3), m."""
-    return np.stack([poses.position(leg.tip) for leg in pose.legs], axis=1)

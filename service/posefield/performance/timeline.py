@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath, Rotations
+from posefield.common.array_shapes import RootPath, Rotations
 from posefield.common.errors import InvalidField
 from posefield.common.units import Booleans, Floats
 from posefield.motion import quat
@@ -82,11 +82,6 @@ class Timeline:
             raise ValueError("no motion, expected a segment before this one")
         return self.motion
 
-    @property
-    def seconds(self) -> float:
-        """Duration so far, s."""
-        return 0.0 if self.motion is None else (len(self.motion) - 1 - self.begin) / RATE
-
     def find_cut(self, after: Passage, entries: range, motion: FloorMotion | None = None) -> Cut:
         """Return the best cut from an exit of the motion to an entry of a passage."""
         return joins.find_cut(self.character.body, self.done, after, self.exits, entries, motion)
@@ -141,10 +136,10 @@ class Timeline:
 
     def check_duration(self) -> None:
         """Raise InvalidField, for the segment itself, for a performance that is too long now."""
-        if self.seconds > MAX_SECONDS:
+        seconds = (len(self.done) - 1 - self.begin) / RATE
+        if seconds > MAX_SECONDS:
             raise InvalidField(
-                "",
-                f"{self.seconds:.0f} s with this segment, expected {MAX_SECONDS:g} s at most",
+                "", f"{seconds:.0f} s with this segment, expected {MAX_SECONDS:g} s at most"
             )
 
 
@@ -213,15 +208,11 @@ def from_poses(poses: Sequence[GivenPose], fps: float, character: ScriptCharacte
     roots = np.array([own.root_position for own in poses], dtype=np.float64)
     if not (np.isfinite(roots).all() and (np.abs(roots) < 1e5).all()):
         raise InvalidField("start/poses", "root positions beyond 100 km, expected nearer ones")
-    times = _times_to_end((len(poses) - 1) / fps)
+    seconds = (len(poses) - 1) / fps
+    times = seconds - np.arange(int(seconds * RATE + 1e-6), -1, -1) / RATE
     rotations, path = resample(quat.unroll(quat.normalize(turns)), roots, fps, times)
     none = np.zeros((len(times), len(character.feet)))
     return Passage(rotations, path, none, np.zeros(len(times)))
-
-
-def _times_to_end(seconds: float) -> Frames:
-    """Return times (F,), s, at `RATE` that end with a last one."""
-    return seconds - np.arange(int(seconds * RATE + 1e-6), -1, -1) / RATE
 
 
 def resample(

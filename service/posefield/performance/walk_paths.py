@@ -314,11 +314,6 @@ def turning(
     return FloorPath(complex(start.shift), start.turn + even, float(gone[-1]) / (count - 1))
 
 
-def place_of(point: Annotated[Floats, "2"]) -> complex:
-    """Return the place of a point x, z, m."""
-    return complex(point[1], point[0])
-
-
 def _slope(at: FloorMotion | None) -> Annotated[Floats, "2"] | None:
     return None if at is None else _plain(np.exp(1j * at.turn))
 

@@ -25,7 +25,6 @@ from posefield.performance import (
 )
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.speed_profile import SpeedRamps
-from posefield.performance.standing_pose import StandingPose
 from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import WalkNote, WalkRequest
@@ -40,77 +39,42 @@ SCALED_CYCLES = 2.0
 SYNTHESISED = "synthesised"
 """First word of the codes of notes about motion that no capture shows."""
 
-Phases = Annotated[Floats, "phases"]
-
-
-@dataclass(frozen=True)
-class PhasePlan:
-    """Phases of a walk (F,), without wrapping, the steps at its standing ends, and notes.
-
-    standing: None for a walk without such steps.
-    """
-
-    phases: Frames
-    standing: StandingEnds | None
-    notes: tuple[WalkNote, ...]
-
 
 def plan_phases(
     walker: Walker, distances: Frames, ways: Frames, phase: float, ends: tuple[str, str]
-) -> PhasePlan:
-    """Return the phases of a walk and the steps at its standing ends.
+) -> tuple[Frames, StandingEnds | None, list[WalkNote]]:
+    """Return the phases (F,) of a walk, without wrapping, steps at its standing ends, and notes.
 
-    distances: (F,), m. ways: lengths of the stride (F,), m. phase: at the first frame. ends:
-    whether the walk begins and ends "standing". A walk that is too short for an opening or a
-    closing step begins or ends in double support.
+    The steps are None for a walk without any. distances: (F,), m. ways: lengths of the stride (F,),
+    m. phase: at the first frame. ends: whether the walk begins and ends "standing". A walk that is
+    too short for an opening or a closing step begins or ends in double support.
     """
     steps = np.diff(distances) * 0.5 * (1.0 / ways[1:] + 1.0 / ways[:-1])
     gone = np.pad(np.cumsum(steps), (1, 0))
     begin, stop = (end == "standing" for end in ends)
     if not (begin or stop):
-        return PhasePlan(phase + gone, None, ())
+        return phase + gone, None, []
     pose = standing_pose.find_standing_pose(walker)
     wanted = begin and pose is not None, stop and pose is not None
     # Without room for a step, the phases are planned once more for a walk without it.
     for _ in range(2 if any(wanted) else 1):
         quiet = [pose.phases if pose and own else walker.double_supports for own in wanted]
-        phases, left = _tied(gone, phase, (quiet[0] if begin else None, quiet[1] if stop else None))
-        opening, closing = _frames(pose, phases, wanted)
+        first = phase + _to_nearest(phase, quiet[0]) if begin else phase
+        phases, left = first + gone, 0.0
+        if stop:
+            phases, left = _scaled(phases, _to_nearest(float(phases[-1]), quiet[1]))
+        closing = standing_steps.closing_frames(pose, phases) if pose and wanted[1] else 0
+        opening = standing_steps.opening_frames(pose, phases) if pose and wanted[0] else 0
+        opening = opening if opening + closing <= len(phases) else 0
         if (opening > 0, closing > 0) == wanted:
             break
         wanted = opening > 0, closing > 0
     standing = StandingEnds(pose, opening, closing) if pose and any(wanted) else None
     notes = [*_standing_notes(ends, wanted), *_left_notes(left, float(ways[-1]), wanted[1])]
-    return PhasePlan(phases, standing, tuple(notes))
+    return phases, standing, notes
 
 
-def _tied(
-    gone: Frames, phase: float, quiet: tuple[Phases | None, Phases | None]
-) -> tuple[Frames, float]:
-    """Return phases (F,) from those gone since the first frame, and what is left at the end.
-
-    quiet: phases at which the walk begins and ends standing; None for an end in motion.
-    """
-    begin, stop = quiet
-    first = phase if begin is None else phase + _to_nearest(phase, begin)
-    phases = first + gone
-    if stop is None:
-        return phases, 0.0
-    return _scaled(phases, _to_nearest(float(phases[-1]), stop))
-
-
-def _frames(
-    pose: StandingPose | None, phases: Frames, wanted: tuple[bool, bool]
-) -> tuple[int, int]:
-    """Return the frames of the opening and the closing step; 0 for one without room."""
-    if pose is None:
-        return 0, 0
-    closing = standing_steps.closing_frames(pose, phases) if wanted[1] else 0
-    opening = standing_steps.opening_frames(pose, phases) if wanted[0] else 0
-    return (opening if opening + closing <= len(phases) else 0), closing
-
-
-def _to_nearest(phase: float, quiet: Phases) -> float:
+def _to_nearest(phase: float, quiet: Annotated[Floats, "phases"]) -> float:
     """Return the signed difference from a phase to the nearest quiet one, in cycles."""
     if not len(quiet):
         return 0.0
@@ -200,11 +164,6 @@ class WalkPlan:
         """Return the number of frames."""
         return len(self.distances)
 
-    @property
-    def duration(self) -> float:
-        """Duration, s."""
-        return (len(self) - 1) / RATE
-
     def part(self, begin: int, end: int) -> "WalkPlan":
         """Return the frames from `begin` until before `end`, on the same path."""
         names = ("distances", "places", "headings", "phases", "controls", "speeds")
@@ -251,13 +210,13 @@ def plan_walk(
     done = walker.strides(own)
     ways = _between(len(distances), knots, np.abs(done.travels))
     ends = (request.start, request.stop)
-    phased = plan_phases(walker, distances, ways, phase, ends)
+    phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, ends)
     centres, tangents = path.at(distances)
     headings = tangents - _between(len(distances), knots, done.drifts)
     places = centres - np.exp(1j * headings) * _offsets(walker, controls)
-    fields = walker, path, distances, places, headings, phased.phases, controls, speeds
-    said = *notes, *pivots, *phased.notes
-    return WalkPlan(*fields, said, request.stop == "standing", phased.standing)
+    fields = walker, path, distances, places, headings, phases, controls, speeds
+    said = *notes, *pivots, *phase_notes
+    return WalkPlan(*fields, said, request.stop == "standing", standing)
 
 
 def _route(
@@ -347,11 +306,11 @@ def _destination(request: WalkRequest) -> Destination:
     if request.to is None:
         end = request.end or FloorMotion()
         return Destination("end", end.shift, end.turn)
-    point = np.array([check_number(f"to/{i}", value) for i, value in enumerate(request.to)])
+    x, z = (check_number(f"to/{i}", value) for i, value in enumerate(request.to))
     heading = request.arrive_heading
     if heading is not None:
         heading = check_number("arrive_heading", heading)
-    return Destination("to", walk_paths.place_of(point), heading)
+    return Destination("to", complex(z, x), heading)
 
 
 def _radii(gait: Gait, speeds: PerPoint) -> Radii:

@@ -37,17 +37,6 @@ class Disc:
     radius: float
 
 
-def check_discs(obstacles: Sequence[Disc]) -> None:
-    """Raise InvalidField for numbers that are not finite and for a radius that is not positive."""
-    for index, disc in enumerate(obstacles):
-        for name in ("x", "z", "radius"):
-            check_number(f"obstacles/{index}/{name}", getattr(disc, name))
-        if disc.radius <= 0.0:
-            raise InvalidField(
-                f"obstacles/{index}/radius", f"{disc.radius:g} m, expected more than 0"
-            )
-
-
 def check_clear(path: FloorPath, obstacles: Sequence[Disc]) -> None:
     """Raise InvalidField, with the place, if a path crosses a disc."""
     places = path.places if obstacles else np.zeros(0, complex)
@@ -195,6 +184,12 @@ def check_fields(request: WalkRequest) -> None:
     if request.detour and len(request.obstacles) > MAX_DISCS:
         found = len(request.obstacles)
         raise InvalidField("obstacles", f"{found}, expected at most {MAX_DISCS} with a detour")
-    check_discs(request.obstacles)
+    for index, disc in enumerate(request.obstacles):
+        for name in ("x", "z", "radius"):
+            check_number(f"obstacles/{index}/{name}", getattr(disc, name))
+        if disc.radius <= 0.0:
+            raise InvalidField(
+                f"obstacles/{index}/radius", f"{disc.radius:g} m, expected more than 0"
+            )
     check_number("acceleration", request.acceleration)
     check_range("acceleration", request.acceleration, 0.1, MAX_ACCELERATION, "m/s²")

@@ -98,7 +98,9 @@ def lead_to(
     cut = cycle.find_cut([cycle.exits])
     for _ in range(APPROACHES):
         cancellation.check()
-        rest = cycle.lies(cut).inverse().after(_trail(plan))
+        # The end of the path in the frame that travels with the walker there.
+        trail = _travelling(plan, -1).inverse().after(plan.end)
+        rest = cycle.lies(cut).inverse().after(trail)
         by = staged.by or staged.facing(staged.act.heading + _turn(plan, rest, by, staged.goal))
         plan = _plan_to(script, index, entry, by.after(rest), staged)
         if plan.closes:
@@ -124,19 +126,15 @@ def _turn(plan: WalkPlan, rest: FloorMotion, by: FloorMotion, goal: complex) -> 
     ends with a line, which turns about its begin when its end moves: it is the tangent from there
     to the circle about the goal on which the path ends.
     """
-    begin = plan.end.shift - _line(plan) * np.exp(1j * plan.end.turn)
+    bent = np.flatnonzero(np.abs(plan.path.curvatures) > BENT)
+    begins = plan.path.distances[bent[-1]] if len(bent) else 0.0
+    line = max(plan.path.length - float(begins), LINE_SHARE * plan.path.length)
+    begin = plan.end.shift - line * np.exp(1j * plan.end.turn)
     away = goal - begin
     point = np.exp(-1j * by.turn) * (goal - by.shift)
     aside = (np.exp(-1j * rest.turn) * (rest.shift - point)).imag
     heading = np.angle(away) + np.arcsin(np.clip(aside / max(abs(away), 1e-9), -1.0, 1.0))
     return float(heading - rest.turn)
-
-
-def _line(plan: WalkPlan) -> float:
-    """Return the length of the line with which the path of a plan ends, m, or a part of a curve."""
-    bent = np.flatnonzero(np.abs(plan.path.curvatures) > BENT)
-    begins = plan.path.distances[bent[-1]] if len(bent) else 0.0
-    return max(plan.path.length - float(begins), LINE_SHARE * plan.path.length)
 
 
 def _plan_to(
@@ -164,11 +162,6 @@ def _last_cycle(
 def _travelling(plan: WalkPlan, frame: int) -> FloorMotion:
     """Return the frame that travels with the walker."""
     return FloorMotion(float(plan.headings[frame]), complex(plan.places[frame]))
-
-
-def _trail(plan: WalkPlan) -> FloorMotion:
-    """Return the end of a plan's path in the frame that travels with the walker there."""
-    return _travelling(plan, -1).inverse().after(plan.end)
 
 
 def _gaps(phases: Annotated[Floats, "frames"], plan: WalkPlan) -> Annotated[Floats, "frames"]:
@@ -232,19 +225,11 @@ def add_walk(
     the model cannot do.
     """
     entry = find_entry(timeline, script, index)
+    own, source = walk_of(script, index)
     if ahead is None:
-        _, source = walk_of(script, index)
         plan = walk_plan.plan_walk(source.gait, entry.request, entry.start, entry.phase)
     else:
         plan, ahead = lead_to(timeline, script, index, entry, ahead)
-    _add(timeline, script, index, (plan, entry))
-    return ahead
-
-
-def _add(
-    timeline: Timeline, script: Script, index: int, planned: tuple[WalkPlan, WalkEntry]
-) -> None:
-    (own, source), (plan, entry) = walk_of(script, index), planned
     passage = script.adapted(
         index, walk_entries.walk_passage(source.model, plan, synthesis_settings(script.question))
     )
@@ -258,12 +243,12 @@ def _add(
         gaits = timeline.spans[-1].kind == "walk" if timeline.spans else False, True
         kind, seconds = choose_blend(own.join, gaits)
         first = timeline.join(index, passage, replace(entry.cut, entry=0), kind, seconds)
-    _record(timeline, script, plan, (index, first))
+    _record(timeline, script, plan, index, first)
+    return ahead
 
 
-def _record(timeline: Timeline, script: Script, plan: WalkPlan, place: tuple[int, int]) -> None:
-    """Add the span of a walk; place: its index, and the frame of its first one."""
-    index, first = place
+def _record(timeline: Timeline, script: Script, plan: WalkPlan, index: int, first: int) -> None:
+    """Add the span of a walk; first: the frame of its first one."""
     own, source = walk_of(script, index)
     card, notes = source.model.session.card, [note.message for note in plan.notes]
     for note in plan.notes:

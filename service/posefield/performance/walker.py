@@ -173,25 +173,20 @@ def find_walker(
     """
     card = gait.session.card
     weights = label_weights(card, None, labels)
-    given = dict(_given(card, name, value) for name, value in controls.items())
-    return Walker(gait, weights, _label_offset(gait, labels), given)
-
-
-def _label_offset(gait: Gait, labels: Mapping[str, LabelValue]) -> Annotated[Floats, "controls"]:
-    """Return the mean residual (d,) of the controls for requested labels; zeros for none."""
-    shares = walker_labels.requested_labels(gait.session.card, labels).shares if labels else None
-    if shares is None or not shares.any():
-        return np.zeros(gait.performer_offsets.shape[1])
-    return np.asarray(shares @ gait.performer_offsets[:-1] / max(1.0, shares.sum()))
-
-
-def _given(card: ModelCard, name: str, value: float) -> tuple[int, float]:
     names = [control.name for control in card.controls]
-    field = f"controls/{name}"
-    if name not in names:
-        found = f"unknown control{did_you_mean(name, names)}"
-        raise InvalidField(field, f"{found}, expected one of {', '.join(names)}")
-    own = card.controls[names.index(name)]
-    found_value = check_number(field, value)
-    check_range(field, found_value, own.minimum, own.maximum, own.unit)
-    return names.index(name), found_value
+    given = {}
+    for name, value in controls.items():
+        field = f"controls/{name}"
+        if name not in names:
+            found = f"unknown control{did_you_mean(name, names)}"
+            raise InvalidField(field, f"{found}, expected one of {', '.join(names)}")
+        own = card.controls[names.index(name)]
+        number = check_number(field, value)
+        check_range(field, number, own.minimum, own.maximum, own.unit)
+        given[names.index(name)] = number
+    # The mean residual of the controls for the labels; zeros for none.
+    offset = np.zeros(gait.performer_offsets.shape[1])
+    shares = walker_labels.requested_labels(card, labels).shares if labels else None
+    if shares is not None and shares.any():
+        offset = np.asarray(shares @ gait.performer_offsets[:-1] / max(1.0, shares.sum()))
+    return Walker(gait, weights, offset, given)

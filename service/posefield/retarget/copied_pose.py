@@ -7,7 +7,6 @@ where the motion's are. Some files are at rest with all bones along one axis, or
 point down: their motions get an upright reference pose with flat feet first.
 """
 
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -176,7 +175,9 @@ def copy_orientations(
             for joint, place in zip(mine.joints, mine.places.tolist(), strict=True):
                 world[joint] = quat.mul(_along(theirs, turns, place), whole)
     for joint, namesake in _namesakes(source, rig, set(world)).items():
-        if (above := _nearest(rig.parents, joint, aligned_joints)) is not None:
+        chain = joint_chain(rig.parents, joint)[-2::-1]
+        above = next((own for own in chain if own in aligned_joints), None)
+        if above is not None:
             world[joint] = quat.mul(turns[:, namesake], aligned_joints[above])
     return _local(rig.parents, world, len(turns))
 
@@ -190,11 +191,6 @@ def _namesakes(source: Body, rig: Body, known: set[int]) -> dict[int, int]:
         for joint, name in enumerate(rig.names)
         if joint not in known and name in free
     }
-
-
-def _nearest(parents: tuple[int, ...], joint: int, some: Collection[int]) -> int | None:
-    """Return the nearest of some joints above a joint; None without one."""
-    return next((own for own in joint_chain(parents, joint)[-2::-1] if own in some), None)
 
 
 def _along(chain: Chain, turns: Annotated[Floats, "frames _ 4"], place: float) -> Floats:

@@ -93,9 +93,6 @@ class RetargetReport:
         return found
 
 
-PERCENTILE = 99.0
-
-
 def measure(feet: SourceFeet, made: PlantedLegs, scale: float, rate: float) -> RetargetReport:
     """Return the report on a motion with planted feet, without its roles, hands and warnings.
 
@@ -113,7 +110,7 @@ def measure(feet: SourceFeet, made: PlantedLegs, scale: float, rate: float) -> R
         skate=after,
         legs_turned=legs_turned(made.copied, made.rig),
         lowered=float(made.lowered.max()),
-        penetration=penetration(made.depths),
+        penetration=float(np.percentile(np.maximum(made.depths, 0.0), 99.0)),
     )
 
 
@@ -139,11 +136,6 @@ def legs_turned(copied: PosedRig, made: PosedRig) -> float:
             ends = [own.of_role(side + lower) - own.of_role(side + upper) for own in (copied, made)]
             angles.append(np.linalg.norm(quat.log(shortest_turn(*ends)), axis=-1))
     return float(np.mean(angles))
-
-
-def penetration(depths: Annotated[Floats, "frames feet"]) -> float:
-    """Return the 99th percentile of the depths (F, 2) of soles below the floor, m."""
-    return float(np.percentile(np.maximum(depths, 0.0), PERCENTILE))
 
 
 FADE = 0.4
@@ -217,18 +209,14 @@ def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
 
 def misses(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> tuple[float, ...]:
     """Return the largest distance of each hand from its goal, m."""
-    return tuple(
-        float(np.linalg.norm(goal.position - path, axis=-1).max())
-        for goal in goals
-        for path in [_at(rig.of_role(goal.role), _frames(goal, rate))]
-    )
-
-
-def _frames(goal: HandGoal, rate: float) -> Annotated[Floats, "places"]:
-    """Return the fractional frames of a goal: its first and last, and all between them."""
-    first, last = goal.time * rate, goal.end * rate
-    between = np.arange(np.floor(first) + 1.0, np.ceil(last))
-    return np.concatenate([[first], between, [last]])
+    found = []
+    for goal in goals:
+        # Its first and last frame, which may be fractional, and all between them.
+        first, last = goal.time * rate, goal.end * rate
+        between = np.arange(np.floor(first) + 1.0, np.ceil(last))
+        path = _at(rig.of_role(goal.role), np.concatenate([[first], between, [last]]))
+        found.append(float(np.linalg.norm(goal.position - path, axis=-1).max()))
+    return tuple(found)
 
 
 SAME_BONE = 1e-4
@@ -252,12 +240,12 @@ def retarget(
 
     roles: joint of the clip by role, of the model's card; recognised by names where it has none.
     The result has the rig's skeleton in metres with Y up, identity rotations at rest, constant bone
-    offsets and a moving root, as clips of models have; `Rig.file_rotations` and
-    `Rig.file_translations` give the values of the rig's file. Curves stay. Raises InvalidField
-    for a motion without hips and two legs.
+    offsets and a moving root, as clips of models have; `Rig.rest` gives the values of the rig's
+    file. Curves stay. Raises InvalidField for a motion without hips and two legs.
     """
     source = role_map.body_of_motion(clip.skeleton, clip.translations[0], roles)
-    body = role_map.body_of_rig(rig)
+    joints = rig.skeleton
+    body = Body(joints.names, joints.parents, joints.offsets, rig.joints)
     motion = PosedRig(
         source,
         clip.rotations,
@@ -268,15 +256,17 @@ def retarget(
     scale = body.leg_length / source.leg_length
     motion = _scaled(motion, scale, scale if settings.travel == "scaled" else 1.0)
     feet = _feet(motion, body, clip, settings)
-    ground = _ground(motion, body, feet, scale)
-    made = _planted(motion, body, feet, ground, clip.rate)
+    soles, higher, below = _ground(motion, body, feet, scale)
+    rotations = copied_pose.copy_orientations(motion.body, body, motion.turns, soles)
+    still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
+    copied = planted_legs.moved(still, _hips(motion) + higher * UP - _hips(still))
+    made = planted_legs.plant(copied, feet, below, clip.rate)
     check_goals(settings.hands, made.rig, clip.rate)
     final = meet_goals(made.rig, settings.hands, clip.rate)
-    found = clips.assemble(
-        rig.skeleton, final.rotations, final.roots, rig.skeleton.offsets, clip.rate
-    )
-    report = measure(feet, made, ground.scale, clip.rate)
-    mapped, missing = _mapped(source, body)
+    found = clips.assemble(joints, final.rotations, final.roots, joints.offsets, clip.rate)
+    report = measure(feet, made, scale, clip.rate)
+    mapped = tuple(role for role in source.joints if role in body.joints)
+    missing = tuple(role for role in source.joints if role not in body.joints)
     missed = misses(final, settings.hands, clip.rate)
     warnings = (*rig.notes, *_warnings(missing, settings.hands, missed))
     return Retargeted(
@@ -312,23 +302,14 @@ def _feet(motion: PosedRig, body: Body, clip: Clip, settings: RetargetSettings) 
     return planted_legs.feet_of(paths, clip.rate, roles, names, settings.stances)
 
 
-@dataclass(frozen=True)
-class _Ground:
-    """Ground contact of a motion's and of a rig's feet.
+def _ground(
+    motion: PosedRig, body: Body, feet: SourceFeet, scale: float
+) -> tuple[Soles, float, RigSoles]:
+    """Return the soles of a motion and of a rig, left and right, and how they stand.
 
-    scale: length of the rig's legs over that of the motion's. soles: of the motion's and the rig's
-    left and right foot. higher: ankles of the rig above those of the motion in proportion, m.
-    below: heights and heels of the rig.
+    Second is how much higher ankles of the rig are than those of the motion in proportion, m, then
+    the heights and heels of the rig. scale: length of the rig's legs over that of the motion's.
     """
-
-    scale: float
-    soles: Soles
-    higher: float
-    below: RigSoles
-
-
-def _ground(motion: PosedRig, body: Body, feet: SourceFeet, scale: float) -> _Ground:
-    """Return how the feet of a motion and of a rig stand."""
     heights, standing = planted_legs.standing_heights(feet, body), feet.standing
     ours = [copied_pose.sole_at_rest(body, side) for side in SIDES]
     theirs = [
@@ -346,23 +327,7 @@ def _ground(motion: PosedRig, body: Body, feet: SourceFeet, scale: float) -> _Gr
     bones = motion.body.leg_bones, body.leg_bones
     limited = len(bones[0]) != len(bones[1]) or not np.allclose(*bones, rtol=0.0, atol=SAME_BONE)
     below = RigSoles(heights, np.stack(heels), limited)
-    return _Ground(scale, (left, right), higher, below)
-
-
-def _planted(
-    motion: PosedRig, body: Body, feet: SourceFeet, ground: _Ground, rate: float
-) -> PlantedLegs:
-    """Return the rig with copied orientations, and its feet on their paths."""
-    rotations = copied_pose.copy_orientations(motion.body, body, motion.turns, ground.soles)
-    still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
-    rig = planted_legs.moved(still, _hips(motion) + ground.higher * UP - _hips(still))
-    return planted_legs.plant(rig, feet, ground.below, rate)
-
-
-def _mapped(source: Body, rig: Body) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the roles of a motion that a rig has, and those that it lacks."""
-    found = tuple(role for role in source.joints if role in rig.joints)
-    return found, tuple(role for role in source.joints if role not in rig.joints)
+    return (left, right), higher, below
 
 
 def _warnings(

@@ -12,7 +12,7 @@ from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton, joint_chain
-from posefield.rigs.rig import NEEDED, Rig, facing_of
+from posefield.rigs.rig import NEEDED, facing_of
 from posefield.roles import joint_recognition
 
 SIDES = joint_recognition.SIDES
@@ -72,9 +72,9 @@ class Body:
     def spine(self) -> "Chain":
         """Return the joints of the trunk above the hips, up to those that carry arms or neck."""
         start = self.joints["hips"]
-        tops = [self._parent(role) for role in ("neck", "head", "leftUpperArm", "rightUpperArm")]
+        top = self._parent("neck") or self._parent("head")
         named = [self.joints.get(role) for role in ("spine", "chest", "upperChest")]
-        ends = [joint for joint in (*named, tops[0] or tops[1]) if joint is not None]
+        ends = [joint for joint in (*named, top) if joint is not None]
         paths = [self._between(start, joint) for joint in ends]
         longest = max(paths, key=len, default=())
         return Chain(longest, _places(self.bones, longest))
@@ -135,9 +135,3 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
     own = bones.copy()
     own[0] = 0.0
     return Body(skeleton.names, skeleton.parents, own, joints)
-
-
-def body_of_rig(rig: Rig) -> Body:
-    """Return the body of a rig."""
-    own = rig.skeleton
-    return Body(own.names, own.parents, own.offsets, rig.joints)

@@ -79,26 +79,22 @@ def load(content: bytes, source: str, beside: Beside) -> GltfDocument:
     version = facts.get("asset", {}).get("version") if isinstance(facts, dict) else None
     if not isinstance(version, str) or version.partition(".")[0] != str(VERSION):
         raise MotionFileError(source, f"found version {version!r} of glTF, expected 2.0")
-    unread = [name for name in facts.get("extensionsRequired", []) if not _is_harmless(name)]
+    unread = [
+        name
+        for name in facts.get("extensionsRequired", [])
+        if name not in READ_EXTENSIONS and not str(name).startswith(IGNORED_PREFIXES)
+    ]
     if unread:
         raise MotionFileError(
             source,
             f"requires the extensions {', '.join(map(str, unread))}, expected none that compress "
             "or replace animations: export it without",
         )
-    return GltfDocument(source, _parse(text), binary, beside)
-
-
-def _is_harmless(name: Any) -> bool:
-    return name in READ_EXTENSIONS or str(name).startswith(IGNORED_PREFIXES)
-
-
-def _parse(text: bytes) -> Any:
-    """Return the objects of pygltflib."""
     with warnings.catch_warnings():
         # It warns of what it fills in for fields that are null or missing.
         warnings.simplefilter("ignore")
-        return pygltflib.GLTF2.gltf_from_json(text.decode())
+        parts = pygltflib.GLTF2.gltf_from_json(text.decode())
+    return GltfDocument(source, parts, binary, beside)
 
 
 def _chunks(content: bytes, source: str) -> tuple[bytes, bytes]:

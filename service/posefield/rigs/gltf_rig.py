@@ -36,16 +36,7 @@ class GltfJoints:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class NodeTransform:
-    """Transform of a node at rest: rotation w x y z, translation and scale."""
-
-    rotation: Floats
-    translation: Floats
-    scale: Floats
-
-
-def node_transform(document: GltfDocument, index: int) -> NodeTransform:
+def node_transform(document: GltfDocument, index: int) -> OuterTransform:
     """Return the transform of a node; MotionFileError for a matrix that skews or mirrors."""
     node = document.parts.nodes[index]
     if node.matrix is not None and list(node.matrix) != np.eye(4).ravel().tolist():
@@ -55,15 +46,15 @@ def node_transform(document: GltfDocument, index: int) -> NodeTransform:
     if not np.linalg.norm(turn) > 0.0:
         raise document.error(f"node {index} has rotation 0, expected a unit quaternion")
     place = np.array(node.translation or (0, 0, 0), float)
-    return NodeTransform(quat.normalize(turn), place, np.array(node.scale or (1, 1, 1), float))
+    return OuterTransform(quat.normalize(turn), place, np.array(node.scale or (1, 1, 1), float))
 
 
-def _of_matrix(document: GltfDocument, index: int, matrix: Floats) -> NodeTransform:
+def _of_matrix(document: GltfDocument, index: int, matrix: Floats) -> OuterTransform:
     sizes = np.linalg.norm(matrix[:3, :3], axis=0)
     axes = matrix[:3, :3] / np.maximum(sizes, 1e-30)
     if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-3 or np.linalg.det(axes) < 0.0:
         raise document.error(f"node {index} has a matrix that skews or mirrors, expected neither")
-    return NodeTransform(quat.from_matrix(axes), matrix[:3, 3], sizes)
+    return OuterTransform(quat.from_matrix(axes), matrix[:3, 3], sizes)
 
 
 def joints_of(document: GltfDocument, animated: Iterable[int]) -> GltfJoints:
@@ -264,18 +255,10 @@ MAX_BYTES = 1_000_000_000
 """Limit of a file or buffer."""
 
 
-@dataclass(frozen=True)
-class GltfRig:
-    """Joints of a glTF file. nodes: of the joints. skins: of the file."""
-
-    rest: RestJoints
-    nodes: tuple[int, ...]
-    skins: tuple[int, ...]
-    notes: tuple[str, ...]
-
-
-def read(path: Path, source: str) -> GltfRig:
-    """Return the joints of the skins of a .glb or .gltf file.
+def read(
+    path: Path, source: str
+) -> tuple[RestJoints, tuple[str, ...], tuple[int, ...], tuple[str, ...]]:
+    """Return the joints of the skins of a .glb or .gltf file, their nodes, the skins and notes.
 
     source: name of the file in messages. Raises MotionFileError for a file without a skin, with
     several skeletons, and for animated nodes above the skeleton or animated scales.
@@ -295,8 +278,7 @@ def read(path: Path, source: str) -> GltfRig:
     local = [node_transform(document, node) for node in joints.nodes]
     outer = OuterTransform(quat.IDENTITY, np.zeros(3), np.ones(3))
     for node in reversed(joints.outer):
-        own = node_transform(document, node)
-        outer = outer.inside(OuterTransform(own.rotation, own.translation, own.scale))
+        outer = outer.inside(node_transform(document, node))
     turns = joints.rest_rotations.copy()
     # The reader gives the first joint's rotation in the world.
     turns[0] = quat.mul(quat.conj(outer.rotation), turns[0])
@@ -311,7 +293,8 @@ def read(path: Path, source: str) -> GltfRig:
         1.0,
         "y",
     )
-    return GltfRig(rest, joints.nodes, tuple(range(len(document.parts.skins))), joints.notes)
+    skins = tuple(range(len(document.parts.skins)))
+    return rest, tuple(map(str, joints.nodes)), skins, joints.notes
 
 
 def _content(path: Path) -> bytes:

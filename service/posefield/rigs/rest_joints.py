@@ -9,7 +9,7 @@ rest pose keep their directions.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -69,24 +69,21 @@ def plain_motion(joints: PosedJoints) -> PlainMotion:
     Raises MotionFileError for a scale that is animated, uneven or mirrored.
     """
     sizes = _constant_scales(joints)
-    above = _products(joints.parents, sizes)
-    own = replace(joints, rotations=quat.normalize(joints.rotations))
-    turns = _rest_orientations(joints)
-    parents = np.array(joints.parents)
-    outer = np.concatenate([quat.IDENTITY[None], turns[parents[1:]]])
-    rotations = quat.mul(quat.mul(outer, own.rotations), quat.conj(turns))
-    translations = quat.rotate(outer, above[:, None] * own.translations)
-    offsets = quat.rotate(outer, above[:, None] * own.rest_translations)
-    skeleton = Skeleton(joints.names, joints.parents, offsets, (), np.zeros((0, 3)))
-    return PlainMotion(skeleton, rotations, translations)
-
-
-def _rest_orientations(joints: PosedJoints) -> Floats:
-    """Return the orientations (J, 4) of the joints at rest in the file's world."""
+    # Products (J,) of the scales of each joint's ancestors.
+    above = np.ones(len(sizes))
+    for joint, parent in enumerate(joints.parents[1:], start=1):
+        above[joint] = above[parent] * sizes[parent]
+    # Orientations (J, 4) of the joints at rest in the file's world.
     turns = quat.normalize(joints.rest_rotations)
     for joint, parent in enumerate(joints.parents[1:], start=1):
         turns[joint] = quat.normalize(quat.mul(turns[parent], turns[joint]))
-    return turns
+    parents = np.array(joints.parents)
+    outer = np.concatenate([quat.IDENTITY[None], turns[parents[1:]]])
+    rotations = quat.mul(quat.mul(outer, quat.normalize(joints.rotations)), quat.conj(turns))
+    translations = quat.rotate(outer, above[:, None] * joints.translations)
+    offsets = quat.rotate(outer, above[:, None] * joints.rest_translations)
+    skeleton = Skeleton(joints.names, joints.parents, offsets, (), np.zeros((0, 3)))
+    return PlainMotion(skeleton, rotations, translations)
 
 
 def _constant_scales(joints: PosedJoints) -> Floats:
@@ -107,14 +104,6 @@ def _constant_scales(joints: PosedJoints) -> Floats:
     return np.where(np.abs(usual - 1.0) <= SCALE_TOLERANCE, 1.0, usual)
 
 
-def _products(parents: tuple[int, ...], sizes: Floats) -> Floats:
-    """Return the product (J,) of the scales of each joint's ancestors."""
-    above = np.ones(len(sizes))
-    for joint, parent in enumerate(parents[1:], start=1):
-        above[joint] = above[parent] * sizes[parent]
-    return above
-
-
 Z_UP = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(-0.5 * np.pi))
 """Rotation of the axes of a file with Z up: (x, y, z) becomes (x, z, -y)."""
 
@@ -124,7 +113,7 @@ MAX_JOINTS = 1000
 
 @dataclass(frozen=True)
 class OuterTransform:
-    """Transform from the root joint's parent to the file's world: scale, rotation, translation."""
+    """Scale, rotation and translation of a node, or from the root's parent to the file's world."""
 
     rotation: Floats
     translation: Floats

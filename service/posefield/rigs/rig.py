@@ -1,4 +1,4 @@
-"""Rig: the skeleton of a character's file, with the roles of its joints.
+"""Rig: the skeleton of a character's USD or glTF file, with the roles of its joints.
 
 Roles are recognised or stated; refusals say what to state.
 """
@@ -7,16 +7,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions, Rotations, Vector
+from posefield.common.array_shapes import Vector
 from posefield.common.errors import MotionFileError
 from posefield.common.name_suggestion import did_you_mean
-from posefield.motion.clip import Clip
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.skeleton import Skeleton, joint_chain
+from posefield.rigs import rest_joints
 from posefield.rigs.rest_joints import RestJoints
 from posefield.roles import joint_recognition
 from posefield.roles.joint_recognition import LOWEST_CONFIDENCE, SIDES, RoleGuess
@@ -35,27 +36,15 @@ LEG_LENGTHS = (0.2, 2.5)
 """Usual lengths of the legs of characters, m."""
 
 
-@dataclass(frozen=True)
-class RigRoles:
-    """Roles of a rig's joints.
-
-    guesses: joint by role. facing: of the body at rest, rad, to the left of +Z. notes: on roles
-    that are left out, and on an unusual size.
-    """
-
-    guesses: Mapping[str, RoleGuess]
-    facing: float
-    notes: tuple[str, ...]
-
-
 def find_roles(
     source: str, skeleton: Skeleton, paths: Sequence[str], stated: Mapping[str, str]
-) -> RigRoles:
-    """Return the roles of a rig's joints.
+) -> tuple[dict[str, RoleGuess], float, tuple[str, ...]]:
+    """Return the joint of a rig by role, the facing at rest, rad, to the left of +Z, and notes.
 
-    paths (J,): other names by which joints may be stated. stated: joint by role; others are
-    recognised. Raises MotionFileError for unknown roles and joints, for a body without hips and two
-    legs, and for roles of limbs that are not sure.
+    Notes are on roles that are left out, and on an unusual size. paths (J,): other names by which
+    joints may be stated. stated: joint by role; others are recognised. Raises MotionFileError for
+    unknown roles and joints, for a body without hips and two legs, and for roles of limbs that are
+    not sure.
     """
     told = _stated(source, skeleton, paths, stated)
     seen = joint_recognition.recognise(skeleton.names, skeleton.parents)
@@ -76,7 +65,8 @@ def find_roles(
         f"{LOWEST_CONFIDENCE}): left out, {HOW}"
         for role, own in unsure.items()
     )
-    return RigRoles(found, _facing(skeleton, found), notes + _notes_on_size(skeleton, found))
+    left, right = (_position(skeleton, found[side + "UpperLeg"]) for side in SIDES)
+    return found, facing_of(left - right), notes + _notes_on_size(skeleton, found)
 
 
 def _stated(
@@ -144,12 +134,6 @@ def _check_order(source: str, skeleton: Skeleton, roles: Mapping[str, RoleGuess]
                 )
 
 
-def _facing(skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> float:
-    """Return the direction in which the body faces at rest, rad, to the left of +Z."""
-    left, right = (_position(skeleton, roles[side + "UpperLeg"]) for side in SIDES)
-    return facing_of(left - right)
-
-
 def facing_of(across: Vector) -> float:
     """Return the direction in which a body faces, rad, to the left of +Z.
 
@@ -176,9 +160,6 @@ def _position(skeleton: Skeleton, guess: RoleGuess) -> Vector:
     return positions
 
 
-RigFormat = Literal["USD", "glTF"]
-
-
 @dataclass(frozen=True)
 class Rig:
     """Skeleton of a character's file.
@@ -191,7 +172,7 @@ class Rig:
     """
 
     path: Path
-    format: RigFormat
+    format: Literal["USD", "glTF"]
     joint_paths: tuple[str, ...]
     skeleton_path: str
     skins: tuple[int, ...]
@@ -211,13 +192,43 @@ class Rig:
         names = self.rest.names
         return {role: names.index(guess.joint) for role, guess in self.roles.items()}
 
-    def file_rotations(self, clip: Clip) -> Rotations:
-        """Return a clip's rotations (F, J, 4) as the file's joints have them, w x y z.
 
-        clip: with the rig's skeleton. Each is local to the parent joint; the root's to its prim.
-        """
-        return self.rest.file_rotations(clip.rotations)
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+GLTF_SUFFIXES = (".glb", ".gltf")
+SUFFIXES = (*USD_SUFFIXES, *GLTF_SUFFIXES)
+"""Suffixes of the files that are read, in lower case."""
+NONE_STATED: Mapping[str, str] = MappingProxyType({})
 
-    def file_translations(self, clip: Clip) -> Positions:
-        """Return a clip's translations (F, J, 3) as the file's joints have them, in its unit."""
-        return self.rest.file_translations(clip.translations)
+
+def read_rig(path: Path, roles: Mapping[str, str] = NONE_STATED) -> Rig:
+    """Return the rig of a character's file.
+
+    roles: names of joints by role, or their paths in the file, where they are not to be
+    recognised. Raises MotionFileError for a file that is none or cannot be read, without a
+    skeleton or with several, without two legs, for scales that are animated, uneven or mirrored,
+    and for roles that are not sure, with the way out.
+    """
+    suffix, source = path.suffix.lower(), str(path)
+    if suffix not in SUFFIXES:
+        raise MotionFileError(
+            source, f"found the suffix {suffix!r}, expected one of {', '.join(SUFFIXES)}"
+        )
+    try:
+        path.open("rb").close()
+    except OSError as fault:
+        raise MotionFileError(path, f"cannot be read: {fault.strerror}") from fault
+    if suffix in USD_SUFFIXES:
+        with rest_joints.naming_faults(source, RuntimeError, ValueError, TypeError):
+            # usd-core takes 0.12 s to import.
+            from posefield.rigs import usd_rig
+
+            rest, paths, prim, notes = usd_rig.read(path, source)
+            guesses, facing, said = find_roles(source, rest.skeleton, paths, roles)
+            return Rig(path, "USD", paths, prim, (), rest, guesses, facing, notes + said)
+    with rest_joints.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
+        # pygltflib takes 0.1 s to import.
+        from posefield.rigs import gltf_rig
+
+        rest, paths, skins, notes = gltf_rig.read(path, source)
+        guesses, facing, said = find_roles(source, rest.skeleton, paths, roles)
+        return Rig(path, "glTF", paths, "", skins, rest, guesses, facing, notes + said)

@@ -140,20 +140,11 @@ SHOWN = 20
 """Skeletons that a message lists."""
 
 
-@dataclass(frozen=True)
-class UsdRig:
-    """Joints of a USD file. paths: tokens of its `joints`. prim: path of its Skeleton."""
-
-    rest: RestJoints
-    paths: tuple[str, ...]
-    prim: str
-    notes: tuple[str, ...]
-
-
-def read(path: Path, source: str) -> UsdRig:
+def read(path: Path, source: str) -> tuple[RestJoints, tuple[str, ...], str, tuple[str, ...]]:
     """Return the joints of a .usd, .usda, .usdc or .usdz file.
 
-    source: name of the file in messages. Raises MotionFileError for a file without a skeleton or
+    Further the tokens of its `joints`, the path of its Skeleton, and notes. source: name of the
+    file in messages. Raises MotionFileError for a file without a skeleton or
     with several, and for a skeleton whose prim moves over time.
     """
     opened = open_stage(path, source)
@@ -176,7 +167,10 @@ def read(path: Path, source: str) -> UsdRig:
     unit = float(UsdGeom.GetStageMetersPerUnit(stage))
     rest = RestJoints(source, names, parents, turns, places, sizes, outer, unit, up)
     paths = tuple(str(own) for own in joints.query.GetJointOrder())
-    return UsdRig(rest, paths, str(joints.prim.GetPath()), _notes(opened, unit))
+    notes: tuple[str, ...] = ()
+    if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+        notes = (f"the file states no metersPerUnit, {unit:g} is USD's default",)
+    return rest, paths, str(joints.prim.GetPath()), notes
 
 
 def _only_skeleton(opened: SkelStage) -> SkelJoints:
@@ -193,10 +187,3 @@ def _only_skeleton(opened: SkelStage) -> SkelJoints:
     if not query:
         raise opened.error(f"skeleton {prim.GetPath()} is not valid: {fault_of(prim)}")
     return SkelJoints(opened.source, prim, query)
-
-
-def _notes(opened: SkelStage, unit: float) -> tuple[str, ...]:
-    """Return a note on a unit that is the format's default."""
-    if UsdGeom.StageHasAuthoredMetersPerUnit(opened.stage):
-        return ()
-    return (f"the file states no metersPerUnit, {unit:g} is USD's default",)

@@ -70,14 +70,11 @@ def trunk_roles(tree: Tree, upper_legs: Sequence[int], arms: Sequence[int]) -> d
     """
     chest = tree.common(arms) if len(arms) == 2 else None
     head = tree.first(frozenset({"head"}))
-    neck = _named_neck(tree, head)
+    neck, sure = _named_neck(tree, head), NAMED
     if head is None and neck is None and chest is not None:
-        neck, head = _unnamed_neck(tree, chest)
-        found = {"neck": LimbJoint(neck, ONE_OF_MANY)} if neck is not None else {}
-        found |= {"head": LimbJoint(head, ONE_OF_MANY)} if head is not None else {}
-    else:
-        found = {"neck": LimbJoint(neck, NAMED)} if neck is not None else {}
-        found |= {"head": LimbJoint(head, NAMED)} if head is not None else {}
+        (neck, head), sure = _unnamed_neck(tree, chest), ONE_OF_MANY
+    found = {"neck": LimbJoint(neck, sure)} if neck is not None else {}
+    found |= {"head": LimbJoint(head, sure)} if head is not None else {}
     top = next((joint for joint in (neck, head, chest) if joint is not None), None)
     hips = _hips(tree, upper_legs, top)
     if hips is None:

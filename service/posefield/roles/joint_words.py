@@ -159,13 +159,9 @@ def _take_side(words: list[str]) -> tuple[str, list[str]]:
     joined = "".join(words)
     if joined not in KNOWN:
         for letter, rest in ((joined[:1], joined[1:]), (joined[-1:], joined[:-1])):
-            if letter in ("l", "r") and _is_limb(rest):
+            if letter in ("l", "r") and rest in KNOWN | HELPERS | DIGITS:
                 return SIDES[letter], [rest]
     return "", words
-
-
-def _is_limb(word: str) -> bool:
-    return word in KNOWN or word in HELPERS or word in DIGITS
 
 
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand", "Fingers")
@@ -199,7 +195,10 @@ def align_limb(
     paths: joints of one side from the root to each leaf. words: of all joints. The confidence
     follows from the score of the best alignment in which the role has another joint or none.
     """
-    ways = list(dict.fromkeys(tuple(_named(path, words, roles)) for path in paths))
+    ways = dict.fromkeys(
+        tuple(joint for joint in path if any(words[joint].score(role) for role in roles))
+        for path in paths
+    )
     scored = [(way, _scores(way, words, roles)) for way in ways if way]
     best: dict[str, int] = {}
     top = 0.0
@@ -222,10 +221,6 @@ def _pieces(way: Sequence[int], joint: int, words: Sequence[JointWord]) -> froze
     if joint not in way:
         return frozenset()
     return frozenset(at for at, other in enumerate(way) if words[other] == words[joint])
-
-
-def _named(path: Sequence[int], words: Sequence[JointWord], roles: Sequence[str]) -> list[int]:
-    return [joint for joint in path if any(words[joint].score(role) for role in roles)]
 
 
 def _scores(way: Sequence[int], words: Sequence[JointWord], roles: Sequence[str]) -> Scores:

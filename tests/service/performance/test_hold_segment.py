@@ -140,7 +140,7 @@ AHEAD = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def posed(model_path):
-    """Looker of the reaching model and a pose: rotations (J, 4) and root (3,)."""
+    """Body of the reaching model and a pose: rotations (J, 4) and root (3,)."""
     model = acting.measured_reach(Synthesizer("reach", session.load(model_path)))
     act = act_motion.act_passage(model, MotionQuestion(controls={"target_height": 1.5}))
     body = acting.body(model, act.bones)
@@ -157,9 +157,7 @@ def seen(body, rotations, root):
 
 def turned(body, own, point):
     rotations, root = own.rotations[-1], own.roots[-1]
-    found = gaze.Looker(body.parents, body.bones, body.joints, body.facing).look_at(
-        rotations, root, np.array(point)
-    )
+    found = body.look_at(rotations, root, np.array(point))
     after = found.add(body.parents, rotations[None], np.ones(1))[0]
     return found, after, root
 

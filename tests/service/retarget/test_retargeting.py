@@ -12,7 +12,7 @@ from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
 from posefield.retarget import planted_legs
 from posefield.retarget.retargeting import HandGoal, RetargetSettings, retarget
-from posefield.rigs.rig_reader import read_rig
+from posefield.rigs.rig import read_rig
 
 ROUNDING = 1e-5
 """Rounding of poses in single precision, m: the model's rotations are unit to 1e-7."""

@@ -6,7 +6,7 @@ import rig_files
 
 from posefield.common.errors import MotionFileError
 from posefield.motion import quat, skeleton
-from posefield.rigs.rig_reader import read_rig
+from posefield.rigs.rig import read_rig
 
 
 @pytest.fixture
@@ -35,7 +35,8 @@ def test_all_formats_give_the_same_skeleton(figure, files, kind):
 def test_values_of_a_file_pose_its_joints_as_the_clip(walk, files, kind):
     """Forward kinematics in the file's own joints, unit and axes against that of the clip."""
     rig = read_rig(files[kind])
-    turns, places = rig.file_rotations(walk), rig.file_translations(walk)
+    turns = rig.rest.file_rotations(walk.rotations)
+    places = rig.rest.file_translations(walk.translations)
     found = skeleton.positions(walk.skeleton.parents, turns, places)
     unit = {"glb": 0.01, "usda": 1.0, "cm, z up": 0.01}[kind]
     found = unit * found
