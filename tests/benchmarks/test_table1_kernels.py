@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from paper import kernels, poses, precomputation
-from timing import in_turn
 
 from posefield_train.tensor.decoder import Decoder
 
@@ -60,11 +59,3 @@ def test_solve_is_what_the_system_says(rng):
     kernels.solve(np.ascontiguousarray(columns[0]), order[0], inverse[0], b, out)
     assert np.abs(system @ out - b).max() < 1e-12
     assert len(set(order[0])) == 9 and list(order[0]) != list(range(9)), "rows change places"
-
-
-def test_timing_takes_turns_and_the_median():
-    called = []
-    runs = {name: lambda name=name: called.append(name) for name in "ab"}
-    taken = in_turn(runs, rounds=3, repeats=2)
-    assert "".join(called) == "ab" + "aabb" * 3
-    assert set(taken) == {"a", "b"} and min(taken.values()) >= 0.0

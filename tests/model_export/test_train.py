@@ -196,45 +196,8 @@ def test_sigma_says_how_far_the_truth_may_lie(trained, examples, rng):
     assert 0.4 < np.median(errors / answer.sigma) < 1.2
 
 
-def with_controls(examples, column, values):
-    changed = []
-    for example, value in zip(examples, values, strict=True):
-        controls = example.controls.copy()
-        controls[column] = value
-        changed.append(replace(example, controls=controls))
-    return changed
-
-
 def test_equal_controls_without_a_nugget_are_refused(small_recipe, few, full_ranks):
     twins = [*few[:-1], replace(few[-1], controls=few[3].controls)]
     with pytest.raises(TrainingError, match=f"samples 4 and {len(few)} have equal controls"):
         train.train(with_size(small_recipe, 0.0, full_ranks), twins, quiet)
     assert train.train(with_size(small_recipe, 0.2, [10, 8, 10]), twins, quiet).model
-
-
-def test_a_control_that_never_changes_is_refused_by_name(small_recipe, few):
-    same = with_controls(few, 2, [7.5] * len(few))
-    with pytest.raises(TrainingError, match=r"control 'turn' has the value 7\.5 in all 23 samples"):
-        train.train(small_recipe, same, quiet)
-
-
-def with_drift(recipe, degree):
-    kriging = recipe.kriging.model_copy(update={"drift": degree})
-    return recipe.model_copy(update={"kriging": kriging})
-
-
-def test_a_control_that_follows_from_another_is_refused(small_recipe, few):
-    doubled = with_controls(few, 2, [2.0 * example.controls[0] - 1.0 for example in few])
-    with pytest.raises(TrainingError, match="follows linearly from the others"):
-        train.train(with_drift(small_recipe, 1), doubled, quiet)
-    # A trend within the covariance needs no slope of each control alone.
-    assert train.train(small_recipe, doubled, quiet).model
-
-
-def test_fewer_samples_than_the_drift_needs_are_refused(small_recipe, few):
-    message = "5 samples, expected at least 6 for 4 controls and a drift of degree 1"
-    with pytest.raises(TrainingError, match=message):
-        train.train(with_drift(small_recipe, 1), few[:: len(few) // 5 + 1][:5], quiet)
-    with pytest.raises(TrainingError, match="1 samples, expected at least 2"):
-        train.train(small_recipe, few[:1], quiet)
-    assert train.train(small_recipe, few[::5], quiet).model

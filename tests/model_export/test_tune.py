@@ -184,15 +184,6 @@ def test_the_prior_decides_where_data_do_not(samples, rng):
     assert np.log(many.nugget) < PRIORS["nugget"].mean - 1.5 * PRIORS["nugget"].deviation
 
 
-def test_nugget_is_worth_the_variance_of_the_noise(samples, rng):
-    smooth = tuned_at(samples, wave(samples))
-    noisy = wave(samples) + 0.5 * rng.normal(size=(50, 2))
-    rough = tuned_at(samples, noisy)
-    expected = 2 * 0.5**2
-    assert 0.5 * expected < rough.hyper.nugget * rough.sill < 2.0 * expected
-    assert smooth.hyper.nugget * smooth.sill < 0.1 * expected
-
-
 def test_given_nugget_is_kept(samples):
     values = wave(samples)
     tuned = tuned_at(samples, values, 0.037)

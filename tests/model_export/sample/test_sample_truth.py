@@ -91,30 +91,6 @@ def test_hinges_turn_about_one_axis():
 
 
 @pytest.mark.parametrize("point", [SITTING, STANDING])
-def test_acceleration_is_continuous(point):
-    """Halving the step halves the largest jump of the second difference quotient."""
-
-    def jump(count):
-        places, _ = positions(point, np.linspace(0.0, 1.0, count + 1))
-        acceleration = np.diff(places, 2, axis=0) * count**2
-        return np.abs(np.diff(acceleration, axis=0)).max(), np.abs(acceleration).max()
-
-    coarse, fine = jump(800), jump(1600)
-    assert fine[0] < 0.6 * coarse[0]
-    assert fine[1] < 50.0, "metres per clip squared"
-
-
-def test_continuity_of_acceleration_would_notice_a_corner():
-    """Negative control: a profile with continuous speed only keeps its jumps at half the step."""
-
-    def jump(count):
-        t = np.clip((np.linspace(0.0, 1.0, count + 1) - 0.2) / 0.6, 0.0, 1.0)
-        return np.abs(np.diff(np.diff(t**2 * (3.0 - 2.0 * t), 2) * count**2)).max()
-
-    assert jump(1600) > 0.9 * jump(800)
-
-
-@pytest.mark.parametrize("point", [SITTING, STANDING])
 @pytest.mark.parametrize(
     ("name", "step"),
     [("stature", 4e-3), ("hip_height", 4e-3), ("turn", 4), ("target_height", 0.04)],
