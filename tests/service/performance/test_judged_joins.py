@@ -152,6 +152,7 @@ def test_joins_are_judged_in_the_frames_that_are_sent(perform, feet):
     answer = perform(60.0, feet)
     joins = answer.trust.joins
     assert joins
+    assert answer.trust.segments[-1].ends == pytest.approx(answer.clip.duration, abs=1e-6)
     for own in joins:
         assert own.peak == pytest.approx(peak(answer.clip, own.time), rel=TOLERANCE)
     other = perform(60.0, "as_predicted" if feet == "stand" else "stand")
