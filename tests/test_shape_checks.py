@@ -22,7 +22,7 @@ NUMERIC = [
     *(f"model_export/posefield_train/{name}" for name in ("kriging", "align", "tensor")),
 ]
 ARRAYS = {"Floats", "Singles", "Indices", "Booleans", "FloorVectors", "Numbers"}
-ANY_RANK = {"decompose", "decompose_truncated", "mode_dot", "restored", "unfold"}
+ANY_RANK = {"decompose", "mode_dot", "restored", "unfold"}
 """Of tensors with any number of axes."""
 WRONG = {
     "a quaternion of three numbers": lambda: quat.mul(np.ones((5, 3)), np.ones(4)),

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from posefield.common.array_shapes import PointControls, PoseVectors
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
-from posefield_train.kriging.variogram import ExperimentalVariogram, VariogramModel
+from posefield_train.kriging.variogram import RANGES, ExperimentalVariogram, VariogramModel
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 VariogramFitter = Callable[[ExperimentalVariogram, str], VariogramModel]
@@ -96,3 +97,20 @@ def fit_naive(
         hyper = Hyper(covariance, (1,), scales, float(nugget), 0.0)
         fields.append(universal_kriging.solve(hyper, points, values[:, frame]))
     return NaiveKriging(tuple(fields), values)
+
+
+def fit_by_search(found: ExperimentalVariogram, covariance: str) -> VariogramModel:
+    """Fit nugget, sill and range together by a general least-squares solver, as is common."""
+    top, far = float(found.values.max()), float(found.distances.max())
+    roots = np.sqrt(found.pairs) / np.maximum(found.values, 1e-30)
+
+    def misfit(x: Floats) -> Floats:
+        squared = np.square(found.distances / x[2])
+        rising = 1.0 - COVARIANCES[covariance].numpy(squared)
+        return roots * (x[0] + x[1] * rising - found.values)
+
+    low, high = [0.0, 0.0, RANGES[0]], [2.0 * top, 10.0 * top, RANGES[-1]]
+    start, sizes = [0.1 * top, 0.9 * top, 0.5 * far], [top, top, far]
+    return VariogramModel(
+        *map(float, least_squares(misfit, start, bounds=(low, high), x_scale=sizes).x)
+    )

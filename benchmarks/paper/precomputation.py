@@ -1,10 +1,13 @@
 """Precomputation from aligned clips to all that a pose needs, by posefield and naive kriging."""
 
+from functools import reduce
+
 import numpy as np
 from family import Family
 
 from paper import naive_kriging as per_frame
 from paper.naive_kriging import NaiveKriging, VariogramFitter
+from posefield.common.units import Floats
 from posefield_train.align import time_alignment
 from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
@@ -19,7 +22,7 @@ NAIVE = (
 # Range of the nugget, in sills.
 NUGGETS = 1e-3, 10.0
 FITS: dict[str, VariogramFitter] = {
-    "SciPy's least_squares": variogram.fit_by_search,
+    "SciPy's least_squares": per_frame.fit_by_search,
     "our own linearised grid search": variogram.fit_by_grid,
 }
 
@@ -34,13 +37,25 @@ def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[TuckerTensor, Unive
     weights = np.ones(len(made.parents))
     chart = made.trained.tensor.chart
     own = motion_tensor.build_tensor(made.vectors, chart, made.parents, made.offsets, weights)
-    reduced = hosvd.decompose_truncated(own.values, ranks)
+    reduced = decompose_truncated(own.values, ranks)
     return reduced, universal_kriging.solve(guess(made, reduced), made.samples, reduced.bases[2])
+
+
+def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
+    """Return `hosvd.decompose` truncated to ranks; only that part of the core is computed."""
+    bases = []
+    for mode, rank in enumerate(ranks):
+        unfolded = hosvd.unfold(tensor, mode)
+        _, vectors = np.linalg.eigh(unfolded @ unfolded.T)
+        bases.append(hosvd.fix_signs(vectors[:, ::-1])[:, :rank])
+    core = reduce(lambda x, mb: hosvd.mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
+    return TuckerTensor(core, tuple(bases))
 
 
 def guess(made: Family, reduced: TuckerTensor) -> Hyper:
     """Return kriging parameters from the variogram of the motions' slices of the core."""
-    experimental = variogram.residual_variogram(made.samples, reduced.motions, 1)
+    left = variogram.residuals(made.samples, reduced.motions, 1)
+    experimental = variogram.experimental_variogram(made.samples, left)
     fitted = variogram.fit_by_grid(experimental, "matern52")
     nugget = fitted.nugget / fitted.sill if fitted.sill > 0.0 else NUGGETS[1]
     scales = np.full(made.samples.shape[1], 1.0 / fitted.range)

@@ -12,7 +12,7 @@ from minimal import TOML
 from posefield.common.errors import RecipeError
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.source import control_sources, recipe
-from posefield_train.source.recipe_errors import key_lines
+from posefield_train.source.recipe import key_lines
 
 RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 MINIMAL = TOML.replace("metres_per_unit = 1.0", "metres_per_unit = 0.01")

@@ -10,9 +10,7 @@ from posefield_train.cli import (
     command_convert,
     command_discover,
     command_evaluate,
-    command_fetch,
     command_probe,
-    command_review,
     command_sample,
     command_train,
 )
@@ -22,9 +20,9 @@ COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "init": (command_probe.init, command_probe.INIT_EXAMPLES),
     "convert": (command_convert.convert, command_convert.CONVERT_EXAMPLES),
     "discover": (command_discover.discover, command_discover.EXAMPLES),
-    "review": (command_review.review, command_review.EXAMPLES),
+    "review": (command_discover.review, command_discover.REVIEW_EXAMPLES),
     "fetch": (
-        command_fetch.fetch,
+        command_convert.fetch,
         ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],
     ),
     "sample": (

@@ -13,7 +13,7 @@ from posefield.console.arguments import Json, ModelPath
 from posefield.console.question_options import with_option_groups
 from posefield.model_file.model_card import PERFORMER
 from posefield_train.cli import output_files
-from posefield_train.cli.progress_messages import ProgressPrinter
+from posefield_train.cli.output_files import ProgressPrinter
 
 RootOffset = Literal["replace", "add"]
 

@@ -12,7 +12,7 @@ from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import ExecutorOptions
-from posefield_train.cli.progress_messages import ProgressPrinter
+from posefield_train.cli.output_files import ProgressPrinter
 from posefield_train.source import data_folder
 
 if TYPE_CHECKING:
@@ -82,7 +82,10 @@ def _train(
     with executors.parts(executor) as jobs, ProgressPrinter("training", steps) as progress:
         progress(f"reading {recipe_file}")
         examples, notes = ingest.ingest(own, data or recipe_file.parent)
-        progress.expect(_step_seconds(len(examples)))
+        clips = len(examples)
+        share = min(max((clips - SMALL) / (LARGE - SMALL), 0.0), 1.0)
+        pairs = zip(STEP_SECONDS_PER_CLIP[SMALL], STEP_SECONDS_PER_CLIP[LARGE], strict=True)
+        progress.expect([clips * ((1.0 - share) * few + share * many) for few, many in pairs])
         ingest.check_presets(own, examples)
         trained = train.train(own, examples, progress, jobs)
         progress("writing the graph and comparing it with the reference")
@@ -101,13 +104,6 @@ STEP_SECONDS_PER_CLIP = {
     SMALL: (0.017, 0.014, 0.001, 0.012, 0.027),
     LARGE: (0.022, 0.018, 0.003, 0.030, 0.022),
 }
-
-
-def _step_seconds(clips: int) -> list[float]:
-    """Return the expected processor seconds of the steps of a training, before its report."""
-    share = min(max((clips - SMALL) / (LARGE - SMALL), 0.0), 1.0)
-    pairs = zip(STEP_SECONDS_PER_CLIP[SMALL], STEP_SECONDS_PER_CLIP[LARGE], strict=True)
-    return [clips * ((1.0 - share) * few + share * many) for few, many in pairs]
 
 
 def _write_report(

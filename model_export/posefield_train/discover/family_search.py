@@ -6,7 +6,7 @@ first which explains most of what is not yet explained.
 """
 
 import heapq
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,8 +37,8 @@ def find_like(
     ends = _nearest([joined.ends(one) for one in examples])
     kept = list(examples)
     found: list[Match] = []
-    for end in _by_cost(ends.costs):
-        if len(found) == most:
+    for end in map(int, np.argsort(ends.costs, kind="stable")):
+        if len(found) == most or not np.isfinite(ends.costs[end]):
             break
         span = joined.span(int(ends.starts[end]), end)
         if not corpus.is_whole(span.take, span.start, span.end):
@@ -66,14 +66,6 @@ def _nearest(several: Sequence[Ends]) -> Ends:
     near = np.exp((least[known] - costs[:, known]) / SOFTNESS)
     soft[known] -= SOFTNESS * np.log(near.mean(axis=0))
     return Ends(soft, starts[best, columns])
-
-
-def _by_cost(costs: Floats) -> Iterator[int]:
-    """Yield the frames with a finite cost, the lowest first."""
-    for end in np.argsort(costs, kind="stable"):
-        if not np.isfinite(costs[end]):
-            return
-        yield int(end)
 
 
 SHORTEST, LONGEST = 0.7, 5.0
@@ -120,7 +112,9 @@ def find_families(
     families share few frames.
     """
     joined = motion_features.join_features(corpus)
-    listed = _moving(joined, candidates(corpus))
+    least = LEAST_MOTION * joined.variance
+    spans = candidates(corpus)
+    listed = [span for span in spans if joined.clip(span).var(axis=0).sum() > least]
     picked = (
         listed
         if len(listed) <= count
@@ -156,11 +150,6 @@ def speed_minima(take: Take, roles: Sequence[str]) -> Floats:
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * MINIMUM_SPAN + 1)
     lowest = np.flatnonzero(smooth == windows.min(axis=1))
     return np.unique([0, *lowest, len(smooth) - 1]) / RATE
-
-
-def _moving(joined: JoinedFeatures, listed: Sequence[Span]) -> list[Span]:
-    least = LEAST_MOTION * joined.variance
-    return [span for span in listed if joined.clip(span).var(axis=0).sum() > least]
 
 
 @dataclass(frozen=True)

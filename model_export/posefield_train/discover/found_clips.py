@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 
 from posefield.common.errors import FileError, InvalidField, RecipeError
-from posefield.common.units import Floats
 from posefield.motion.joint_roles import ROLES
 from posefield_train.discover import family_search, motion_features, stride_detection
 from posefield_train.discover.family_search import SHORTEST, Family
@@ -234,20 +233,15 @@ class FamilyQuality:
 
 def assess(joined: JoinedFeatures, family: Family) -> FamilyQuality:
     """Return the quality of a family, whose clips are aligned to its example."""
-    aligned = align_members(joined, family)
+    query = joined.clip(family.example)
+    members = []
+    for member in family.members:
+        clip = joined.clip(member.span)
+        apart = np.linalg.norm(query[:, None] - clip, axis=-1)
+        members.append(clip[motion_features.align(apart)])
+    aligned = np.stack(members)
     mean = aligned.mean(axis=0)
     within = float(np.square(aligned - mean).sum(axis=-1).mean())
     motion = float(np.square(mean - mean.mean(axis=0)).sum(axis=-1).mean())
     whole = joined.variance
     return FamilyQuality(within / whole, motion / whole, family.seconds)
-
-
-def align_members(joined: JoinedFeatures, family: Family) -> Floats:
-    """Return the features (M, L, k) of a family's clips at the frames of its example."""
-    query = joined.clip(family.example)
-    found = []
-    for member in family.members:
-        own = joined.clip(member.span)
-        apart = np.linalg.norm(query[:, None] - own, axis=-1)
-        found.append(own[motion_features.align(apart)])
-    return np.stack(found)

@@ -38,12 +38,6 @@ class SearchedFrames:
     between: Booleans
 
 
-def searched_frames(corpus: Floats) -> SearchedFrames:
-    """Return the features (F, k) of a corpus for searches; NaN stands between two takes."""
-    known = np.nan_to_num(corpus)
-    return SearchedFrames(known, np.sum(np.square(known), axis=1), np.isnan(corpus[:, 0]))
-
-
 def distances(query: Floats, corpus: SearchedFrames) -> Floats:
     """Return the distances (L, F) of features (L, k) of a query from those of a corpus.
 
@@ -300,7 +294,10 @@ class JoinedFeatures:
 
     @cached_property
     def _searched(self) -> SearchedFrames:
-        return searched_frames(self.values)
+        # NaN stands between two takes.
+        known = np.nan_to_num(self.values)
+        missing = np.isnan(self.values[:, 0])
+        return SearchedFrames(known, np.sum(np.square(known), axis=1), missing)
 
     def frames(self, span: Span) -> slice:
         """Return the frames of a part of a take; its end may lie beyond the last one."""

@@ -183,7 +183,13 @@ def proposal_lines(proposal: ControlProposal, roles: dict[str, str]) -> list[str
         lines += ["[[controls]]", f"name = {quote(control_name(control))}"]
         at = f', joint = {quote(roles[control.role])}, at = "{control.at}"' if control.role else ""
         lines.append(f'auto = {{ quantity = "{control.quantity}"{at} }}')
-        lines += [f"description = {quote(_description(control))}", ""]
+        if control.role is None or control.at is None:
+            description = GAIT[control.quantity]
+        else:
+            words = re.sub(r"([A-Z])", r" \1", control.role).lower()
+            moment = MOMENTS[control.at]
+            description = DIRECTIONS[control.quantity].format(f"the {words}", moment)
+        lines += [f"description = {quote(description)}", ""]
     if proposal.event is not None:
         role, moment = proposal.event
         lines += ["[event]", f"joint = {quote(roles[role])}", f'at = "{moment}"', ""]
@@ -204,13 +210,6 @@ def _evidence(proposal: ControlProposal) -> list[str]:
         named = ", ".join(control_name(one) for one in proposal.controls[: single + at])
         lines.append(f"# {left:.0%} of the variance of takes left out remains with {named}")
     return lines
-
-
-def _description(control: ProposedControl) -> str:
-    if control.role is None or control.at is None:
-        return GAIT[control.quantity]
-    words = re.sub(r"([A-Z])", r" \1", control.role).lower()
-    return DIRECTIONS[control.quantity].format(f"the {words}", MOMENTS[control.at])
 
 
 SUMMARY, PAGE = "discover.json", "index.html"
@@ -313,18 +312,17 @@ def summary(
         },
         "refused": read.refused,
         "notes": read.notes,
-        "families": [_offered_facts(one) for one in found.offered],
+        "families": [
+            {
+                "number": one.number,
+                "status": "proposed",
+                **_family_facts(one.family),
+                **proposal_facts(one.proposal),
+                "roles": one.facts.report.roles,
+            }
+            for one in found.offered
+        ],
         "not_offered": [_family_facts(one) | {"reasons": one.reasons} for one in found.refused],
-    }
-
-
-def _offered_facts(one: OfferedFamily) -> dict[str, Any]:
-    return {
-        "number": one.number,
-        "status": "proposed",
-        **_family_facts(one.family),
-        **proposal_facts(one.proposal),
-        "roles": one.facts.report.roles,
     }
 
 

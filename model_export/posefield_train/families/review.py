@@ -3,14 +3,13 @@
 import json
 import re
 import statistics
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField, MotionError
-from posefield_train.discover.control_proposals import ControlProposal
 from posefield_train.families import found_families, recipe_folder
 from posefield_train.families.found_families import FamilyRow
 from posefield_train.source import data_folder
@@ -213,40 +212,30 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in own.rows[first]]
     into["seconds"] = round(statistics.median(spans), 3)
     into["left_out"] |= gone["left_out"]
+    evidence = f"Family {second} was merged into it: {gone['clips']} clips"
+    if gone["within"] is not None:
+        evidence += (
+            f", which differ by {gone['within']:.1%} of all motion; {gone['shared']:.0%} of their "
+            "motion is common"
+        )
     text = recipe_folder.with_merged(
         own.texts[first],
         recipe_folder.clips_text(len(own.rows[first]), len(into["performers"]), into["seconds"]),
-        _merged_text(gone),
+        f"{evidence}.",
     )
-    found = _propose(own, first, text)
+    draft = re.sub('^licence = ""$', 'licence = "not stated yet"', text, count=1, flags=re.M)
+    name = recipe_folder.family_name(first)
+    try:
+        found = recipe_folder.propose(draft, name, own.rows[first], own.data)
+    except (MotionError, ValueError) as fault:
+        said = f"the clips of {first} and those merged into it make no family: {fault}"
+        raise InvalidField("merge", said) from fault
     own.texts[first] = recipe_folder.with_proposal(
         text, recipe_folder.proposal_lines(found, into["roles"])
     )
     into |= recipe_folder.proposal_facts(found)
     into["clips"] = len(own.rows[first])
     gone |= {"status": "merged", "into": first}
-
-
-def _merged_text(gone: Mapping[str, Any]) -> str:
-    """Return the evidence on a family that is merged into another."""
-    said = f"Family {gone['number']} was merged into it: {gone['clips']} clips"
-    if gone["within"] is None:
-        return f"{said}."
-    return (
-        f"{said}, which differ by {gone['within']:.1%} of all motion; {gone['shared']:.0%} of "
-        "their motion is common."
-    )
-
-
-def _propose(own: ReviewedFolder, number: int, text: str) -> ControlProposal:
-    name = recipe_folder.family_name(number)
-    rows: Sequence[FamilyRow] = own.rows[number]
-    draft = re.sub('^licence = ""$', 'licence = "not stated yet"', text, count=1, flags=re.M)
-    try:
-        return recipe_folder.propose(draft, name, rows, own.data)
-    except (MotionError, ValueError) as fault:
-        said = f"the clips of {number} and those merged into it make no family: {fault}"
-        raise InvalidField("merge", said) from fault
 
 
 def _write(folder: Path, own: ReviewedFolder) -> None:

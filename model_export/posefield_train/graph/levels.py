@@ -235,19 +235,21 @@ class LevelBuilder:
             rung = LevelSize(self._ranks(front, parts), joints)
             lowered, keeps = self._thinned(model, rung, allowed)
             kept += [lowered] if keeps else []
-        return self._with_level_error(
-            min(
-                kept or [lowered],
-                key=lambda m: truncation_cost.count_operations(m, len(m.bank.coarse)),
-            )
+        chosen = min(
+            kept or [lowered],
+            key=lambda m: truncation_cost.count_operations(m, len(m.bank.coarse)),
         )
+        # The last level's error relative to the full model belongs to its sigma.
+        bank, last = chosen.bank, len(chosen.bank.coarse)
+        error = self.draft_test.outputs(chosen, last).errors(range(len(chosen.decoder.means))).rms
+        rank = chosen.decoder.level_sizes[last].ranks[2]
+        weights = self.thinning_data.weights(bank.columns(last), rank, error)
+        return replace(chosen, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
 
     def level(self, model: FloatModel, level: int) -> Level:
         """Return the description of a level of a model."""
-        rung, numbers = (
-            model.decoder.level_sizes[level],
-            truncation_cost.count_numbers(model, level),
-        )
+        rung = model.decoder.level_sizes[level]
+        numbers = truncation_cost.count_numbers(model, level)
         answers = self.final_test.outputs(model, level)
         found = answers.errors(range(len(model.decoder.means)))
         effector = answers.effector
@@ -265,14 +267,6 @@ class LevelBuilder:
             effector=None if effector is None else rounded(effector),
             event=0 if level else model.bank.event_columns,
         )
-
-    def _with_level_error(self, model: FloatModel) -> FloatModel:
-        """Return the model with the last level's error relative to the full model in its sigma."""
-        bank, last = model.bank, len(model.bank.coarse)
-        error = self.draft_test.outputs(model, last).errors(range(len(model.decoder.means))).rms
-        rank = model.decoder.level_sizes[last].ranks[2]
-        weights = self.thinning_data.weights(bank.columns(last), rank, error)
-        return replace(model, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
 
     def _ranks(self, front: ParetoFront, allowed: dict[str, float]) -> RankTriple:
         """Return the cheapest ranks of a front whose true errors are allowed."""
@@ -293,7 +287,10 @@ class LevelBuilder:
         """
         bank, decoder = model.bank, model.decoder
         decoder = replace(decoder, coarse=(*decoder.coarse, rung))
-        for columns in _covariance_counts(model):
+        # Some samples of the pose's model, or whole models.
+        n = len(bank.pose.samples)
+        counts = [*(m for m in SAMPLE_COUNTS if m < n), n]
+        for columns in (m for m in counts if m <= bank.columns(len(bank.coarse))):
             weights = self.thinning_data.weights(columns, rung.ranks[2], error=0.0)
             coarse = (*bank.coarse, weights)
             tried = replace(model, bank=replace(bank, coarse=coarse), decoder=decoder)
@@ -342,13 +339,3 @@ def _moving_joints(trained: TrainedModel, finer: LevelSize, detail: Detail) -> t
     for joint, parent in enumerate(parents[1:], start=1):
         still[joint] |= still[parent]
     return tuple(joint for joint in finer.joints if not still[joint])
-
-
-def _covariance_counts(model: FloatModel) -> list[int]:
-    """Return the numbers of covariances to try for the next level.
-
-    They cover some samples of the pose's model, or whole models.
-    """
-    bank, n = model.bank, len(model.bank.pose.samples)
-    some = [*(m for m in SAMPLE_COUNTS if m < n), n]
-    return [m for m in some if m <= bank.columns(len(bank.coarse))]

@@ -200,7 +200,10 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
         return None
     found = _harmonic_deviations(trained)
     captured = _accelerations(trained, trained.tensor.values).mean()
-    predicted = _predictions(trained)
+    # The left-out predictions of the finest level.
+    first, times, samples = trained.model.decoder.reduced.bases
+    bases = first, times, samples - _left_out(trained) @ samples
+    predicted = TuckerTensor(trained.model.decoder.reduced.core, bases).restored()
     without = _accelerations(trained, predicted).mean() / captured
     gain = reached = 1.0
     for _ in range(ROUNDS):
@@ -215,13 +218,6 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
 def _left_out(trained: TrainedModel) -> Floats:
     """Return the matrix (N, N) from sample values to leave-one-out residuals."""
     return sample_kriging.leave_out(trained.pose.hyper, trained.samples)
-
-
-def _predictions(trained: TrainedModel) -> Floats:
-    """Return the left-out predictions (D', T, N) of the finest level."""
-    first, times, samples = trained.model.decoder.reduced.bases
-    predicted = samples - _left_out(trained) @ samples
-    return TuckerTensor(trained.model.decoder.reduced.core, (first, times, predicted)).restored()
 
 
 def _harmonic_deviations(trained: TrainedModel) -> Deviations:
@@ -300,7 +296,7 @@ def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) 
     """Check a model of all its levels and return it with its file.
 
     own_card: makes the model card from the parity error, m. Raises ExportRefused as
-    `parity_check.check_parity` does.
+    `check_parity` does.
     """
     about = _producer()
     # The card contains the parity error, so the weights are checked with a draft of the card.

@@ -30,7 +30,6 @@ from posefield.model_file.model_card import (
 )
 from posefield.motion.clip import Clip
 from posefield_train.align import phase_alignment
-from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import truncation_cost
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
@@ -323,6 +322,10 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
     kept, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
     compression = asdict(truncation_cost.tensor_compression(trained.tensor, kept, controls))
     hyper = trained.pose.hyper
+    contacts = {}
+    if trained.contacts is not None:
+        accuracy = asdict(trained.contacts.accuracy).items()
+        contacts["contacts"] = {name: rounded(own) for name, own in accuracy}
     return {
         **{name: rounded(distance) for name, distance in cut.items()},
         "compression": {name: rounded(ratio) for name, ratio in compression.items()},
@@ -341,7 +344,7 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         **_large_family(trained),
         "parity_m": float(f"{parity:.1e}"),
         "notes": list(notes),
-        **_contact_accuracy(trained.contacts),
+        **contacts,
     }
 
 
@@ -354,12 +357,6 @@ def _large_family(trained: TrainedModel) -> dict[str, Any]:
     clips = len(trained.examples)
     counts = {"clips": clips, "tuned": sample_points.tuned_count(clips)}
     return {"projected": {**counts, "inducing": len(trained.listed), **tuned}}
-
-
-def _contact_accuracy(found: FittedContacts | None) -> dict[str, Any]:
-    if found is None:
-        return {}
-    return {"contacts": {name: rounded(own) for name, own in asdict(found.accuracy).items()}}
 
 
 def plain_parameters(hyper: Hyper) -> Hyper:

@@ -69,10 +69,8 @@ def count_numbers(model: FloatModel, level: int) -> int:
     """Return how many numbers a level reads: core, bases, kriging weights and samples."""
     bank, rung = model.bank, model.decoder.level_sizes[level]
     r1, r2, r3 = rung.ranks
-    samples, varies = (
-        bank.columns(level),
-        np.any(model.decoder.at_level(level).unwhiten != 0.0, axis=1),
-    )
+    samples = bank.columns(level)
+    varies = np.any(model.decoder.at_level(level).unwhiten != 0.0, axis=1)
     bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
     blend = model.decoder.event
     if blend and not level:

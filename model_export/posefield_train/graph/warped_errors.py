@@ -49,14 +49,10 @@ def captured_positions(examples: Sequence[Example]) -> Floats:
     for example in examples:
         poses = motion_tensor.captured_poses(example.clip)
         own = skeleton.positions(example.clip.skeleton.parents, *poses)
-        found.append(_with_curves(own, *_uniform_curves(example)))
+        clip = example.clip
+        values = time_alignment.interpolate(clip.curve_values, UNIFORM_SHARES)
+        found.append(_with_curves(own, clip.curves.curves if clip.curves else (), values))
     return np.stack(found)
-
-
-def _uniform_curves(example: Example) -> tuple[tuple[Curve, ...], Floats]:
-    clip = example.clip
-    values = time_alignment.interpolate(clip.curve_values, UNIFORM_SHARES)
-    return clip.curves.curves if clip.curves else (), values
 
 
 def _with_curves(joints: Floats, own: tuple[Curve, ...], values: Floats) -> Floats:

@@ -137,18 +137,15 @@ def choose_covariance(
     best = min(others, key=lambda field: field.unexplained, default=first)
     chosen = best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
     if len(samples.points) > sample_points.LARGEST_TUNED:
-        chosen = _better_draw(problem, settings.fixed_degree, chosen, jobs)
+        # The better of the model and of one tuned on other clips, with their disagreement.
+        second = kriging_tuning.tune(
+            problem, chosen.hyper.covariance, settings.fixed_degree, draw=1, jobs=jobs
+        )
+        errors = np.sqrt([chosen.unexplained, second.unexplained])
+        apart = float(errors.max() / max(errors.min(), TINY) - 1.0)
+        better = min(chosen, second, key=lambda field: field.unexplained)
+        chosen = replace(better, disagreement=apart)
     return chosen if samples.inducing is None else _smoothest(chosen, samples, values)
-
-
-def _better_draw(
-    problem: TuningProblem, degree: int | None, first: TunedKriging, jobs: Jobs
-) -> TunedKriging:
-    """Return the better of a model and of one tuned on other clips, with their disagreement."""
-    second = kriging_tuning.tune(problem, first.hyper.covariance, degree, draw=1, jobs=jobs)
-    better = min(first, second, key=lambda own: own.unexplained)
-    errors = np.sqrt([first.unexplained, second.unexplained])
-    return replace(better, disagreement=float(errors.max() / max(errors.min(), TINY) - 1.0))
 
 
 def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues) -> TunedKriging:

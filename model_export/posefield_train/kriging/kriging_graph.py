@@ -174,16 +174,14 @@ def _weights(bank: KrigingBank, net: GraphBuilder) -> str:
     one, end = net.indices(1), net.indices(stored.shape[1])
     linear = net("Slice", net.weights("linear_weights", stored), one, end, one)
     finest = net("Concat", linear, _duals(bank, net), axis=0)
-    levels = [finest, *(_coarse_weights(bank, net, 1 + i) for i in range(len(bank.coarse)))]
+    levels = [finest]
+    for level, coarse in enumerate(bank.coarse, start=1):
+        # Its variance is in m².
+        stored = coarse.copy()
+        stored[bank.label_count, 0] += _log_sill(bank)
+        levels.append(net.weights(f"weights_{level}", stored))
     flat = [net("Reshape", level, net.indices(-1)) for level in levels]
     return net("Concat", *flat, axis=0) if bank.coarse else flat[0]
-
-
-def _coarse_weights(bank: KrigingBank, net: GraphBuilder, level: int) -> str:
-    """Build the weights of a coarser level, whose variance is in m²."""
-    stored = bank.coarse[level - 1].copy()
-    stored[bank.label_count, 0] += _log_sill(bank)
-    return net.weights(f"weights_{level}", stored)
 
 
 def _duals(bank: KrigingBank, net: GraphBuilder) -> str:
@@ -215,7 +213,7 @@ def _sigma(
     form = net("Pad", _symmetric(net, "precision", whole), net.indices(0, 0, 1, 1))
     form = net("Slice", form, ends["curved_from"], ends["curved_to"], net.indices(0, 1))
     # Two columns: see `GraphBuilder.row_sums`.
-    pairs = net("Expand", _sill(bank, net), ends["pairs"])
+    pairs = net("Expand", net.weights("sill", np.array([bank.sill])), ends["pairs"])
     terms = net("Mul", net("MatMul", own, form), own)
     # Not Relu, which onnxruntime-web 1.23 fuses with Gemm into an operator that it lacks.
     variance = net("Max", net("Gemm", terms, pairs, net("Exp", logarithm)), net.number(0.0))
@@ -225,10 +223,6 @@ def _sigma(
 def _log_sill(bank: KrigingBank) -> float:
     """Return the logarithm of the sill, m²; clips without any error have a sill of zero."""
     return math.log(max(bank.sill, float(np.finfo(np.float32).tiny)))
-
-
-def _sill(bank: KrigingBank, net: GraphBuilder) -> str:
-    return net.weights("sill", np.array([bank.sill]))
 
 
 def _symmetric(net: GraphBuilder, name: str, matrix: Annotated[Floats, "rows rows"]) -> str:

@@ -41,7 +41,12 @@ def choose_inducing(
     """
     if len(points) <= LARGEST_DENSE:
         return None
-    needed = _required(points, controls)
+    required: set[int] = set()
+    for column in points[:, :controls].T:
+        values, first = np.unique(column, return_index=True)
+        ends = {int(first[0]), int(first[-1])}
+        required |= {*first.tolist()} if len(values) <= FEW_VALUES else ends
+    needed = sorted(required | {int(np.argmax(column)) for column in points[:, controls:].T})
     count = max(INDUCING, len(needed))
     return np.sort(_pivoted(points, fixed_parameters(controls, labels), count, needed))
 
@@ -74,16 +79,6 @@ def fixed_parameters(controls: int, labels: tuple[int, ...]) -> Hyper:
     """Return the parameters of the covariance that clips are chosen by."""
     kernels = tuple(LabelKernel(count, CORRELATION, OFFSET) for count in labels)
     return Hyper("matern52", (0,), np.full(controls, SCALE), 0.0, 0.0, kernels)
-
-
-def _required(points: Samples, controls: int) -> list[int]:
-    """Return the clips that the card of a model needs, in order."""
-    found: set[int] = set()
-    for column in points[:, :controls].T:
-        values, first = np.unique(column, return_index=True)
-        found |= {*first.tolist()} if len(values) <= FEW_VALUES else {int(first[0]), int(first[-1])}
-    found |= {int(np.argmax(column)) for column in points[:, controls:].T}
-    return sorted(found)
 
 
 def _pivoted(

@@ -15,7 +15,6 @@ from posefield.kriging import kriging_model
 from posefield_train.kriging.kriging_bank import (
     POSE,
     VARIANCE,
-    CoefficientModel,
     ConstantModel,
     KrigingBank,
 )
@@ -33,7 +32,10 @@ RELATIVE_CUTOFF = 1e-5
 def sort_samples(bank: KrigingBank) -> KrigingBank:
     """Return the bank with its samples sorted by how much they explain of the pose."""
     order = pivoted_order(bank.pose)
-    others = {name: _permute(field, order) for name, field in bank.others.items()}
+    others = {
+        name: field if isinstance(field, ConstantModel) else _permute_kriging(field, order)
+        for name, field in bank.others.items()
+    }
     event = _permute_kriging(bank.event, order) if bank.event else None
     contacts = _permute_kriging(bank.contacts, order) if bank.contacts else None
     pose = _permute_kriging(bank.pose, order)
@@ -53,10 +55,6 @@ def pivoted_order(pose: UniversalKriging) -> Annotated[Indices, "samples"]:
         if unknown[chosen] > RELATIVE_CUTOFF:
             left = left - np.outer(left[chosen], left[chosen]) / unknown[chosen]
     return np.array(taken)
-
-
-def _permute(field: CoefficientModel, order: Annotated[Indices, "samples"]) -> CoefficientModel:
-    return field if isinstance(field, ConstantModel) else _permute_kriging(field, order)
 
 
 def _permute_kriging(

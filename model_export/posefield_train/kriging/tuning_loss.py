@@ -262,7 +262,8 @@ class LeaveOneOutLoss:
         by_name: dict[str, Callable[[int], Floats]] = {
             "nugget": lambda _: hyper.nugget * np.eye(len(controls)),
             "correlation": lambda index: (
-                _odds_slope(hyper.labels[index].correlation)
+                # The first factor is the derivative of a share by its log odds.
+                (hyper.labels[index].correlation * (1.0 - hyper.labels[index].correlation))
                 * model.numpy(squared)
                 * (1.0 - self._same[index])
                 * _product(shares[:index] + shares[index + 1 :])
@@ -287,11 +288,6 @@ NUGGET, TREND = ("nugget", 0), ("trend", 0)
 def _value(name: Parameter, unit: float) -> float:
     """Return the value of a parameter at a search unit."""
     return float(expit(unit) if name[0] == "correlation" else np.exp(unit))
-
-
-def _odds_slope(share: float) -> float:
-    """Return the derivative of a share by its log odds."""
-    return share * (1.0 - share)
 
 
 def _product(shares: Sequence[Floats]) -> Floats | float:

@@ -17,7 +17,6 @@ from posefield.common.array_shapes import (
     Points,
     PointSamples,
     PointValues,
-    SampleControls,
     Samples,
     SampleValues,
 )
@@ -121,14 +120,10 @@ def check_samples(
     if np.linalg.matrix_rank(drift(samples, len(names), degree)) < 1 + len(names) * degree:
         raise TrainingError(f"controls {names}: one of them follows linearly from the others")
     if nugget_is_zero:
-        _refuse_duplicates(samples)
-
-
-def _refuse_duplicates(samples: SampleControls) -> None:
-    _, first, inverse = np.unique(samples, axis=0, return_index=True, return_inverse=True)
-    for row, group in enumerate(np.ravel(inverse)):
-        if first[group] != row:
-            raise TrainingError(
-                f"samples {first[group] + 1} and {row + 1} have equal controls: a nugget of zero "
-                "expects them to differ; allow a nugget, or leave one out"
-            )
+        _, first, inverse = np.unique(samples, axis=0, return_index=True, return_inverse=True)
+        for row, group in enumerate(np.ravel(inverse)):
+            if first[group] != row:
+                raise TrainingError(
+                    f"samples {first[group] + 1} and {row + 1} have equal controls: a nugget of "
+                    "zero expects them to differ; allow a nugget, or leave one out"
+                )

@@ -1,4 +1,4 @@
-"""Experimental variogram of reduced motions and its fit, for diagnosis and naive kriging.
+"""Experimental variogram of reduced motions and its fit, for diagnosis.
 
 The dissimilarity of two motions is the distance between their slices of the core tensor (Mukai &
 Kuriyama 2006, section 2), which equals that of their rows of the sample basis scaled by the
@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from posefield.common.array_shapes import SampleControls, SampleValues
 from posefield.common.units import Floats, Indices
@@ -49,13 +48,6 @@ def residuals(samples: SampleControls, values: SampleValues, drift: int) -> Samp
     functions = universal_kriging.drift(samples, samples.shape[1], drift)
     coefficients, *_ = np.linalg.lstsq(functions, values, rcond=None)
     return values - functions @ coefficients
-
-
-def residual_variogram(
-    samples: SampleControls, values: SampleValues, drift: int
-) -> ExperimentalVariogram:
-    """Return the experimental variogram of the residuals of values (n, m) from a drift."""
-    return experimental_variogram(samples, residuals(samples, values, drift))
 
 
 def pairs_by_lag(
@@ -105,21 +97,19 @@ def _squared_distances(
     return squared
 
 
-def fit_by_grid(experimental_variogram: ExperimentalVariogram, covariance: str) -> VariogramModel:
+def fit_by_grid(found: ExperimentalVariogram, covariance: str) -> VariogramModel:
     """Fit by weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
 
     Nugget and sill enter linearly and are solved for at each range. If no lag has enough pairs, as
     for a control of two values, the sill is zero.
     """
-    if not len(experimental_variogram.pairs):
+    if not len(found.pairs):
         return VariogramModel(0.0, 0.0, float(RANGES[-1]))
-    squared = np.square(experimental_variogram.distances[None] / RANGES[:, None])
+    squared = np.square(found.distances[None] / RANGES[:, None])
     rising = 1.0 - COVARIANCES[covariance].numpy(squared)
-    weights = experimental_variogram.pairs / np.maximum(experimental_variogram.values, 1e-30) ** 2
-    nuggets, sills = _nonnegative_lines(rising, experimental_variogram.values, weights)
-    misfit = (
-        nuggets[:, None] + sills[:, None] * rising - experimental_variogram.values
-    ) ** 2 @ weights
+    weights = found.pairs / np.maximum(found.values, 1e-30) ** 2
+    nuggets, sills = _nonnegative_lines(rising, found.values, weights)
+    misfit = (nuggets[:, None] + sills[:, None] * rising - found.values) ** 2 @ weights
     best = int(np.argmin(misfit))
     return VariogramModel(float(nuggets[best]), float(sills[best]), float(RANGES[best]))
 
@@ -138,29 +128,3 @@ def _nonnegative_lines(
     nuggets = mean_y - slopes * mean_x
     slopes = np.where(nuggets < 0.0, through_zero, slopes)
     return np.maximum(nuggets, 0.0), slopes
-
-
-def fit_by_search(experimental_variogram: ExperimentalVariogram, covariance: str) -> VariogramModel:
-    """Fit nugget, sill and range together by a general least-squares solver.
-
-    This is the common method; the naive baseline is timed with it.
-    """
-    top, far = (
-        float(experimental_variogram.values.max()),
-        float(experimental_variogram.distances.max()),
-    )
-    roots = np.sqrt(experimental_variogram.pairs) / np.maximum(experimental_variogram.values, 1e-30)
-
-    def misfit(x: Floats) -> Floats:
-        squared = np.square(experimental_variogram.distances / x[2])
-        return roots * (
-            x[0]
-            + x[1] * (1.0 - COVARIANCES[covariance].numpy(squared))
-            - experimental_variogram.values
-        )
-
-    low, high = [0.0, 0.0, RANGES[0]], [2.0 * top, 10.0 * top, RANGES[-1]]
-    found = least_squares(
-        misfit, [0.1 * top, 0.9 * top, 0.5 * far], bounds=(low, high), x_scale=[top, top, far]
-    )
-    return VariogramModel(*map(float, found.x))

@@ -53,7 +53,8 @@ class FinishedJobs:
             else:
                 left.append((number, listed[number]))
         for number, result in self.jobs.run(_run_numbered, left, (function, shared)):
-            write_result(result, files[number])
+            content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
+            atomic_files.write(hashlib.sha256(content).digest() + content, files[number])
             yield result
 
 
@@ -61,12 +62,6 @@ def _run_numbered(
     function: Callable[..., Any], shared: Arguments, number: int, own: Arguments
 ) -> tuple[int, Any]:
     return number, function(*shared, *own)
-
-
-def write_result(result: Any, file: Path) -> None:
-    """Write a result with its checksum. Raises FileError if that cannot be done."""
-    content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
-    atomic_files.write(hashlib.sha256(content).digest() + content, file)
 
 
 def read_result(file: Path) -> tuple[Any] | None:

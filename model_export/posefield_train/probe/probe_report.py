@@ -221,7 +221,11 @@ def text(report: ProbeReport) -> str:
         f"joints ({len(report.joints)}): {joints}"
         f"{more if len(report.joints) > SHOWN_JOINTS else ''}",
         f"roles by name: {_roles(report) or 'none recognised'}",
-        *_asked_roles(report),
+        *(
+            f"role to confirm: {role} = {guess.joint} (confidence {guess.confidence:.2f}: "
+            f"{'; '.join(guess.reasons)})"
+            for role, guess in report.asked.items()
+        ),
     ]
     return "\n".join([*lines, *summary(report, with_evidence=True)])
 
@@ -240,15 +244,6 @@ def _roles(report: ProbeReport) -> str:
     return ", ".join(
         f"{role} = {guess.joint} ({guess.confidence:.2f})" for role, guess in sure.items()
     )
-
-
-def _asked_roles(report: ProbeReport) -> list[str]:
-    """Return a line for each role that has to be confirmed."""
-    return [
-        f"role to confirm: {role} = {guess.joint} (confidence {guess.confidence:.2f}: "
-        f"{'; '.join(guess.reasons)})"
-        for role, guess in report.asked.items()
-    ]
 
 
 def _value(name: str, found: Proposal) -> str:

@@ -6,7 +6,7 @@ measure it from the hips or from the travel; a motion that contradicts it is an 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from posefield.roles import joint_recognition
 
 Facing = Literal["+x", "-x", "+z", "-z", "travel", "hips", "roles", "none"]
 """Axis of the root, or the evidence that tells it; none for motions without a facing."""
-FACINGS: tuple[str, ...] = get_args(Facing)
 AXES = {"+z": 0.0, "+x": 90.0, "-z": 180.0, "-x": -90.0}
 """Angle of each axis to the left of +z, degrees."""
 

@@ -63,7 +63,10 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
     if not tracks:
         raise document.error(f"animation {name!r} moves no joint, expected one of the skeleton")
     try:
-        found = motion_file.sample_times(_key_union(tracks), options.rate)
+        keys = np.unique(np.concatenate([track.times for track in tracks.values()]))
+        # Keys of one frame count once.
+        keys = keys[np.concatenate([[True], np.diff(keys) > SAME_TIME])]
+        found = motion_file.sample_times(keys, options.rate)
     except UnevenKeys as fault:
         raise document.error(f"animation {name!r}: {fault}") from fault
     if len(found.times) * len(joints.nodes) > MAX_POSES:
@@ -154,12 +157,6 @@ def _track(document: GltfDocument, sampler: Any, part: str) -> Track:
         before, values, after = values.reshape(len(times), 3, -1).swapaxes(0, 1)
         return Track(times, values, kind, before, after)
     return Track(times, values, kind)
-
-
-def _key_union(tracks: Tracks) -> Floats:
-    """Return the times of all keys, those of one frame once."""
-    times = np.unique(np.concatenate([track.times for track in tracks.values()]))
-    return times[np.concatenate([[True], np.diff(times) > SAME_TIME])]
 
 
 def _posed(

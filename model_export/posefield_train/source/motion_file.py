@@ -179,7 +179,12 @@ def to_clip(
     if up != "y":
         rotations = np.concatenate([rotations[..., :1], to_y_up(rotations[..., 1:], up)], axis=-1)
     lengths = metres_per_unit * to_y_up(translations, up)
-    return Clip(_upright(file.skeleton, metres_per_unit, up), rotations, lengths, _rate(file, rate))
+    found = rate if file.rate is None else file.rate
+    if found is None:
+        raise file.error(
+            f"{file.format} files state no frame rate, expected source.rate, frames a second"
+        )
+    return Clip(_upright(file.skeleton, metres_per_unit, up), rotations, lengths, found)
 
 
 def check_stated(file: MotionFile, metres_per_unit: float, up: UpAxis, rate: float | None) -> None:
@@ -195,15 +200,6 @@ def check_stated(file: MotionFile, metres_per_unit: float, up: UpAxis, rate: flo
         raise file.error(
             f"has {file.rate:g} frames a second ({file.evidence}), expected source.rate {rate:g}"
         )
-
-
-def _rate(file: MotionFile, rate: float | None) -> float:
-    found = rate if file.rate is None else file.rate
-    if found is None:
-        raise file.error(
-            f"{file.format} files state no frame rate, expected source.rate, frames a second"
-        )
-    return found
 
 
 def to_y_up(vectors: Floats, up: UpAxis) -> Floats:

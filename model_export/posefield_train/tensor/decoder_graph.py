@@ -43,16 +43,6 @@ def mean_products_onnx(net: GraphBuilder, own: PoseChart, columns: str) -> str:
     return net("Reshape", found, net.indices(4 * count, -1))
 
 
-def row_offset(net: GraphBuilder, chart: ChartName, products: str, means: str) -> str:
-    """Build the offset (4 J, 1) of the rows that `quaternions` takes.
-
-    products: mean products (4 J, 1) of the mean numbers. means: (J, 4, 1).
-    """
-    if chart == "rotation_vector":
-        return products
-    return net("Add", products, net("Reshape", means, net.indices(-1, 1)))
-
-
 def quaternions(net: GraphBuilder, chart: ChartName, rows: str, means: str, shape: str) -> str:
     """Build quaternions (J, 4, P) about means (J, 4, 1) from rows (4 J, P).
 
@@ -238,8 +228,10 @@ def _chart_quaternions(
     """Build quaternions (J, 4, P) of directions (4 J, r1), poses (P, r1), constant (4 J, 1)."""
     directions, poses, constant = rows
     chart = decoder.chart.chart
-    offset = row_offset(net, chart, constant, means)
-    products = net("Gemm", directions, poses, offset, transB=1)
+    # The rows that `quaternions` takes have the means added in the stereographic chart.
+    if chart != "rotation_vector":
+        constant = net("Add", constant, net("Reshape", means, net.indices(-1, 1)))
+    products = net("Gemm", directions, poses, constant, transB=1)
     return quaternions(net, chart, products, means, ends["half_angles"])
 
 

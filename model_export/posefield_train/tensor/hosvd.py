@@ -89,7 +89,8 @@ def decompose(tensor: Floats) -> TuckerTensor:
     Each basis holds the eigenvectors of its unfolding's Gram matrix, largest first; the largest
     entry of every column is positive, so the result does not depend on LAPACK's choice of sign.
     """
-    return _project(tensor, tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim)))
+    bases = tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim))
+    return TuckerTensor(_projected(tensor, bases), bases)
 
 
 def decompose_in_passes(
@@ -106,19 +107,15 @@ def decompose_in_passes(
     bases = []
     for mode in (0, 1):
         gram = sum(_gram(unfold(tensor[:, :, own], mode)) for own in blocks)
-        bases.append(_leading(np.asarray(gram), squared_error))
+        sizes, vectors = np.linalg.eigh(np.asarray(gram))
+        first = _negligible(np.maximum(sizes, 0.0), squared_error)
+        bases.append(fix_signs(vectors[:, first:][:, ::-1]))
     parts = [_projected(tensor[:, :, own], bases) for own in blocks]
     some = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
     left, lengths, _ = np.linalg.svd(unfold(some, 2), full_matrices=False)
     kept = len(lengths) - _negligible(np.square(lengths[::-1]), squared_error)
     last = fix_signs(left[:, :kept])
     return TuckerTensor(some @ last, (*bases, last))
-
-
-def _leading(gram: Annotated[Floats, "size size"], squared_error: float) -> Floats:
-    """Return the leading eigenvectors (size, rank) of a Gram matrix that leave out an error."""
-    sizes, vectors = np.linalg.eigh(gram)
-    return fix_signs(vectors[:, _negligible(np.maximum(sizes, 0.0), squared_error) :][:, ::-1])
 
 
 def _negligible(sizes: Annotated[Floats, "size"], squared_error: float) -> int:
@@ -129,20 +126,6 @@ def _negligible(sizes: Annotated[Floats, "size"], squared_error: float) -> int:
 
 def _projected(tensor: Floats, bases: Sequence[Floats]) -> Floats:
     return reduce(lambda x, mb: mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
-
-
-def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
-    """Return `decompose` truncated to ranks, in half the time.
-
-    Only the required part of the core is computed.
-    """
-    pairs = zip(range(tensor.ndim), ranks, strict=True)
-    bases = tuple(_basis(unfold(tensor, mode))[:, :rank] for mode, rank in pairs)
-    return _project(tensor, bases)
-
-
-def _project(tensor: Floats, bases: tuple[Floats, ...]) -> TuckerTensor:
-    return TuckerTensor(_projected(tensor, bases), bases)
 
 
 def _basis(unfolded: Annotated[Floats, "size rest"]) -> Annotated[Floats, "size rank"]:

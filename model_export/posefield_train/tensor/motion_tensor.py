@@ -54,7 +54,7 @@ def gram(
     """
     positions, orientations = skeleton.forward_kinematics(parents, rotations, translations)
     below = skeleton.descendant_matrix(parents)
-    motions = _motions(positions, _axes(orientations, jacobians))
+    motions = _motions(positions, np.swapaxes(quat.to_matrix(orientations) @ jacobians, -1, -2))
     forces = _forces(motions, positions, joint_weights, below)
     poses = len(positions)
     products = np.tensordot(motions, forces, axes=([0, 2], [0, 2])) / poses
@@ -62,15 +62,6 @@ def gram(
     acts = np.kron(np.pad(below, ((1, 0), (1, 0)), constant_values=1.0), np.ones((3, 3)))
     upper = products * np.triu(acts)
     return upper + np.triu(upper, k=1).T
-
-
-def _axes(
-    orientations: Annotated[Floats, "poses joints 4"],
-    jacobians: Annotated[Floats, "poses joints 3 3"],
-) -> Annotated[Floats, "poses joints 3 3"]:
-    """Return the world axis (P, J, 3 numbers, 3) of each number of a rotation."""
-    turned = quat.to_matrix(orientations) @ jacobians
-    return np.swapaxes(turned, -1, -2)
 
 
 def _motions(

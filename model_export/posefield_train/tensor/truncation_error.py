@@ -218,7 +218,8 @@ def event_frame(recipe: Recipe, examples: Sequence[Example]) -> EventFrame | Non
     names = examples[0].clip.skeleton.names
     if event.joint not in names:
         raise TrainingError(f"event.joint {event.joint!r}, expected one of {', '.join(names)}")
-    return EventFrame(names.index(event.joint), _canonical_frame(recipe, event.at, examples))
+    share = _event_share(recipe, event.at, examples)
+    return EventFrame(names.index(event.joint), round((recipe.motion.frames - 1) * share))
 
 
 def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
@@ -227,11 +228,6 @@ def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
     if found is None or recipe.event is None:
         return None
     return Event(found.joint, round(_event_share(recipe, recipe.event.at, examples), 4))
-
-
-def _canonical_frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> int:
-    """Return the canonical frame of the event; a landmark lies at the mean of its times."""
-    return round((recipe.motion.frames - 1) * _event_share(recipe, at, examples))
 
 
 def _event_share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:

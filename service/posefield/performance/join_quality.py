@@ -230,7 +230,7 @@ def add_steps(
 ) -> tuple[Passage, tuple[JoinStep, ...]]:
     """Return a joined passage with contacts that let feet step over the cut, and the steps.
 
-    after: where the cut places it. joined: `blends.join` of both, or a longer passage with the join
+    after: where the cut places it. joined: `joins.join` of both, or a longer passage with the join
     at frame `cut.exit`. A foot that stands more than 5 cm apart on both sides steps, one foot after
     another, the farthest first. A foot that swings before the cut and stands after it lands where
     it has come near the ground and its place.

@@ -5,7 +5,7 @@ import time
 
 from posefield.console.late_progress import LateProgress
 from posefield.console.progress import ProgressBar
-from posefield_train.cli.progress_messages import ProgressPrinter
+from posefield_train.cli.output_files import ProgressPrinter
 
 
 def test_a_line_says_how_much_is_finished(capsys):
