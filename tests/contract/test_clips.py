@@ -69,17 +69,6 @@ def test_the_manifest_says_what_each_file_is(kind, ask, questions, spec):
         assert {key: line[key] for key in clip["trust"]} == clip["trust"]
 
 
-def test_an_archive_says_where_it_comes_from(ask, questions, loaded):
-    answer = ask("POST", f"{CLIPS}.zip", json=asked("usdc", questions))
-    assert answer.headers["posefield-model"] == loaded.find("reach").identity
-    assert answer.headers["content-disposition"] == 'attachment; filename="reach.zip"'
-    assert answer.headers["content-type"] == "application/zip"
-    warning = json.loads(answer.headers["posefield-warning"])
-    assert warning == "1 of 4 clips lie outside what was sampled, or in a gap of it"
-    within = ask("POST", f"{CLIPS}.tar", json=asked("usdc", questions[:3]))
-    assert "posefield-warning" not in within.headers
-
-
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_the_same_questions_give_the_same_bytes(kind, ask, questions):
     once, again, other = (
@@ -168,13 +157,3 @@ def test_a_clip_of_an_archive_is_as_large_as_one_alone_may_be(loaded, controls):
     within = small("POST", f"{CLIPS}.tar", json=asked("json", [{"controls": controls}, clip]))
     assert alone.status_code == within.status_code == 422
     assert within.json()["detail"].endswith(alone.json()["detail"])
-
-
-@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
-def test_other_methods_media_types_and_archives_are_refused(kind, ask):
-    for method in ("GET", "HEAD", "PUT"):
-        answer = ask(method, f"{CLIPS}.{kind}")
-        assert (answer.status_code, answer.headers["allow"]) == (405, "OPTIONS, POST")
-    assert ask("POST", f"{CLIPS}.{kind}", content=b"{}").status_code == 415
-    unknown = ask("POST", f"{CLIPS}.rar", json={})
-    assert unknown.status_code == 404 and "there are zip, tar" in unknown.json()["detail"]

@@ -43,17 +43,6 @@ def test_all_formats_hold_the_same_poses(ask, controls):
     assert plain["model"].startswith("reach@")
 
 
-def test_levels_follow_the_camera(ask, controls):
-    camera = {"position": [0.0, 1.7, -4.0], "fov": 1.0, "height": 1080}
-    far = [[0.0, 0.0, 10.0**power] for power in range(1, 5)]
-    asked = question(controls, 4, position=far, level="auto", camera=camera)
-    found = ask("POST", f"{CROWD}.json", json=asked).json()
-    assert found["levels"] == sorted(found["levels"]) and found["levels"][-1] > 0
-    assert len(found["error_px"]) == 4
-    fine = ask("POST", f"{CROWD}.json", json={**asked, "pixels": 1e-4}).json()
-    assert set(fine["levels"]) == {0}
-
-
 REFUSED = {
     "zero characters": ({"time": []}, 422, "/time"),
     "lengths that differ": ({"heading": [0.0, 1.0]}, 422, "/heading"),
@@ -175,14 +164,6 @@ def test_a_walk_has_the_labels_that_are_asked_for(ask):
     # Layers name the labels, so that a mixture of one name differs there alone.
     alone = ask("GET", f"{path}&label=performer=ann:1").content
     assert alone.split(b"def ", 1)[1] == ann.split(b"def ", 1)[1] != ben.split(b"def ", 1)[1]
-
-
-def test_feet_of_a_walk_stand_unless_asked_to_be_as_predicted(ask):
-    path = f"{WALK}.usda?count=3&seconds=1"
-    usual, stood, free = (
-        ask("GET", path + more).content for more in ("", "&feet=stand", "&feet=as_predicted")
-    )
-    assert usual == stood != free
 
 
 @pytest.mark.parametrize(

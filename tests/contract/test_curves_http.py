@@ -71,17 +71,6 @@ def test_a_crowd_has_the_curves_of_its_poses(face, spec):
     assert b"curve_names" in face("POST", "/v1/models/face/crowd.arrow", json=asked).content
 
 
-def test_curves_count_towards_the_limit_of_a_file(model_file):
-    """Eleven curves count as three joints: without them, twice as many frames would pass."""
-    limit = 200_000
-    ask = asker(
-        create_app(model_registry.load([model_file("curves")]), Settings(output_limit=limit))
-    )
-    fine = ask("GET", f"/v1/models/curves/clip.json?{QUERY}&fps=300")
-    assert fine.status_code == 200 and len(fine.content) < limit
-    assert ask("GET", f"/v1/models/curves/clip.json?{QUERY}&fps=500").status_code == 422
-
-
 @pytest.mark.parametrize("path", ["", "/clip.json?fps=5", "/pose?time=0.5"])
 def test_a_model_without_curves_says_nothing_of_them(ask, face, path):
     first = "&" if "?" in path else "?"

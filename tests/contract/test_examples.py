@@ -8,6 +8,13 @@ from contract_examples import EXAMPLES, OPERATIONS, each_example
 
 from posefield.http.api import contract
 
+# Of every answer of HTTP, or said once for all of them in the contract's introduction.
+USUAL = {
+    *("content-type", "content-length", "content-encoding", "vary"),
+    *("x-content-type-options", "content-security-policy", "cross-origin-resource-policy"),
+    "referrer-policy",
+}
+
 
 def test_every_operation_has_an_example_and_every_example_an_operation():
     assert {folder.name for folder in EXAMPLES.iterdir()} == set(OPERATIONS)
@@ -23,6 +30,11 @@ def test_the_example_is_answered_as_it_says(name, form, ask, spec, loaded):
     expected = contract_examples.response(name, form)
     assert answer.status_code == expected["status"], answer.text
     assert dict(answer.headers).items() >= expected["headers"].items()
+    node = contract.resolve(spec, operation_of(spec, name)["responses"]["200"])
+    resolved = {key.lower(): contract.resolve(spec, each) for key, each in node["headers"].items()}
+    assert set(answer.headers) - resolved.keys() <= USUAL
+    needed = {key for key, each in resolved.items() if each.get("required")}
+    assert needed <= set(answer.headers)
     if "body" in expected:
         assert contains(answer.json(), expected["body"])
         jsonschema.validate(answer.json(), schema_of(spec, name), jsonschema.Draft202012Validator)

@@ -4,7 +4,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic
 
 import pytest
 
@@ -13,7 +12,6 @@ sys.path.insert(0, str(BENCHMARKS))
 
 from faults_book import Book  # noqa: E402
 from faults_known import Answer, Known, Question  # noqa: E402
-from faults_wire import Wire  # noqa: E402
 
 pytestmark = pytest.mark.system
 
@@ -51,13 +49,3 @@ def test_a_right_answer_and_a_documented_refusal_are_none():
     book.answered(KNOWN, OVERLOADED)
     assert book.wrong == []
     assert (book.right, book.refused) == ({200: 1}, {"overloaded": 1})
-
-
-def test_a_request_that_is_not_answered_is_noticed_unless_a_worker_was_killed():
-    book, wire = Book(), Wire(None, None, monotonic())
-    book.unanswered(wire, "request", EOFError())
-    assert len(book.wrong) == 1
-    book.killed.append(monotonic())
-    book.unanswered(wire, "request", EOFError())
-    book.unanswered(replace(wire, begun=monotonic()), "request", EOFError())
-    assert (len(book.wrong), book.broken) == (2, 1)

@@ -2,8 +2,6 @@
 
 import io
 import json
-import subprocess
-import sys
 import zipfile
 
 import jsonschema
@@ -48,24 +46,6 @@ def test_the_facts_are_those_of_the_contract(get, spec):
 def test_the_default_is_to_stand_and_answers_are_repeatable(get):
     assert get("clip.bvh").content == get("clip.bvh", feet="stand").content
     assert get("clip.bvh").content != get("clip.bvh", feet="as_predicted").content
-
-
-def test_the_command_writes_the_bytes_of_the_service(get, walk, measured_walk_path, tmp_path):
-    path = tmp_path / "walk.bvh"
-    said = [
-        word
-        for control in walk.session.card.controls
-        for word in ("-c", f"{control.name}={control.default!r}")
-    ]
-    command = [sys.executable, "-m", "posefield", "clip", str(measured_walk_path), *said]
-    for feet in ("stand", "as_predicted"):
-        done = subprocess.run([*command, "--feet", feet, "-o", str(path)], check=True, text=True)
-        assert done.returncode == 0
-        assert path.read_bytes() == get("clip.bvh", feet=feet).content
-        path.unlink()
-    told = tmp_path / "walk.json"
-    subprocess.run([*command, "-o", str(told)], check=True)
-    assert json.loads(told.read_text())["trust"]["feet"]["swings"] >= 2
 
 
 def test_a_floor_is_one_answer_in_a_link_a_body_and_a_command(walk, get, spec, tmp_path):

@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 import pyarrow as pa
 import pytest
-from asking import unpacked
 
 MODEL = "/v1/models/reach"
 GIVEN = {"turn": 20.0, "target_height": 1.1}
@@ -77,15 +76,6 @@ def test_a_file_says_it_in_a_header(extension, ask, chosen, controls):
         assert found.content == whole.content
     else:
         assert b"inferred" in found.content and b"inferred" not in whole.content
-
-
-def test_an_archive_says_it_of_each_clip(ask, chosen, controls):
-    clips = [{"controls": GIVEN, "fps": 10}, {"controls": controls, "fps": 10}]
-    answer = ask("POST", f"{MODEL}/clips.zip", json={"format": "bvh", "clips": clips})
-    lines = unpacked("zip", answer.content)["manifest.jsonl"].splitlines()
-    first, second = map(json.loads, lines)
-    assert (first["inferred"], first["controls"]) == (LEFT_OUT, chosen["controls"])
-    assert "inferred" not in second
 
 
 def test_a_crowd_needs_every_control(ask):

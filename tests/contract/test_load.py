@@ -60,20 +60,6 @@ def test_an_answer_that_takes_too_long_is_given_up():
     assert answer.headers["retry-after"] == "1"
 
 
-def test_others_are_answered_meanwhile():
-    async def first_stuck(service, request):
-        await asyncio.sleep(100 if "slow" in request.headers else 0.15)
-        return Response("done")
-
-    async def both(app):
-        late = asyncio.create_task(ask_many(app, ["/v1/models"], slow="1", **SOON))
-        prompt = [await ask_many(app, ["/v1/models"]) for _ in range(3)]
-        return (await late)[0], [answer.status_code for (answer,) in prompt]
-
-    late, prompt = asyncio.run(both(app_with(listModels=first_stuck)))
-    assert (late.status_code, prompt) == (503, [200, 200, 200])
-
-
 @pytest.mark.parametrize(
     ("prefer", "expected"),
     [

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from serving import address, host_and_port, process, within
+from serving import address, host_and_port, process
 
 pytestmark = pytest.mark.system
 
@@ -40,20 +40,6 @@ def test_liveness_is_answered_beside_hundreds_of_unfinished_heads(models):
             for wire in wires:
                 wire.sendall(b"G")
             assert {httpx.get(url + "/livez").status_code for _ in range(10)} == {200}
-
-
-def test_liveness_is_answered_while_all_places_are_taken(models):
-    head = (
-        b"POST /v1/models/reach/pose HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n"
-        b"Content-Type: application/json\r\n\r\n"
-    )
-    with process(models, POSEFIELD_CONCURRENCY="4") as child:
-        url = address(child)
-        with sockets(url, 4) as wires:
-            for wire in wires:
-                wire.sendall(head)
-            assert within(10, lambda: httpx.get(url + "/v1/models").status_code == 503)
-            assert {httpx.get(url + path).status_code for path in ("/livez", "/readyz")} == {200}
 
 
 def test_unfinished_bodies_take_bounded_memory_and_small_ones_are_read(models, controls):

@@ -9,12 +9,10 @@ import pytest
 from asking import asker, unpacked
 from bad_scripts import ABSENT, REFUSED, UNREADABLE
 
-from posefield.batch import scripts
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.decoding import performances_query
 
 BATCH = "/v1/performances/batch"
 JSON = "application/json"
@@ -121,22 +119,3 @@ def test_the_duration_of_all_is_limited(loaded):
     # The last script would be refused, but is not reached.
     answer = small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 4 + [FAR_MODEL]))
     assert_refused(answer, 422, "/scripts", "s with script 3, expected at most 3 s in all")
-
-
-def test_performances_are_made_as_they_are_requested(loaded):
-    """One at a time is in memory: the next is made when its file is requested."""
-    body = json.dumps(asked("npz", SCRIPTS)).encode()
-    order = performances_query.decode_order(loaded, body, Settings())
-    made = []
-
-    def encode(answer, convention):
-        made.append(answer.trust.frames)
-        return order.encode(answer, convention)
-
-    watched = scripts.PerformanceOrder(order.scripts, encode)
-    members = scripts.archive_members(watched)
-    for count in range(1, 4):
-        next(members)
-        assert len(made) == count
-    name, _ = next(members)
-    assert name == "manifest.jsonl" and len(made) == 3

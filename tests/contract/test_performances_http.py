@@ -46,16 +46,6 @@ def test_a_plan_is_json(ask):
 
 
 @pytest.mark.parametrize(
-    ("form", "field", "value"),
-    [("glb", "unit", "cm"), ("glb", "up", "z"), ("json", "body", "bones")],
-)
-def test_a_format_that_does_not_carry_a_convention_refuses_it(ask, form, field, value):
-    script = {**bad_scripts.walk(), field: value}
-    found = assert_problem(ask("POST", f"/v1/performances.{form}", json=script), 422)
-    assert [own["pointer"] for own in found["errors"]] == [f"/{field}"]
-
-
-@pytest.mark.parametrize(
     ("content", "status"),
     [
         (b'{"segments":[' + b" " * 2_000_000 + b"]}", 413),

@@ -8,7 +8,6 @@ import model_files
 import pytest
 import recorded
 from asking import asker
-from model_files import numbered
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
@@ -139,19 +138,3 @@ def test_a_file_that_is_meant_to_do_harm_is_told_and_the_others_are_taken(
     page = asker(create_app(ready, Settings()))("GET", "/metrics").text
     assert 'posefield_reloads{what="faults"} 1.0' in page
     assert 'posefield_reloads{what="failed"} 1.0' in page
-
-
-def test_versions_are_listed_and_each_answers_under_its_hash(models, tmp_path):
-    content = (models / "reach.onnx").read_bytes()
-    for version in (1, 2):
-        (tmp_path / "reach").mkdir(exist_ok=True)
-        (tmp_path / f"reach/{version}.onnx").write_bytes(numbered(content, version))
-    ask = asker(create_app(Readiness(ReloadingRegistry([tmp_path], VersionLimits())), Settings()))
-    (listed,) = ask("GET", "/v1/models").json()["models"]
-    assert listed["identity"] == listed["versions"][0] and len(listed["versions"]) == 2
-    for key in ("reach", *listed["versions"]):
-        card = ask("GET", f"/v1/models/{key}").json()
-        assert card["identity"] == (listed["identity"] if key == "reach" else key)
-    gone = ask("GET", f"/v1/models/reach@{'0' * 16}/pose")
-    assert gone.status_code == 404
-    assert gone.json()["detail"].endswith(", ".join(listed["versions"]))

@@ -11,7 +11,6 @@ from asking import asker
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 
 CLIP = "/v1/models/reach/clip.json"
@@ -111,16 +110,6 @@ WRONG_BODIES = [
 def test_a_wrong_body_is_pointed_at(content, status, kind, pointer, assert_refused):
     problem = assert_refused(status, kind, "POST", CLIP, content=content, headers=JSON)
     assert [error["pointer"] for error in problem["errors"]] == [pointer]
-
-
-def test_a_model_that_knows_no_performers_refuses_every_name(model_path, controls):
-    ask = asker(create_app(model_registry.load([model_path]), Settings()))
-    asked = urlencode({**controls, "time": 0, "performer": "tall"})
-    answer = ask("GET", f"/v1/models/reaching/pose?{asked}")
-    assert (answer.status_code, answer.headers["content-type"]) == (422, "application/problem+json")
-    assert answer.json()["errors"][0]["parameter"] == "performer"
-    assert "'tall', expected none: this model knows none" in answer.json()["detail"]
-    assert ask("GET", "/v1/models/reaching").json()["performers"] == []
 
 
 @pytest.mark.parametrize("media", ["text/plain", "application/xml", "application/json; charset=x"])

@@ -1,7 +1,5 @@
 """Tests of the server process on a real socket: responses, shutdown and invalid models."""
 
-import json
-import signal
 import socket
 import threading
 
@@ -52,17 +50,6 @@ def test_requests_at_the_same_time_do_not_disturb_each_other(base, controls):
     for stature in statures:
         ask(stature)
     assert answers == together
-
-
-@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
-def test_told_to_end_it_ends_well(ending, models):
-    with process(models, POSEFIELD_LOG="on") as child:
-        assert httpx.get(address(child) + "/readyz").status_code == 200
-        child.send_signal(ending)
-        assert child.wait(20) == 0
-        assert child.stdout.read() == b""
-        (line,) = map(json.loads, child.stderr)
-        assert (line["operation"], line["status"]) == ("getReadiness", 200)
 
 
 def test_a_taken_port_stops_the_start(models):

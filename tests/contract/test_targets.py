@@ -185,10 +185,3 @@ def test_a_measured_control_is_met_if_not_asked_otherwise(ask_measured):
     assert "targets" not in found["none"]
     plain = ask_measured("GET", query("clip.json")).json()["trust"]
     assert plain == found["auto"]
-
-
-def test_a_target_is_nearer_than_the_control_of_its_joint(ask_measured):
-    clip = ask_measured("GET", query("clip.json", target=WORDS)).json()
-    assert [met["what"] for met in clip["trust"]["targets"]] == ["RightHand at end"]
-    both = ask_measured("GET", query("clip", target=WORDS, exact="target_height"))
-    assert problem(both)[:3] == (422, "invalid-field", "exact")

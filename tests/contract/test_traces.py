@@ -51,12 +51,6 @@ def test_a_request_is_one_span_of_the_clients_trace(spans, loaded, controls):
     assert span.attributes["posefield.model"] == loaded.find("reach").identity
 
 
-def test_a_refusal_is_no_error_of_the_service(spans):
-    (span,) = spans("GET", "/nowhere")
-    assert span.attributes["http.response.status_code"] == 404
-    assert span.status.is_unset
-
-
 @pytest.fixture
 def collector():
     """Address of a collector, and the names of the spans that it was sent."""

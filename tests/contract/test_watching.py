@@ -147,14 +147,6 @@ def test_a_line_names_the_trace_of_its_request(told):
         assert line["trace"] is None
 
 
-def test_versions_of_models_are_shown_while_they_answer(ask, loaded):
-    page = ask("GET", "/metrics").text
-    for identity in loaded.identities:
-        name, digest = identity.split("@")
-        assert value(page, "posefield_model", model=name, hash=digest) == 1.0
-    assert value(page, "posefield_reloads", what="faults") == 0.0
-
-
 def test_a_version_that_is_gone_is_shown_to_be():
     metrics.set_models(["gone@0123456789abcdef"], {})
     metrics.set_models([], {})

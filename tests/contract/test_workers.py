@@ -123,17 +123,6 @@ def test_one_that_hangs_is_replaced_while_the_others_answer(models):
         assert new and all(answers(url) for _ in range(5))
 
 
-def test_one_that_dies_while_it_is_asked_whether_it_hangs_is_replaced_at_once(models):
-    with process(models, POSEFIELD_WORKERS="2", POSEFIELD_UNRESPONSIVE="3600") as child:
-        assert answers(address(child))
-        first, second = workers(child)
-        os.kill(first, signal.SIGSTOP)
-        # The supervisor asks twice a second, and then waits for the answer.
-        time.sleep(2)
-        os.kill(first, signal.SIGKILL)
-        assert replaced(child, first, {second})
-
-
 def test_an_event_loop_that_hangs_ends_its_process_and_says_where(tmp_path):
     with started([sys.executable, "-c", BLOCKED]) as child:
         with socket.create_connection(host_and_port(address(child)), timeout=60) as wire:
@@ -198,17 +187,6 @@ def test_as_many_as_the_container_may_use(quota, most, tmp_path):
     if quota:
         file.write_text(f"{quota}\n")
     assert server.usable_processors(file) == min(most, len(os.sched_getaffinity(0)))
-
-
-def test_ctrl_c_reaches_them_in_order(models):
-    given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "2"}
-    posefield = [Path(sys.executable).with_name("posefield"), "serve", str(models)]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(posefield, env=given, stdout=pipe, stderr=pipe, process_group=0) as child:
-        assert answers(address(child))
-        os.killpg(child.pid, signal.SIGINT)
-        assert child.wait(30) == 0
-        assert child.stderr.read() == b""
 
 
 def test_ctrl_c_during_a_health_check_is_logged_as_no_death(models):

@@ -35,25 +35,6 @@ def test_progress_of_short_work_shows_nothing(capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_late_progress_begins_with_the_work_so_far(capsys):
-    with LateProgress("points", 9, delay=0.0, interval=0.0) as bar:
-        bar.update(4)
-        bar.update(5, 10)
-    first, second = capsys.readouterr().err.splitlines()
-    assert first == "points: 4 of 9"
-    assert second.startswith("points: 5 of 10")
-
-
-def test_each_item_counts_when_the_next_is_taken(capsys):
-    with LateProgress("files", 3, delay=0.0, interval=0.0) as bar:
-        list(bar.count("abc"))
-    assert [line[:13] for line in capsys.readouterr().err.splitlines()] == [
-        "files: 0 of 3",
-        "files: 1 of 3",
-        "files: 2 of 3",
-    ]
-
-
 def test_progress_of_steps_estimates_the_rest_by_the_finished_ones(capsys):
     with ProgressPrinter("training", 3) as progress:
         progress("reading")

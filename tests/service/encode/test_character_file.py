@@ -10,7 +10,6 @@ import pytest
 from posefield.encode import character_file
 from posefield.encode.character import character
 from posefield.encode.formats import CLIP_ENCODERS, METRES
-from posefield.motion.skeleton import Skeleton
 
 KINDS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -76,15 +75,3 @@ def test_the_coarse_mesh_has_the_same_points(content):
     assert len(corners) == 3 * 300
     assert len(part(content, "corners")) > 4 * len(corners)
     assert set(corners.flat) < set(part(content, "corners").flat)
-
-
-def test_equal_skeletons_have_equal_files(person, content):
-    again = Skeleton(
-        person.names,
-        person.parents,
-        person.offsets.copy(),
-        person.tip_joints,
-        person.tip_offsets.copy(),
-    )
-    assert character_file.character_glb(again, "reach@0123456789abcdef") == content
-    assert character_file.character_glb(again, "other@0123456789abcdef") != content

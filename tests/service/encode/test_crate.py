@@ -168,19 +168,3 @@ def test_what_cannot_be_verified_is_written_by_usd(author):
         made = content(seed)
         expected = layer_metadata.crate_bytes(author.layer(made))
         assert crate_template.usdc(author, made) == expected
-
-
-def test_places_are_found_in_layers_of_one_sample_alone():
-    values = {}
-    for frames in (1, 2):
-        made = replace(content(1, frames), facts={})
-        parts = crate_sections.split_crate(layer_metadata.crate_bytes(Plain().layer(made)))
-        rows = made.samples["rotations"][:1]
-        values[frames] = parts.values
-        assert (crate_sections.find_place(parts.values, rows) is not None) == (frames == 1)
-    rows = content(1, 1).samples["rotations"]
-    assert crate_sections.find_place(values[1], rows + 1) is None
-    place = crate_sections.find_place(values[1], rows)
-    moved = bytearray(values[1])
-    moved[place.jump] += 1
-    assert crate_sections.find_place(bytes(moved), rows) is None

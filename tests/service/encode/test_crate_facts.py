@@ -12,8 +12,6 @@ from test_crate import Plain, built, content
 from test_facts import GIVEN
 
 from posefield.encode.usd_layers import (
-    crate_facts,
-    crate_sections,
     crate_template,
     layer_metadata,
 )
@@ -67,19 +65,3 @@ def test_a_text_with_the_end_of_a_token_is_an_error():
     made = replace(content(1), facts={"a": "x\0y"})
     with pytest.raises(ValueError, match="a fact with the character NUL, expected text without"):
         crate_template.usdc(Plain(), made)
-
-
-def test_a_layer_without_the_mark_has_no_place():
-    bare = replace(content(1), facts={})
-    parts = crate_sections.split_crate(crate_template.usdc(Plain(), bare))
-    assert crate_facts.find_place(parts) is None
-    marked = Plain().layer(bare)
-    marked.customLayerData = {"posefield": crate_facts.MARK}
-    parts = crate_sections.split_crate(layer_metadata.crate_bytes(marked))
-    assert crate_facts.find_place(parts) is not None
-    # Texts of several parts are those of gigabytes.
-    head, *rest = parts.sections
-    size = crate_facts.TOKENS_HEAD.size
-    several = replace(head, content=head.content[:size] + b"\2" + head.content[size + 1 :])
-    assert crate_facts.find_place(replace(parts, sections=(several, *rest))) is None
-    assert crate_facts.find_place(replace(parts, sections=(*rest, head))) is None

@@ -1,9 +1,7 @@
 """Tests of crowd poses in every format, with the clients' readers."""
 
-import dataclasses
 import io
 import json
-from concurrent.futures import ThreadPoolExecutor
 
 import msgpack
 import numpy as np
@@ -46,12 +44,6 @@ def crowd(skeleton, characters):
 @pytest.fixture(scope="module")
 def poses(walk):
     return crowd(walk.clip.skeleton, 23)
-
-
-@pytest.fixture(scope="module")
-def unseen(poses):
-    """The same without a camera and without warnings."""
-    return dataclasses.replace(poses, error_px=None, warnings=())
 
 
 def by_arrow(poses):
@@ -115,13 +107,6 @@ def test_a_block_says_what_it_is(extension, poses):
     assert set(UNITS) < set(facts["units"])
 
 
-@pytest.mark.parametrize("extension", READERS)
-def test_without_a_camera_there_are_no_pixels(extension, unseen):
-    columns, facts = READERS[extension](unseen)
-    assert columns.keys() == {*TENSORS, *NUMBERS} - {"error_px"}
-    assert facts["warnings"] == []
-
-
 def test_arrow_is_read_without_a_copy(poses):
     """The numbers that a client gets lie in the bytes that it received."""
     content = pa.py_buffer(CROWD_ENCODERS["arrow"].encode(poses))
@@ -129,12 +114,3 @@ def test_arrow_is_read_without_a_copy(poses):
     for name in TENSORS:
         address = batch.column(name).to_numpy_ndarray().ctypes.data
         assert content.address <= address < content.address + content.size
-
-
-@pytest.mark.parametrize("extension", READERS)
-def test_threads_write_the_same_bytes(extension, poses):
-    encode, other = CROWD_ENCODERS[extension].encode, crowd(poses.skeleton, 24)
-    expected = [encode(poses), encode(other)] * 8
-    assert expected[0] != expected[1]
-    with ThreadPoolExecutor(max_workers=4) as pool:
-        assert list(pool.map(encode, [poses, other] * 8)) == expected

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
 
-from posefield.encode.character import character
 from posefield.encode.tables import crowd_tables
-from posefield.encode.usd_crowd import crowd_package, crowd_size, crowd_writer
-from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+from posefield.encode.usd_crowd import crowd_writer
 
 MOTION, FRAMES = [0, 1, 2, 0], 7
 FLOAT32 = 1e-7
@@ -68,20 +66,3 @@ def test_npz_has_the_curves_of_every_character(made, tmp_path):
     crowd_tables.write_npz(crowd(replace(made, curves=None)), tmp_path / "crowd.npz")
     with np.load(tmp_path / "crowd.npz") as found:
         assert not [name for name in found.files if "curve" in name]
-
-
-@pytest.mark.parametrize(("ending", "instancing"), crowds.STREAMED)
-def test_a_file_with_many_curves_is_no_larger_than_said(made, ending, instancing):
-    person = conftest.person()
-    for curves, characters, frames in ((52, 3, 200), (52, 40, 2)):
-        values = np.random.default_rng(1).uniform(0.0, 1.0, (3, frames, curves)).astype("f4")
-        many = replace(crowds.motions(person, 3, frames), curves=values)
-        names = tuple(f"shape{index}" for index in range(curves))
-        played = np.arange(characters) % 3
-        given = replace(crowds.crowd(person, many, played), curves=names)
-        size = sum(map(len, crowd_writer.stream(given, ending, instancing)))
-        points = character.body_size(person, "mannequin")
-        counts = CrowdCounts(len(person), characters, 3, frames, points, curves)
-        assert size - 40_000 < crowd_size.file_size_bound(counts, ending, instancing == "flatten")
-        if ending == "usdz":
-            assert size < crowd_package.size_bound(given) or instancing == "flatten"

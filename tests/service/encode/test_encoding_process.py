@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import conftest
 import crowds
-import numpy as np
 import pytest
 from serving import children
 
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
-from posefield.encode.usd_crowd import STREAMS, crowd_size, crowd_writer, encoding_process
-from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+from posefield.encode.usd_crowd import STREAMS, crowd_writer, encoding_process
 from posefield.encode.usd_crowd.encoding_process import EncoderDied
 
 pytestmark = pytest.mark.system
@@ -47,18 +45,6 @@ def test_its_bytes_are_those_of_this_process(crowd, made, ending, instancing):
     apart = b"".join(encoding_process.stream(crowd, ending, instancing))
     again = replace(crowd, batches=crowds.cut(made, 3))
     assert apart == b"".join(crowd_writer.encode_here(again, ending, instancing))
-
-
-def test_a_large_layer_is_encoded_apart(made):
-    person = conftest.person()
-    count = crowd_writer.CHILD_PROCESS_SIZE // crowd_size.CHARACTER
-    few, many = (crowds.crowd(person, made, np.arange(n) % 5) for n in (6, count))
-    assert (
-        crowd_size.layer_size_bound(CrowdCounts(len(person), count, 5, 12, 0), "usdc", False)
-        > crowd_writer.CHILD_PROCESS_SIZE
-    )
-    # The process has ended when the first piece comes, and so has the generator's work here.
-    assert next(crowd_writer.stream(few, "usdc")) and next(crowd_writer.stream(many, "usdc"))
 
 
 def test_a_fault_of_the_motions_is_raised_here(crowd):

@@ -117,17 +117,3 @@ def test_boxes_of_clips_are_exact(seed):
         every = places(person, clip).reshape(-1, 3)
         for ours, theirs in ((low, every.min(axis=0)), (-high, -every.max(axis=0))):
             assert np.all(ours <= theirs) and np.all(theirs - ours < 1e-4)
-
-
-def test_a_turn_in_the_wrong_order_would_be_seen():
-    person, made = ragged(3)
-    rig = character.rig(person)
-    none = np.zeros((len(made), len(person) + len(person.tip_joints)))
-    swapped = [replace(clip, rotations=np.roll(clip.rotations, 1, axis=-1)) for clip in made]
-    found = exact.bounding_boxes(rig.tree, animation_samples.from_clips(swapped), none)
-    assert (
-        np.abs(
-            found - exact.bounding_boxes(rig.tree, animation_samples.from_clips(made), none)
-        ).max()
-        > 0.05
-    )

@@ -74,12 +74,6 @@ def test_command_lines_unpack_it_without_a_word(kind, contents, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
-def test_the_same_files_are_the_same_bytes(kind):
-    assert packed(kind, CONTENTS) == packed(kind, dict(CONTENTS))
-    assert packed(kind, CONTENTS) != packed(kind, dict(reversed(CONTENTS.items())))
-
-
-@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_pieces_come_before_the_next_file_is_made(kind):
     made = []
 

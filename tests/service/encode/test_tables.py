@@ -16,7 +16,7 @@ from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.encode.tables import table as tables
-from posefield.encode.tables.table import Table, arrow_stream, npz_archive, npz_table
+from posefield.encode.tables.table import npz_archive
 from posefield.question.results import PoseAnswer
 
 ROWS = ("times", "rotations", "root_position")
@@ -94,21 +94,6 @@ def test_a_clip_holds_what_its_json_does(extension, walk):
     )
     # Negative control: another frame is farther than rounding.
     assert np.abs(np.array(found["rotations"])[1] - plain["rotations"][0]).max() > 1e-4
-
-
-FORMS = {
-    "json": tables.json_table,
-    "msgpack": tables.msgpack_table,
-    "npz": npz_table,
-    "arrow": arrow_stream,
-}
-
-
-@pytest.mark.parametrize("extension", FORMS)
-def test_truths_are_truths(extension):
-    table = Table({"inside": np.array([True, False, True])}, {"model": "a@b"})
-    found = READERS[extension](FORMS[extension](table))
-    assert np.array(found["inside"]).tolist() == [True, False, True]
 
 
 def test_large_arrays_are_written_in_pieces_that_do_not_show():

@@ -106,16 +106,6 @@ def test_joints_have_legal_unique_leaf_names_and_keep_their_own(stage, walk):
     assert list(value(stage, "/Anim.joints")) == list(joints)
 
 
-def test_every_frame_is_baked_and_scales_are_ones(stage, walk):
-    count = len(walk.clip)
-    for name in ("translations", "rotations"):
-        attribute = stage.GetAttributeAtPath(f"/Character/Anim.{name}")
-        assert attribute.GetTimeSamples() == list(range(count))
-    scales = stage.GetAttributeAtPath("/Character/Anim.scales")
-    assert scales.GetTypeName() == "half3[]"
-    np.testing.assert_array_equal(np.array(scales.Get()), np.ones((20, 3)))
-
-
 def test_neighbouring_quaternions_have_one_sign(stage, walk):
     rotations = stage.GetAttributeAtPath("/Character/Anim.rotations")
     found = np.array([rotations.Get(frame) for frame in range(len(walk.clip))])

@@ -7,7 +7,6 @@ import conftest
 import numpy as np
 import pytest
 
-from posefield.encode.body.skinned_mesh import TINTS
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.encode.usd import clip_arrays, usd_clip
@@ -170,13 +169,6 @@ def chain(joints):
 def test_skeletons_whose_arrays_are_as_large_as_others_will_do(joints):
     given = answers(4, person=chain(joints))
     assert both(given)
-
-
-def test_samples_that_equal_the_tints_are_written_as_usd_does():
-    given = answers(4, person=chain(3))
-    tinted = np.broadcast_to(TINTS, given[3].clip.translations.shape)
-    given[3] = moved(given[3], tinted)
-    assert both(given, Convention(1.0, "y", "bones"))
 
 
 def test_awkward_numbers_are_written_as_usd_does():

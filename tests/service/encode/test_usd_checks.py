@@ -15,12 +15,6 @@ def layer(walk, tmp_path):
     return Sdf.Layer.FindOrOpen(str(path))
 
 
-def cleared(path, name):
-    return lambda layer: layer.GetPrimAtPath(path).RemoveProperty(
-        layer.GetAttributeAtPath(f"{path}.{name}")
-    )
-
-
 def renamed(layer):
     for prim in ("Skel", "Anim"):
         joints = layer.GetAttributeAtPath(f"/Character/{prim}.joints")
@@ -31,11 +25,6 @@ def flipped(layer):
     path = "/Character/Anim.rotations"
     turned = -np.array(layer.QueryTimeSample(path, 3))
     layer.SetTimeSample(path, 3, Vt.QuatfArray.FromNumpy(turned.astype("f4")))
-
-
-def heavy(layer):
-    spec = layer.GetAttributeAtPath("/Character/Body.primvars:skel:jointWeights")
-    spec.default = Vt.FloatArray.FromNumpy(2 * np.array(spec.default, "f4"))
 
 
 def narrow(layer):

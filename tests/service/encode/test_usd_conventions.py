@@ -90,15 +90,3 @@ def test_the_body_and_its_extent_are_where_they_are_in_metres(path, walk, tmp_pa
     expected = np.array(other.GetAttributeAtPath("/Character.extent").Get())
     corners = np.sort(metres(stage, [low, high]), axis=0)
     np.testing.assert_allclose(corners, expected, atol=NEAR)
-
-
-def test_rest_and_bind_transforms_turn_nothing_and_agree(path, walk, convention):
-    stage, skeleton, _ = opened(path)
-    rest = np.array(skeleton.ComputeJointSkelTransforms(0, atRest=True))
-    bind = np.array(skeleton.GetJointWorldBindTransforms())
-    np.testing.assert_allclose(rest, bind, atol=1e-6 / convention.metres_per_unit)
-    np.testing.assert_array_equal(bind[:, :3, :3], np.tile(np.eye(3), (len(bind), 1, 1)))
-    offsets = walk.clip.translations[0].copy()
-    offsets[0] = walk.clip.skeleton.offsets[0]
-    expected = walk.clip.skeleton.at_rest(offsets)
-    np.testing.assert_allclose(metres(stage, bind[:, 3, :3]), expected, atol=1e-6)

@@ -3,7 +3,6 @@ import struct
 import zipfile
 
 import pytest
-from pxr import Usd, UsdSkel
 
 from posefield.encode.files import zip_archive
 from posefield.encode.formats import CLIP_ENCODERS
@@ -31,14 +30,6 @@ def test_data_are_aligned_after_a_name_of_any_length():
         padding = data[30 + length : start]
         assert start % 64 == 0
         assert len(padding) == 4 + int.from_bytes(padding[2:4], "little")
-
-
-def test_pxr_opens_it(archive, tmp_path):
-    path = tmp_path / "clip.usdz"
-    path.write_bytes(archive)
-    stage = Usd.Stage.Open(str(path))
-    assert stage.GetDefaultPrim().IsA(UsdSkel.Root)
-    assert len(stage.GetAttributeAtPath("/Character/Anim.rotations").GetTimeSamples()) == 45
 
 
 def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):

@@ -140,27 +140,6 @@ def replace_question(asked):
     return FileQuestion(controls={}, **asked)
 
 
-def test_packages_are_refused_for_usd_and_hold_the_skeleton_of_gltf(character, motion):
-    if character.rig.format == "USD":
-        with pytest.raises(InvalidField, match="referred to, not copied"):
-            written(character, motion, "usdz")
-    else:
-        path = usd_file(character, motion, "usdz")
-        assert np.abs(stage_positions(path, 3)[0] - motion.clip.positions()[3]).max() < NEAR
-
-
-def test_materials_beside_the_root_prim_are_told(tmp_path, shipped_walk):
-    path = tmp_path / "hero.usdc"
-    usd_rig(path, shipped_walk.session.card)
-    stage = Usd.Stage.Open(str(path))
-    stage.DefinePrim("/Looks/Cloth", "Material")
-    body = stage.GetPrimAtPath("/Character/Body")
-    body.GetRelationship("material:binding").SetTargets(["/Looks/Cloth"])
-    stage.GetRootLayer().Save()
-    (note,) = open_character(path, "./hero.usdc").target.stage.notes
-    assert "/Looks/Cloth" in note and "leaves out" in note
-
-
 def _without_binds(stage):
     stage.GetPrimAtPath("/Character/Skel").RemoveProperty("bindTransforms")
 

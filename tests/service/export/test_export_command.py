@@ -1,6 +1,5 @@
 """Tests of `posefield export`: arguments, output and exit codes."""
 
-import json
 import os
 import pty
 import subprocess
@@ -71,14 +70,6 @@ def test_lines_tell_of_a_resumed_export_where_there_is_no_terminal(export, tmp_p
     assert ": 9 clips, " in out
 
 
-def test_its_facts_as_json(export, table, tmp_path):
-    code, out, err = export(table, "-o", tmp_path / "made", "--json")
-    facts = json.loads(out)
-    assert (code, facts["rows"], facts["done"], facts["export"]["clips"]) == (0, 3, 3, 3)
-    assert facts["export"] == json.loads((tmp_path / "made/export.json").read_text())
-    assert err.startswith(f"{tmp_path}/made: 3 clips")
-
-
 def test_rows_at_fault_are_told_of_by_line(export, table, tmp_path):
     table.write_text(f"{TABLE}again,1.7,0.9,10,1.0,usdc,often\nlow,1.7,0.9,10,1.0,usdc,30\n")
     code, out, err = export(table, "-o", tmp_path / "made")
@@ -89,26 +80,6 @@ def test_rows_at_fault_are_told_of_by_line(export, table, tmp_path):
     assert "/queries.csv:5: fps: 'often', expected" in err
     assert "/queries.csv:6: name: 'low'" in err
     assert not (tmp_path / "made").exists()
-
-
-def test_rows_at_fault_are_skipped_if_asked_to(export, table, tmp_path):
-    table.write_text(f"{TABLE}again,1.7,0.9,10,1.0,usdc,often\n")
-    code, out, err = export(table, "-o", tmp_path / "made", "--skip-errors")
-    assert code == 0
-    assert "3 clips, " in out and "rows skipped and listed in skipped.jsonl: 1" in out
-    assert err.startswith("skipped: queries.csv:5: fps: 'often'")
-    assert exporting.lines(tmp_path / "made/skipped.jsonl")[0]["place"] == "queries.csv:5"
-
-
-def test_a_part_says_that_others_are_missing(export, table, tmp_path):
-    words = (table, "-o", tmp_path / "made", "--chunk", "1", "--shard")
-    code, out, _ = export(*words, "1/2")
-    assert (code, out) == (
-        0,
-        f"{tmp_path}/made: clips of this part: 1, all finished; other parts are not\n",
-    )
-    code, out, _ = export(*words, "0/2")
-    assert code == 0 and ": 3 clips, " in out
 
 
 @pytest.mark.parametrize(

@@ -173,18 +173,3 @@ def test_where_no_more_can_be_written_it_names_the_file(workers, command, undist
     assert 0 < whole(tmp_path, undisturbed) < CLIPS
     go_on(command(tmp_path))
     assert exporting.content(tmp_path) == undisturbed
-
-
-def test_where_usd_core_can_write_no_temporary_file_it_says_so(model_path, tmp_path):
-    """usd-core writes the first clip of a pattern to a temporary file."""
-    words = [POSEFIELD, "export", model_path, "--sample", "4", "-o", tmp_path, "--workers", "1"]
-    process = begun(
-        [*map(str, words)],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)),
-    )
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (3, "")
-    (line,) = err.splitlines()
-    assert "a temporary file of usd-core cannot be written: " in line
-    assert "File too large" in line
-    assert not (tmp_path / "clips").exists()

@@ -92,9 +92,3 @@ def test_a_file_that_cannot_be_created_is_named(folder, tmp_path, monkeypatch):
     with pytest.raises(FileError, match="a: cannot be written or read: broken disk"):
         folder.create("a", b"first")
     assert files(tmp_path) == {}
-
-
-def test_a_place_that_cannot_be_written_is_named(folder, tmp_path):
-    (tmp_path / "clips").write_text("in the way")
-    with pytest.raises(FileError, match="clips/a: cannot be written or read: "):
-        folder.write([("clips/a", b"")])

@@ -1,7 +1,6 @@
 """Tests of export runs: equal bytes for all ways to run, and their reports."""
 
 import hashlib
-import json
 import shutil
 
 import exporting
@@ -54,15 +53,6 @@ def test_the_manifest_is_true(undisturbed, source):
         assert line["sigma"] > 0.0
 
 
-def test_the_export_says_what_it_is(undisturbed, source, model_path):
-    facts = json.loads((undisturbed / "export.json").read_text())
-    assert facts["content"] == hashlib.sha256(model_path.read_bytes()).hexdigest()
-    assert facts["queries"] == source.digest
-    assert (facts["clips"], facts["skipped"], facts["warned"]) == (ROWS, 0, 0)
-    assert facts["bytes"] == sum(f.stat().st_size for f in undisturbed.glob("clips/*/*"))
-    assert set(facts["versions"]) == {"posefield", "numpy", "onnxruntime", "usd-core"}
-
-
 @pytest.mark.system
 @pytest.mark.parametrize("workers", [2, 3])
 def test_processes_make_the_same_bytes(workers, undisturbed, source, model_path, tmp_path):
@@ -96,15 +86,6 @@ def test_what_was_complete_and_lost_a_file_is_made_again(
     outcome = run.run(work, source, exporting.Recorder())
     assert (outcome.already_complete, outcome.done) == (False, ROWS)
     assert exporting.content(target) == exporting.content(undisturbed)
-
-
-def test_what_was_killed_as_it_ended_is_tidied(undisturbed, source, model_path, tmp_path):
-    shutil.copytree(undisturbed, tmp_path, dirs_exist_ok=True)
-    (tmp_path / ".posefield/parts").mkdir(parents=True)
-    (tmp_path / ".posefield/parts/000001.jsonl").write_bytes(b"{}")
-    work = exporting.work(model_path, source, tmp_path)
-    assert run.run(work, source, exporting.Recorder()).already_complete
-    assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
 
 @pytest.mark.parametrize("stop", [1, 2, 3])
@@ -158,15 +139,6 @@ def spoilt(source):
     return exporting.Listed(rows)
 
 
-def test_rows_at_fault_end_it_before_anything_is_written(source, model_path, tmp_path):
-    bad = spoilt(source)
-    with pytest.raises(
-        InvalidField, match=r"rows that cannot be answered: 1 .*:\n  line 6: fps: 'often'"
-    ):
-        run.run(exporting.work(model_path, bad, tmp_path / "t"), bad, exporting.Recorder())
-    assert not (tmp_path / "t").exists()
-
-
 def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp_path):
     rows = [row for row in spoilt(source).rows() if not isinstance(row, RowFault)]
     bad = exporting.Listed(rows)
@@ -192,19 +164,3 @@ def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_p
     assert run.run(work, source, watch, process_pool.runner(2)).facts is not None
     assert model.read_bytes() == b"another"
     assert exporting.content(tmp_path / "target") == exporting.content(undisturbed)
-
-
-def test_it_may_be_completed_by_another_while_its_queries_are_looked_at(
-    undisturbed, source, model_path, tmp_path
-):
-    work = exporting.work(model_path, source, tmp_path / "made")
-
-    class Slow(exporting.Listed):
-        def survey(self):
-            run.run(work, source, exporting.Recorder())
-            return super().survey()
-
-    outcome = run.run(work, Slow(source.rows()), exporting.Recorder())
-    assert (outcome.rows, outcome.done) == (ROWS, ROWS)
-    assert outcome.facts["clips"] == ROWS
-    assert exporting.content(tmp_path / "made") == exporting.content(undisturbed)

@@ -109,12 +109,6 @@ def test_a_large_file_goes_in_pieces_and_what_breaks_off_is_not_there(bucket):
     assert store.read("broken") is None
 
 
-def test_the_address_of_a_folder_is_the_folder(source, model_path, tmp_path, local):
-    work = exporting.work(model_path, source, f"file://{tmp_path}/with%20space")
-    run.run(work, source, exporting.Recorder())
-    assert exporting.content(tmp_path / "with space") == local["folder"]
-
-
 def test_credentials_come_from_the_environment(bucket, monkeypatch):
     """Negative control: with another address in it the server is not found."""
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")

@@ -7,7 +7,7 @@ import pytest
 
 from posefield.batch import scripts as many
 from posefield.batch.scripts import PerformanceBatch
-from posefield.common.errors import FileError, InvalidField
+from posefield.common.errors import InvalidField
 
 
 def walk(**more):
@@ -126,18 +126,6 @@ def test_scripts_that_cannot_be_read_are_named(tmp_path, text, said):
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("file", "content"),
-    [("other.txt", "mine"), ("manifest.jsonl", '{"name": "a", "file": "a"}\n')],
-)
-def test_a_target_of_something_else_is_left_alone(batch, scripts, tmp_path, file, content):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / file).write_text(content)
-    with pytest.raises(FileError):
-        many.run(batch, many.read_scripts(scripts))
-    assert contents(tmp_path / "out") == {file: content.encode()}
-
-
 @pytest.mark.system
 def test_processes_give_the_same_bytes(batch, scripts, tmp_path, models):
     rows = many.read_scripts(scripts)
@@ -160,18 +148,6 @@ def test_the_command_performs_many(posefield, scripts, models, tmp_path):
         "before": 3,
     }
     assert (tmp_path / "out/performances/slow.glb").read_bytes().startswith(b"glTF")
-
-
-def test_a_layout_holds_for_all_files(posefield, scripts, models, tmp_path):
-    words = ("perform", scripts, "--model", models, "--workers", 1, "--format", "usda")
-    for layout, count in (("whole", 0), ("segments", 1)):
-        out = tmp_path / layout
-        assert posefield(*words, "-o", out, "--layout", layout)[0] == 0
-        for path in (out / "performances").iterdir():
-            assert path.read_text().count('def Scope "Segments"') == count
-    assert posefield(*words, "-o", tmp_path / "whole", "--layout", "segments", "--json")[0] == 0
-    text = (tmp_path / "whole/performances/slow.usda").read_text()
-    assert text == (tmp_path / "segments/performances/slow.usda").read_text()
 
 
 @pytest.mark.parametrize(

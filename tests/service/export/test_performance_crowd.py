@@ -103,22 +103,6 @@ def test_a_character_stands_where_its_script_begins_and_keeps_its_last_pose(mode
     assert np.allclose(said["durations"], durations)
 
 
-def test_a_script_that_goes_on_from_poses_stands_at_their_end(models, tmp_path):
-    before = performed(models, written(tmp_path, [SCRIPTS[1]])[0].script).clip
-    poses = [
-        {"rotations": before.rotations[i].tolist(), "root_position": before.root_path[i].tolist()}
-        for i in (-2, -1)
-    ]
-    rows = written(tmp_path, [{"start": {"poses": poses}, "segments": [WALK]}])
-    crowd = PerformanceCrowd((models,), tmp_path / "crowd.usdc")
-    performance_crowd.write(crowd, rows)
-    stage = Usd.Stage.Open(str(crowd.path))
-    clip = performed(models, rows[0].script).clip
-    assert np.abs(world_joints(stage, 0, 20) - clip.positions()[20]).max() < NEAR
-    matrix = stage.GetAttributeAtPath("/Crowd/Characters/c00000.xformOp:transform").Get()
-    assert np.allclose(matrix.ExtractTranslation()[::2], clip.root_path[0, ::2], atol=1e-6)
-
-
 def test_the_stage_complies(models, rows, tmp_path):
     crowd = PerformanceCrowd((models,), tmp_path / "crowd.usdc")
     performance_crowd.write(crowd, rows)

@@ -24,7 +24,7 @@ from rowing import (
 
 from posefield.batch import run
 from posefield.batch.rows import Defaults, RowFault, generated_name, points, repeated_names
-from posefield.common.errors import FileError, InvalidField, QueryError, UnknownFormat
+from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question import json_decoding, text_decoding
 from posefield.question.floor import Floor
@@ -279,35 +279,6 @@ def test_faults_are_counted_and_the_first_are_named(model, tmp_path):
     assert run.check_rows(opened, skip=True) == 700
 
 
-@pytest.mark.parametrize(
-    ("asked", "found"),
-    [
-        ({}, "none"),
-        ({"path": True, "grid": ("turn=1",)}, "a file and --grid"),
-        ({"grid": ("turn=1",), "sample": 0}, "--grid and --sample"),
-    ],
-)
-def test_one_source_is_expected(model, tmp_path, asked, found):
-    path = write_csv(tmp_path / "q.csv", [POINT])
-    asked = {key: path if value is True else value for key, value in asked.items()}
-    with pytest.raises(InvalidField) as caught:
-        source(model, **asked)
-    assert str(caught.value) == f"queries: {found}, expected one of a file, --grid, --sample"
-
-
-@pytest.mark.parametrize(
-    ("usual", "fault"),
-    [
-        (Defaults("fbx"), UnknownFormat),
-        (Defaults("usdc", ClipQuestion(controls={}, performer="nobody")), InvalidField),
-        (Defaults("usdc", ClipQuestion(controls={}, start=2.0, end=1.0)), InvalidField),
-    ],
-)
-def test_defaults_are_checked_before_rows(model, usual, fault):
-    with pytest.raises(fault):
-        source(model, sample=1, usual=usual)
-
-
 def test_a_grid_is_the_product_in_the_order_it_is_given(model):
     texts = ("turn=0:80:17", "stature=1.7,1.75", "performer=tall,short", "format=bvh,usda")
     found = rows(model, grid=texts)
@@ -318,18 +289,6 @@ def test_a_grid_is_the_product_in_the_order_it_is_given(model):
     ] == expected
     assert [row.place for row in found[:2]] == ["grid point 1", "grid point 2"]
     assert found[33].name == "clip-000033"
-
-
-def test_points_of_a_grid_without_an_answer_are_faults(model):
-    usual = Defaults("usdc", ClipQuestion(controls={}, extrapolate="refuse"))
-    middle = tuple(
-        f"{c.name}={c.default!r}" for c in model.session.card.controls if c.name != "turn"
-    )
-    found = rows(model, usual=usual, grid=(*middle, "turn=80:90:3"))
-    assert [isinstance(row, RowFault) for row in found] == [False, False, True]
-    assert found[2].message.startswith("controls: turn = 90 deg lies outside what was sampled")
-    (fault,) = rows(model, grid=("turn=x",))
-    assert (fault.place, fault.message) == ("grid point 1", "turn: 'x', expected a finite number")
 
 
 @pytest.mark.parametrize(

@@ -72,15 +72,6 @@ def test_each_gets_the_bytes_that_it_gets_alone(model):
         assert all(np.array_equal(a, b) for a, b in zip(row, own, strict=True))
 
 
-def test_levels_are_not_mixed(model):
-    own, feeds = counted(model)
-    levels = range(len(own.session.card.levels))
-    asked = [question(own, 4.0, level=level) for level in levels for _ in range(3)]
-    feeds.clear()
-    together(own, asked)
-    assert rows(feeds)[2:] == [3] * len(levels)
-
-
 def test_one_that_has_no_answer_harms_no_other(model):
     asked = [question(model, 4.0, time) for time in (0.1, 99.0, 0.2)]
     first, wrong, last = together(model, asked)

@@ -27,10 +27,3 @@ def threads():
 def test_blas_keeps_to_one_thread():
     server.limit_threads()
     assert threads() == {1}
-
-
-@pytest.mark.parametrize("name", SINGLE_THREAD_ENV)
-def test_the_environment_counts_more(monkeypatch, name):
-    monkeypatch.setenv(name, "2")
-    server.limit_threads()
-    assert threads() == {2}

@@ -25,14 +25,6 @@ def test_every_kind_is_a_client_error_but_one():
 
 
 @pytest.mark.parametrize(
-    ("parts", "expected"),
-    [((), ""), (("times", "0"), "/times/0"), (("controls", "a/b~c"), "/controls/a~1b~0c")],
-)
-def test_pointers_escape_what_rfc_6901_says(parts, expected):
-    assert problems.json_pointer(*parts) == expected
-
-
-@pytest.mark.parametrize(
     ("error", "where"),
     [
         (InvalidField("controls/a/b", "1e9, expected less", 17), "/controls/a~1b/17"),

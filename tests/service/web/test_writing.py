@@ -5,7 +5,6 @@ import gc
 import weakref
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from msgspec import structs
 
@@ -84,16 +83,6 @@ def test_conventions_are_not_mixed(calls, answers):
     assert files == [USDC.encode(answers[0], c) for c in (METRES, CENTIMETRES)]
 
 
-def test_a_long_clip_keeps_nobody_waiting(calls, answers):
-    encoder, made = calls
-    clip = answers[0].clip
-    times = -(-clip_batching.MAX_BATCHED_FRAMES // len(clip)) + 1
-    turns, moves = (np.tile(a, (times, 1, 1)) for a in (clip.rotations, clip.translations))
-    long = replace(answers[0], clip=replace(clip, rotations=turns, translations=moves))
-    written(encoder, [(METRES, long)] * 3)
-    assert made == [1, 1, 1]
-
-
 def test_a_fault_reaches_everybody_and_the_next_is_written(answers):
     def broken(asked, convention):
         raise RuntimeError("broken")
@@ -108,21 +97,6 @@ def test_a_fault_reaches_everybody_and_the_next_is_written(answers):
     faults, file = asyncio.run(ask())
     assert [str(fault) for fault in faults] == ["broken"] * 3
     assert file == USDC.encode(answers[0], METRES)
-
-
-def test_a_client_that_went_away_is_passed_over(calls, answers):
-    encoder, made = calls
-
-    async def ask():
-        desk = ClipBatcher()
-        tasks = [asyncio.create_task(desk.file(encoder, METRES, a)) for a in answers[:3]]
-        await asyncio.sleep(0)
-        tasks[1].cancel()
-        return await asyncio.gather(*tasks, return_exceptions=True)
-
-    first, gone, last = asyncio.run(ask())
-    assert isinstance(gone, asyncio.CancelledError) and made == [2]
-    assert (first, last) == tuple(USDC.encode(a, METRES) for a in (answers[0], answers[2]))
 
 
 def made(model, asked, encoder=USDC, most=frame_times.MAX_POSES):
