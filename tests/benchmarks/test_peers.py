@@ -77,16 +77,6 @@ def test_thin_plates_are_scipys_own(points, queries):
     assert np.abs(predicted("cubic_rbf", laid(points), values, queries) - own).max() > 1e-3
 
 
-def test_smoothing_is_chosen_by_what_is_left_out(points, queries, rng):
-    noisy = linear(points) + 0.3 * rng.standard_normal((24, 2))
-    smoothed = predicted("thin_plate_smoothed", laid(points), noisy, queries)
-    plain = predicted("thin_plate", laid(points), noisy, queries)
-    truth = linear(queries)
-    assert np.abs(smoothed - truth).mean() < 0.7 * np.abs(plain - truth).mean()
-    clean = predicted("thin_plate_smoothed", laid(points), linear(points), queries)
-    assert np.abs(clean - truth).max() < 1e-6
-
-
 def test_equal_controls_are_trials_of_one_motion(points, queries):
     values = curved(points)
     twice = laid(np.vstack([points, points]))
@@ -137,14 +127,3 @@ def test_left_out_weights_are_those_of_a_peer_without_the_part(two):
     known, asked = samples.half_ranges[~out], samples.half_ranges[out]
     expected = RBFInterpolator(known, values[~out], kernel="thin_plate_spline", degree=1)(asked)
     assert np.abs((own.left_out @ values)[out] - expected).max() < EXACT
-
-
-def test_a_part_that_carries_the_line_is_not_left_out_whole():
-    """Every thirteenth take is off the line of the others; dealt into parts they share one."""
-    height = np.zeros(26)
-    height[[0, 12]] = 1.0
-    points = np.stack([np.arange(26.0), height], axis=1)
-    parts = linear_smoothers.left_out_parts(laid(points))
-    assert len(parts) == 26
-    # Negative control: of points in general position, parts are fewer.
-    assert len(linear_smoothers.left_out_parts(laid(points + np.sin(points[:, ::-1] * 7)))) == 12

@@ -42,13 +42,6 @@ def test_controls_come_first_in_half_ranges_and_labels_after_them():
     ]
 
 
-def test_without_a_label_nobody_is_told_apart():
-    laid, labels = sample_points.make_samples(recipe(label=None), examples())
-    assert labels == {}
-    assert (laid.points.shape, laid.labels) == ((6, 1), ())
-    assert laid.unnamed
-
-
 def test_clips_of_one_file_are_one_group():
     groups = sample_points.make_samples(recipe(), examples())[0].groups
     same = [[a == b for a in FILES] for b in FILES]

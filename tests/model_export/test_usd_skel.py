@@ -139,14 +139,6 @@ def test_sparse_samples_need_a_rate_at_which_they_are_sampled(path):
     assert found.rate == 30.0 and np.abs(found.translations[:, 0, 0] - expected).max() < 1e-6
 
 
-def test_samples_between_whole_time_codes_are_frames(path):
-    made = usd_files.stage(path, codes=24.0)
-    usd_files.animation(made, "/Root/Anim", 0.2 * CODES, swing())
-    saved(made)
-    found = read(path)
-    assert found.rate == 120.0 and np.abs(places(found)[:, 1] - hand()).max() < 1e-6
-
-
 def test_value_clips_are_followed(path, tmp_path):
     """Samples of the animation are in two files beside the stage."""
     made = usd_files.stage(path)
