@@ -5,7 +5,6 @@ import logging
 import re
 from urllib.parse import urlencode
 
-import numpy as np
 import pytest
 from asking import asker
 
@@ -43,22 +42,6 @@ def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded)
     assert answer.headers["posefield-supported"] == str(trust.supported).lower() == "true"
     assert "posefield-warning" not in answer.headers
     assert answer.headers["content-disposition"] == f'attachment; filename="reach.{extension}"'
-
-
-def test_a_file_measures_as_asked_for(ask, controls):
-    usual, stage = (
-        ask("GET", url(f"{CLIP}.json", controls, **said)).json()
-        for said in ({}, {"unit": "cm", "up": "z"})
-    )
-    assert (usual["units"]["length"], usual["units"]["up"]) == ("metre", "Y")
-    assert (stage["units"]["length"], stage["units"]["up"]) == ("centimetre", "Z")
-    root = np.array(usual["root_position"])
-    turned = 100.0 * np.stack([root[:, 0], -root[:, 2], root[:, 1]], axis=-1)
-    np.testing.assert_allclose(stage["root_position"], turned, atol=1e-4)
-    assert stage["trust"] == usual["trust"]
-    metres, usual = (ask("GET", url(f"{CLIP}.bvh", controls, **u)) for u in ({"unit": "m"}, {}))
-    assert metres.content != usual.content
-    assert usual.content == ask("GET", url(f"{CLIP}.bvh", controls, unit="cm")).content
 
 
 def test_each_control_outside_the_samples_gives_a_warning(ask, controls, loaded):

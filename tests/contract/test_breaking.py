@@ -49,10 +49,6 @@ def without(place, *names):
 
 # How a contract may be changed, and what is then said of it.
 BREAKING = {
-    "path": (
-        lambda s: without(s["paths"], "/livez"),
-        "GET /livez: gone",
-    ),
     "format": (
         lambda s: s["components"]["parameters"]["tableFormat"]["schema"]["enum"].remove("npz"),
         f"POST {POSE}.npz: gone",
@@ -69,21 +65,9 @@ BREAKING = {
         lambda s: schema(s, "Names")["enum"].remove("vrm"),
         "Names (asked): no longer 'vrm'",
     ),
-    "upper bound": (
-        lambda s: s["components"]["parameters"]["fps"]["schema"].update(maximum=999),
-        "GET /v1/models/{model}/clip fps: maximum 999 was 1000",
-    ),
-    "field of a question": (
-        lambda s: without(schema(s, "PoseQuestion")["properties"], "level"),
-        "PoseQuestion (asked)/level: gone",
-    ),
     "field of an answer": (
         lambda s: without(schema(s, "Trust")["properties"], "sigma"),
         "Trust (answered)/sigma: gone",
-    ),
-    "type of an answer": (
-        lambda s: schema(s, "ModelSummary")["properties"]["name"].update(type=["string", "null"]),
-        "ModelSummary (answered)/name: now may be null",
     ),
 }
 

@@ -79,12 +79,6 @@ def test_a_tag_holds_for_the_name_and_the_hash(ask, loaded, controls):
     assert hashed.headers["cache-control"] == "public, max-age=31536000, immutable"
 
 
-def test_an_operator_may_let_caches_use_a_name_unasked(loaded, controls):
-    ask = asker(create_app(loaded, Settings(alias_seconds=60)))
-    answer = ask("GET", asked(controls, "clip.bvh?"))
-    assert answer.headers["cache-control"] == "public, max-age=60"
-
-
 def test_another_model_under_the_same_name_has_other_tags(models, tmp_path, ask, controls):
     shutil.copy(models / "walk.onnx", tmp_path / "reach.onnx")
     other = asker(create_app(model_registry.load([tmp_path]), Settings()))

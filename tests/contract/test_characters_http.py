@@ -155,10 +155,3 @@ def test_the_entity_tag_depends_on_the_characters(ask, shipped_walk, folder, tmp
     # Without a character, nothing depends on the folder.
     plain = [each("GET", url, params=WALK).headers["etag"] for each in (ask, other)]
     assert plain[0] == plain[1] != tag
-
-
-def test_answers_with_a_character_are_not_immutable(ask, shipped_walk):
-    url = f"/v1/models/{shipped_walk.identity}/clip.glb"
-    plain = ask("GET", url, params=WALK).headers["cache-control"]
-    delivered = ask("GET", url, params={**WALK, "character": "small"}).headers["cache-control"]
-    assert "immutable" in plain and "immutable" not in delivered and "no-cache" in delivered

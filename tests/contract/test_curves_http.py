@@ -6,7 +6,7 @@ import jsonschema
 import msgspec
 import numpy as np
 import pytest
-from asking import asker, unpacked
+from asking import asker
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
@@ -92,18 +92,3 @@ def test_bvh_says_that_it_carries_no_curves_and_what_does(face, ask):
         assert warnings(face("GET", f"/v1/models/face/clip.{other}?{QUERY}")) == []
     # A model without curves has none to leave out.
     assert warnings(ask("GET", "/v1/models/reach/clip.bvh")) == []
-
-
-def test_archives_and_exports_of_bvh_say_so_in_the_manifest(face, model_file, posefield, tmp_path):
-    body = {"format": "bvh", "clips": [{"controls": CONTROLS, "name": "one"}]}
-    found = face("POST", "/v1/models/face/clips.zip", json=body)
-    (said,) = warnings(found)
-    assert "bvh files carry no curves" in said
-    entry = json.loads(unpacked("zip", found.content)["manifest.jsonl"])
-    assert entry["warnings"] == [said]
-    table = tmp_path / "queries.jsonl"
-    table.write_text(json.dumps({**CONTROLS, "name": "one"}) + "\n")
-    for form, expected in (("bvh", [said]), ("usdc", [])):
-        words = ("export", model_file("face"), table, "-o", tmp_path / form, "--format", form)
-        assert posefield(*words)[0] == 0
-        assert json.loads((tmp_path / form / "manifest.jsonl").read_bytes())["warnings"] == expected

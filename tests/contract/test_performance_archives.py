@@ -111,11 +111,3 @@ def test_counts_are_limited_before_any_work(loaded):
     large = small("POST", f"{BATCH}.zip", content=b" " * 2001, headers={"content-type": JSON})
     assert large.status_code == 413
     assert small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 3)).status_code == 200
-
-
-def test_the_duration_of_all_is_limited(loaded):
-    small = asker(create_app(loaded, Settings(performances_seconds=3)))
-    assert small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 2)).status_code == 200
-    # The last script would be refused, but is not reached.
-    answer = small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 4 + [FAR_MODEL]))
-    assert_refused(answer, 422, "/scripts", "s with script 3, expected at most 3 s in all")

@@ -79,19 +79,6 @@ def test_a_wrong_parameter_is_named(query, status, parameter, ask):
     assert answer.json()["errors"][0]["parameter"] == parameter
 
 
-@pytest.mark.parametrize(
-    ("change", "status", "pointer"),
-    [
-        ({"across": None}, 400, "/across"),
-        ({"controls": {"turn": 1}}, 422, "/controls/turn"),
-    ],
-)
-def test_a_wrong_body_is_pointed_at(change, status, pointer, ask):
-    answer = ask("POST", SIGMA, json={"across": "turn", "along": "stature", **change})
-    assert answer.status_code == status, answer.text
-    assert answer.json()["errors"][0]["pointer"] == pointer
-
-
 def test_how_large_a_grid_may_be_is_a_setting(loaded):
     small = asker(create_app(loaded, Settings(grid_limit=15)))
     assert small("GET", f"{SIGMA}?{ASKED}").status_code == 200

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from asking import unpacked
 
 MODEL = "/v1/models/walk"
 
@@ -34,31 +33,12 @@ def test_a_take_is_another_clip_and_has_an_entity_tag_of_its_own(clip):
     assert take.json()["trust"]["take"] == said and "take" not in mean.json()["trust"]
 
 
-def test_variety_scales_a_take(clip):
-    mean, half, whole = (clip(take=7, variety=variety) for variety in (0, 0.5, 1))
-    assert apart(mean, clip()) < 1e-5
-    assert apart(mean, whole) == pytest.approx(2.0 * apart(mean, half), rel=0.2)
-
-
 def test_a_pose_of_a_take_is_that_of_its_clip(ask, clip):
     pose = ask("GET", f"{MODEL}/pose.json", params={"time": 0.2, "take": 7}).json()
     frame = clip(take=7, feet="as_predicted").json()["rotations"][4]
     assert np.abs(np.array(pose["rotations"][0]) - frame).max() < 1e-6
     plain = ask("GET", f"{MODEL}/pose.json", params={"time": 0.2}).json()
     assert np.abs(np.array(plain["rotations"][0]) - frame).max() > 1e-3
-
-
-def test_bodies_and_archives_have_takes(ask, clip):
-    controls = clip().json()["trust"]["controls"]
-    taken = clip(take=7, **controls)
-    body = {"controls": controls, "fps": 20, "take": 7}
-    posted = ask("POST", f"{MODEL}/clip.json", json=body)
-    assert posted.json()["rotations"] == taken.json()["rotations"]
-    clips = [{"controls": controls, "take": seed} for seed in (0, 7, 7)]
-    packed = ask("POST", f"{MODEL}/clips", json={"format": "bvh", "clips": clips})
-    files = unpacked("zip", packed.content).items()
-    mean, first, second = (content for name, content in files if name.endswith(".bvh"))
-    assert first == second != mean
 
 
 @pytest.mark.parametrize(

@@ -110,19 +110,6 @@ def test_a_clip_meets_its_target(ask):
     assert "targets" not in plain["trust"] and held["trust"]["warnings"] == []
 
 
-def test_poses_are_those_of_the_clip(ask):
-    clip = ask("GET", query("clip.json", fps=25, target=WORDS)).json()
-    times = [0, 0.4, 1.2]
-    pose = ask("GET", query("pose", time=times, target=WORDS)).json()
-    assert pose["trust"] == clip["trust"]
-    for name in ("rotations", "root_position"):
-        expected = np.array(clip[name])[[0, 10, 30]]
-        # Poses travel in single precision.
-        assert np.abs(np.array(pose[name]) - expected).max() < 1e-6
-    free = ask("GET", query("pose", time=times)).json()
-    assert np.abs(np.array(free["rotations"]) - np.array(pose["rotations"])).max() > 1e-4
-
-
 @pytest.mark.parametrize("extension", ["bvh", "usdc", "glb", "npz"])
 def test_what_is_missed_is_said_in_headers(ask, extension):
     answer = ask("GET", query(f"clip.{extension}", target="LeftHand@end:0,1,5"))

@@ -138,15 +138,6 @@ def test_lines_are_written_whole():
     assert lines == [*[short] * 100, long, *[short] * 100]
 
 
-def test_a_line_names_the_trace_of_its_request(told):
-    parent = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"
-    _, (line,) = told("GET", "/livez", headers={"traceparent": parent})
-    assert line["trace"] == "4bf92f3577b34da6a3ce929d0e0e4736"
-    for strange in ("00-xyz-00f067aa0ba902b7-01", parent + "-more", ""):
-        _, (line,) = told("GET", "/livez", headers={"traceparent": strange})
-        assert line["trace"] is None
-
-
 def test_a_version_that_is_gone_is_shown_to_be():
     metrics.set_models(["gone@0123456789abcdef"], {})
     metrics.set_models([], {})

@@ -14,7 +14,6 @@ import pytest
 from serving import address, children, host_and_port, process, started, within
 
 from posefield.common.cpu_cores import SINGLE_THREAD_ENV
-from posefield.http import server
 
 pytestmark = pytest.mark.system
 
@@ -179,14 +178,6 @@ def test_numpy_has_one_thread_in_each_unless_the_operator_says_otherwise(
                 f"{name}={value}".encode() for name, value in (threads or SINGLE_THREAD_ENV).items()
             }
             assert said == expected
-
-
-@pytest.mark.parametrize(("quota", "most"), [("20000 100000", 1), ("1 100000", 1), (None, 10_000)])
-def test_as_many_as_the_container_may_use(quota, most, tmp_path):
-    file = tmp_path / "cpu.max"
-    if quota:
-        file.write_text(f"{quota}\n")
-    assert server.usable_processors(file) == min(most, len(os.sched_getaffinity(0)))
 
 
 def test_ctrl_c_during_a_health_check_is_logged_as_no_death(models):

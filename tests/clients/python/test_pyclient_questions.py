@@ -13,7 +13,7 @@ from posefield_client import Client, Floor, Target, generated, numbers
 from posefield_client.errors import WrongQuestion
 from posefield_client.numbers import Pose, SigmaGrid
 from posefield_client.wire import Reply
-from requests_of import CLIENT, body, request, sent
+from requests_of import CLIENT, request, sent
 
 M = CLIENT.model("m")
 HAND = {"joint": "mixamorig:Hand", "position": np.array([0.5, -1e-7, 2]), "at": "end"}
@@ -33,14 +33,6 @@ def test_controls_by_keyword_and_by_mapping_are_the_same():
     expected = [("turn", "1"), ("time", "0")]
     assert query(lambda client: client.model("m").pose(0, turn=1)) == expected
     assert query(lambda client: client.model("m").pose(0, controls={"turn": 1})) == expected
-
-
-def test_labels_are_a_parameter_each_and_weights_a_list():
-    labels = {"style": {"angry": 0.75, "happy": 0.25}, "performer": "kim"}
-    expected = [("label", text) for text in ("style=angry:0.75,happy:0.25", "performer=kim")]
-    assert query(lambda client: client.model("m").suggest(labels=labels)) == expected
-    assert query(M.crowd_walk(count=3, labels=labels)) == [("count", "3"), *expected]
-    assert body(M.crowd(0, labels=labels), "npz")["labels"] == labels
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import asyncio
 import io
 from concurrent.futures import ThreadPoolExecutor
-from stat import S_IMODE
 
 import pytest
 import scripted
@@ -174,16 +173,3 @@ def test_headers_that_cannot_be_read_leave_nothing(said, tmp_path):
     ):
         save(server.address, tmp_path / "clip.usdc")
     assert list(tmp_path.iterdir()) == []
-
-
-def saved_over(path):
-    with scripted.serving(answer(b"whole", USDC)) as server:
-        save(server.address, path)
-    return server
-
-
-def test_a_file_keeps_its_permissions(tmp_path):
-    path = tmp_path / "clip.usdc"
-    path.touch(0o600)
-    saved_over(path)
-    assert S_IMODE(path.stat().st_mode) == 0o600

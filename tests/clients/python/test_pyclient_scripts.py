@@ -5,12 +5,11 @@ import zipfile
 import msgspec
 import numpy as np
 import pytest
-from posefield_client import Client, Script, errors
+from posefield_client import Client, Script
 from posefield_client.errors import WrongQuestion
 from requests_of import body, request
 
 from posefield.question import json_decoding
-from posefield.question.performance_batch_question import PerformancesQuestion
 from posefield.question.performance_question import PerformanceQuestion
 
 HAND = {"joint": "rhand", "position": np.array([0.4, 1.6, 4.6]), "at": "event"}
@@ -97,35 +96,6 @@ def test_a_performance_is_planned_and_saved(address, tmp_path):
     assert [each.kind for each in planned.segments] == ["walk", "walk"]
     assert saved.path.read_bytes().startswith(b"PXR-USDC") and saved.duration == planned.duration
     assert "2 segments" in repr(numbers) and repr(performance) == "Motion(2 segments)"
-
-
-@pytest.mark.parametrize(
-    ("script", "options", "pointer"),
-    [
-        (Script().walk("walk", seconds=1).act("reech"), {}, "/segments/1/model"),
-        (
-            Script().act("reach", targets=[{"joint": "Hand", "position": (0, 0, 0)}]),
-            {},
-            "/segments/0/targets/0",
-        ),
-    ],
-)
-def test_the_service_points_at_the_part_of_a_script(script, options, pointer, address):
-    with Client(address) as client, pytest.raises(errors.Problem) as caught:
-        client.plan(script, **options)
-    assert caught.value.errors[0].pointer.startswith(pointer)
-
-
-def test_an_archive_has_named_scripts():
-    script = Script().walk("a", seconds=1)
-    named = {"name": "left", "fps": 24, **script.document()}
-    asked = request(CLIENT.performances([script, named], "usdc", layout="segments"), "tar")
-    assert asked.target == "/v1/performances/batch.tar"
-    scripts = [script.document(), named]
-    expected = {"format": "usdc", "layout": "segments", "scripts": scripts}
-    assert msgspec.json.decode(asked.body) == expected
-    question = json_decoding.decode_question(PerformancesQuestion, asked.body)
-    assert [each.name for each in question.scripts] == [None, "left"]
 
 
 def test_many_performances_are_saved_with_their_reports(address, tmp_path):

@@ -185,21 +185,6 @@ def test_our_own_check_and_the_official_ones_find_nothing(path):
     assert all("missing-frame" in each or "frames without" in each for each in defects(path))
 
 
-@pytest.mark.parametrize("ending", ["usd", "usdz"])
-def test_a_crowd_that_is_not_loaded_still_says_how_large_it_is(ending, made, clip, tmp_path):
-    path = tmp_path / f"crowd.{ending}"
-    crowd_writer.write(crowds.crowd(conftest.person(), made, MOTION), path)
-    stage = Usd.Stage.Open(str(path), Usd.Stage.LoadNone)
-    unloaded = stage.GetPrimAtPath("/Crowd/Characters").GetAllChildren()
-    assert len(unloaded) == len(MOTION)
-    assert not any(prim.IsLoaded() for prim in unloaded)
-    assert all(prim.GetAttribute("extent").Get() for prim in unloaded)
-    stage.Load()
-    assert (
-        error(stage, crowds.positions(crowds.crowd(conftest.person(), made, MOTION), made)) < NEAR
-    )
-
-
 class TestNegativeControls:
     """Crowds that are wrong in one way must be seen to be."""
 

@@ -6,7 +6,6 @@ import resource
 import subprocess
 import sys
 import tempfile
-import tracemalloc
 import weakref
 import zipfile
 from copy import deepcopy
@@ -147,29 +146,6 @@ def watch(batch, earlier):
     arrays = (value for value in vars(copy).values() if value is not None)
     earlier.extend(map(weakref.ref, arrays))
     return copy
-
-
-def test_a_longer_archive_takes_no_more_memory():
-    peak(8)
-    (few, _), (many, sent) = peak(8), peak(40)
-    # Prims and zip entries of each character are some hundred bytes of its 60 kB.
-    assert many < 1.15 * few
-    assert many < sent / 4
-
-
-def peak(count):
-    """Bytes that NumPy and Python hold at most while an archive of so many motions is sent; and
-    how many bytes are sent."""
-    person = conftest.person()
-    batches = (crowds.motions(person, 1, 100, seed) for seed in range(count))
-    given = replace(
-        crowds.crowd(person, crowds.motions(person, 1, 100), range(count)), batches=batches
-    )
-    tracemalloc.start()
-    sent = sum(map(len, crowd_writer.stream(given, "usdz")))
-    held = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return held, sent
 
 
 @pytest.mark.parametrize(("ending", "instancing"), [("usdc", "references"), ("usdz", "flatten")])

@@ -11,7 +11,7 @@ from pxr import Usd, UsdSkel
 from posefield.encode.character import joint_names
 from posefield.encode.files.file_convention import METRES
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd import usd_animation, usd_clip, usd_library
+from posefield.encode.usd import usd_clip
 from posefield.encode.usd_layers import (
     layer_metadata,
 )
@@ -102,20 +102,6 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
         assert usd_clip.usda([made], METRES) == [expected]
         (binary,) = usd_clip.usdc([made], METRES)
         assert layer_metadata.crate_text(binary).encode() == expected
-
-
-def test_a_library_binds_the_weights_of_its_clips_to_shapes_of_its_body(face, tmp_path):
-    (content,) = usd_animation.usdc([face], METRES)
-    (tmp_path / "laugh.usdc").write_bytes(content)
-    entry = usd_library.library_entry("laugh", "laugh.usdc", face)
-    written = usd_library.library_stage(face.clip.skeleton, METRES, 30.0, [entry], NAMES)
-    opened = stage(written, tmp_path / "library.usda")
-    animation = UsdSkel.Animation(opened.GetPrimAtPath("/Character/Clips/laugh"))
-    assert tuple(animation.GetBlendShapesAttr().Get()) == NAMES
-    skinned = UsdSkel.BindingAPI(opened.GetPrimAtPath("/Character/Body"))
-    assert UsdSkel.BlendShapeQuery(skinned).GetNumBlendShapes() == len(NAMES)
-    without = usd_library.library_stage(face.clip.skeleton, METRES, 30.0, [entry])
-    assert b"BlendShape" not in without and b"BlendShape" in written
 
 
 def gltf(content):

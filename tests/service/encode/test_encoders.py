@@ -1,4 +1,3 @@
-import dataclasses
 import io
 from concurrent.futures import ThreadPoolExecutor
 
@@ -28,12 +27,6 @@ def test_json_holds_the_clip(keyframes, walk):
     np.testing.assert_allclose(keyframes["root_position"], clip.root_path, atol=1e-6)
     np.testing.assert_allclose(keyframes["bone_offsets"][1:], clip.translations[0, 1:], atol=1e-6)
     assert keyframes["bone_offsets"][0] == [0.0, 0.0, 0.0]
-
-
-def test_json_never_holds_nan(walk):
-    unknown = dataclasses.replace(walk.trust, sigma=float("nan"))
-    data = CLIP_ENCODERS["json"].encode(dataclasses.replace(walk, trust=unknown))
-    assert orjson.loads(data)["trust"]["sigma"] is None
 
 
 def test_bvh_is_in_centimetres(walk):

@@ -9,7 +9,7 @@ import pytest
 
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
-from posefield.encode.usd import clip_arrays, usd_clip
+from posefield.encode.usd import usd_clip
 from posefield.encode.usd_layers import (
     crate_template,
     layer_content,
@@ -91,14 +91,6 @@ def test_a_clip_is_the_same_alone_and_among_others(extension):
     assert write(given, METRES) == alone
     assert write(given[::-1], METRES) == alone[::-1]
     assert write([], METRES) == []
-
-
-def test_clips_too_long_to_be_made_together_are_written():
-    """Two that are too long together, and one that is too long by itself."""
-    given = [*answers(2, 1700), *answers(1, 3300, seed=1)]
-    lengths = [len(answer.clip) for answer in given]
-    assert max(lengths[:2]) < clip_arrays.FRAMES_AT_ONCE < min(sum(lengths[:2]), lengths[2])
-    assert both(given)
 
 
 def closed(answer):

@@ -98,14 +98,6 @@ def test_what_makes_no_sense_is_refused(words, said, export, table, tmp_path):
     assert not (tmp_path / "made").exists()
 
 
-@pytest.mark.parametrize("place", ["", "file://", "file://clips/made"])
-def test_a_target_that_names_no_place_is_refused(place, export, table):
-    """Else the root of the file system would be taken."""
-    code, out, err = export(table, "-o", place)
-    assert (code, out) == (2, "")
-    assert err.startswith("posefield: output: ") and "expected " in err
-
-
 @pytest.mark.system
 def test_a_terminal_sees_a_bar(model_path, tmp_path):
     ours, its = pty.openpty()

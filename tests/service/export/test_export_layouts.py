@@ -69,18 +69,6 @@ def test_the_manifest_of_an_archive_is_its_last_member(layout, made):
     assert together == (made["folder"] / "manifest.jsonl").read_bytes()
 
 
-@pytest.mark.parametrize("layout", ["tar", "zip"])
-def test_an_archive_that_was_cut_short_is_made_again(layout, made, source, model_path, tmp_path):
-    work = exporting.work(model_path, source, tmp_path, CHUNK, layout)
-    run.run(work, source, exporting.Recorder(2))
-    archive = tmp_path / f"clips-000001.{layout}"
-    archive.write_bytes(archive.read_bytes()[:-1])
-    watch = exporting.Recorder()
-    run.run(work, source, watch)
-    assert watch.begun == (ROWS, CHUNK)
-    assert exporting.content(tmp_path) == exporting.content(made[layout])
-
-
 def test_a_library_is_one_character_that_can_play_every_clip(made, source, model_path):
     synthesizer = synthesis.load([model_path]).models["reaching"]
     stage = Usd.Stage.Open(str(made["library"] / "character.usd"))

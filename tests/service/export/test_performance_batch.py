@@ -78,25 +78,6 @@ def test_only_what_changed_is_made_again(batch, scripts, tmp_path):
     assert contents(out)["performances/slow.bvh"] != whole["performances/slow.bvh"]
 
 
-def test_a_stopped_run_is_resumed_with_the_same_bytes(batch, scripts, tmp_path, models):
-    rows = many.read_scripts(scripts)
-
-    class Stopped(Exception):
-        pass
-
-    def stop(count):
-        if count and len(list((tmp_path / "out/performances").iterdir())) == 2:
-            raise Stopped
-
-    with pytest.raises(Stopped):
-        many.run(batch, rows, advance=stop)
-    assert not (tmp_path / "out/manifest.jsonl").exists()
-    assert many.run(batch, rows).before == 2
-    other = PerformanceBatch((models,), str(tmp_path / "other"), "bvh")
-    many.run(other, rows)
-    assert contents(tmp_path / "out") == contents(tmp_path / "other")
-
-
 def test_all_scripts_at_fault_are_named_and_nothing_is_written(batch, tmp_path):
     path = tmp_path / "scripts.jsonl"
     reech = {"segments": [{"kind": "act", "model": "reech"}]}

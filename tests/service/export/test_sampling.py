@@ -1,7 +1,5 @@
 """Tests of samplings: stratification, points in the hull and reproducible bytes."""
 
-import subprocess
-import sys
 from collections import Counter
 from dataclasses import replace
 from itertools import permutations
@@ -24,21 +22,6 @@ from posefield.registry import model_registry
 UNLIKELY = 1e-6
 # A point is a sum of a few products of numbers up to 100.
 ROUNDING = 1e-12
-
-PRINTED = """
-import hashlib, sys
-from pathlib import Path
-from posefield.batch.rows import Defaults, SourceOptions, open_source
-from posefield.registry import model_registry
-model = model_registry.load([Path(sys.argv[1])]).models["labelled"]
-for method in ("latin", "hull"):
-    asked = SourceOptions(sample=5000, method=method, seed=3)
-    source = open_source(asked, Defaults("usdc"), model)
-    found = hashlib.sha256()
-    for row in source.rows():
-        found.update(repr(row).encode())
-    print(source.digest, found.hexdigest())
-"""
 
 
 @pytest.fixture(scope="module")
@@ -174,17 +157,6 @@ def test_a_sampling_is_latin_by_seed_0_unless_it_is_said(model):
     assert rows(model, sample=50) == rows(model, sample=50, method="latin", seed=0)
     assert rows(model, sample=50) != rows(model, sample=50, method="hull", seed=0)
     assert rows(model, sample=50)[7].place == "sample 8"
-
-
-@pytest.mark.system
-def test_a_sampling_is_the_same_in_every_process(labelled_path):
-    def printed():
-        command = [sys.executable, "-c", PRINTED, labelled_path]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
-    first = printed()
-    assert len(set(first.split())) == 4
-    assert printed() == first
 
 
 def test_numbers_of_a_seed_are_those_of_ever(card):

@@ -173,21 +173,6 @@ def test_the_first_character_of_whom_nothing_is_known_is_named(known):
     assert caught.value.index == 2
 
 
-@pytest.mark.parametrize(
-    ("body", "field"),
-    [
-        ({"level": [2, 3]}, "level"),
-        ({"level": "auto", "camera": CAMERA, "previous_level": [2, 3]}, "previous_level"),
-    ],
-)
-def test_a_level_that_a_model_does_not_have_is_named(body, field):
-    found = asked(**changed(**body))
-    crowd_question.check_levels(found, 4)
-    with pytest.raises(InvalidField, match="3, expected 0 to 2") as caught:
-        crowd_question.check_levels(found, 3)
-    assert (caught.value.field, caught.value.index) == (field, 1)
-
-
 @given(st.binary())
 def test_any_bytes_are_a_question_or_refused(content):
     with pytest.raises(FormError):

@@ -107,19 +107,3 @@ def test_a_place_is_held_until_work_that_does_not_look_has_ended(times):
         assert places.borrowed_tokens == 0
 
     asyncio.run(scene())
-
-
-def test_work_that_waits_for_a_place_never_begins_when_it_is_cancelled():
-    async def scene():
-        places, work, never = CapacityLimiter(1), Work(), Work()
-        first = asyncio.create_task(worker_threads.run_in_thread(work, places=places))
-        await begun(work)
-        second = asyncio.create_task(worker_threads.run_in_thread(never, places=places))
-        await asyncio.sleep(0.01)
-        second.cancel()
-        await cancelled(second)
-        first.cancel()
-        await cancelled(first)
-        assert not never.begun.is_set()
-
-    asyncio.run(scene())

@@ -190,13 +190,6 @@ def test_no_address_in_a_token_is_asked(checker, token, listener):
     assert asked == []
 
 
-def test_without_an_id_the_only_key_is_meant(checker, pairs):
-    claims = {"iss": "https://issuer", "aud": "posefield", "exp": time.time() + 60}
-    assert checker.find(jwt.encode(claims, pairs["one"][0], "RS256"))
-    with pytest.raises(InvalidCredentials):
-        checker.find(jwt.encode(claims, pairs["two"][0], "RS256"))
-
-
 def test_a_key_that_goes_takes_its_tokens_with_it(checker, token, source, pairs):
     given = token()
     checker.find(given)
