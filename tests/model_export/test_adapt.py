@@ -188,6 +188,7 @@ def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
     who = np.eye(3)[[model.bank.labels["performer"].index("new")]]
     for example in shown:
         seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]
+        assert seconds == pytest.approx(example.clip.duration, rel=0.05)
         found = model.evaluate(example.controls[None], np.array([[0.0, seconds]]), who)
         way = example.clip.root_path[-1] - example.clip.root_path[0]
         gone = found.root_position[0, 1] - found.root_position[0, 0]
