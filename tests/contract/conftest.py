@@ -1,8 +1,10 @@
 """Fixtures of the contract's tests: a service with the small model `reach`, and clients."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 import yaml
 from asking import Ask, asker
@@ -42,3 +44,14 @@ def controls(loaded) -> dict[str, float]:
 @pytest.fixture(scope="session")
 def spec() -> dict[str, Any]:
     return yaml.safe_load((ROOT / "api/openapi.yaml").read_bytes())
+
+
+@pytest.fixture(scope="session")
+def valid(spec) -> Callable[[str, Any], None]:
+    """Validate a value by a schema of the contract."""
+
+    def check(name: str, value: Any) -> None:
+        schema = {"$ref": f"#/components/schemas/{name}", "components": spec["components"]}
+        jsonschema.Draft202012Validator(schema).validate(value)
+
+    return check

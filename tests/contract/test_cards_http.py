@@ -25,17 +25,6 @@ def opened(walk_path):
     return session.load(walk_path)
 
 
-@pytest.fixture
-def valid(spec):
-    """Function that validates a value by a schema of the contract."""
-
-    def check(name, value):
-        schema = {"$ref": f"#/components/schemas/{name}", "components": spec["components"]}
-        jsonschema.Draft202012Validator(schema).validate(value)
-
-    return check
-
-
 def test_a_measured_control_says_how(measured_walk_path, valid):
     card = served("measured", session.load(measured_walk_path))("GET", "/v1/models/measured").json()
     assert [control["measure"] for control in card["controls"]] == [

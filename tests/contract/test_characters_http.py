@@ -4,7 +4,6 @@ import io
 import json
 import zipfile
 
-import jsonschema
 import numpy as np
 import pytest
 from asking import asker
@@ -50,10 +49,9 @@ def saved(folder, name, response):
     return folder / name
 
 
-def test_the_list_has_the_characters_and_why_files_are_left_out(ask, folder, spec):
+def test_the_list_has_the_characters_and_why_files_are_left_out(ask, folder, valid):
     found = ask("GET", "/v1/characters").json()
-    schema = {"$ref": "#/components/schemas/CharacterList", "components": spec["components"]}
-    jsonschema.Draft202012Validator(schema).validate(found)
+    valid("CharacterList", found)
     named = {own["name"]: own for own in found["characters"]}
     assert list(named) == ["hero", "odd", "small"]
     assert (named["hero"]["file"], named["hero"]["format"]) == ("hero.usdc", "USD")
@@ -76,15 +74,14 @@ def test_without_a_folder_there_are_none(shipped_walk):
     assert refused.status_code == 422 and "no characters" in refused.json()["detail"]
 
 
-def test_a_clip_moves_the_character(ask, folder, spec):
+def test_a_clip_moves_the_character(ask, folder, valid):
     response = ask("GET", f"{CLIP}.usdc", params={**WALK, "character": "hero"})
     path = saved(folder, "served.usd", response)
     joints, points = stage_positions(path, 5)
     plain = stage_positions(folder / "hero.usdc", 0)[0]
     assert len(points) > 100 and np.abs(joints - plain).max() > 0.1
     document = ask("GET", f"{CLIP}.json", params={**WALK, "character": "hero"}).json()
-    schema = {"$ref": "#/components/schemas/Trust", "components": spec["components"]}
-    jsonschema.Draft202012Validator(schema).validate(document["trust"])
+    valid("Trust", document["trust"])
     told = document["trust"]["retargeting"]
     assert (told["character"], told["file"]) == ("hero", "hero.usdc") and told["skate"] < 0.05
     assert "mixamorig:LeftFoot" in document["names"]
@@ -127,15 +124,14 @@ def test_archives_move_the_character(ask, folder):
     assert refused.status_code == 422 and "expected one of hero" in refused.json()["detail"]
 
 
-def test_performances_move_the_character(ask, folder, spec):
+def test_performances_move_the_character(ask, folder, valid):
     url = "/v1/performances"
     response = ask("POST", f"{url}.usda?character=hero", json=SCRIPT)
     path = saved(folder, "performed.usd", response)
     assert len(stage_positions(path, 10)[1]) > 100
     path.unlink()
     report = ask("POST", f"{url}.json?character=hero", json=SCRIPT).json()["trust"]
-    schema = {"$ref": "#/components/schemas/PerformanceReport", "components": spec["components"]}
-    jsonschema.Draft202012Validator(schema).validate(report)
+    valid("PerformanceReport", report)
     assert report["retargeting"]["file"] == "hero.usdc"
     body = {"format": "usda", "character": "hero", "scripts": [{**SCRIPT, "name": "one"}]}
     archive = ask("POST", f"{url}/batch.zip", json=body)

@@ -4,7 +4,6 @@ import asyncio
 import json
 
 import httpx
-import jsonschema
 import pytest
 from asking import Answer, asker
 
@@ -124,13 +123,12 @@ def test_every_kind_is_provoked_here_and_is_one_of_all():
 
 @pytest.mark.system
 @pytest.mark.parametrize("kind", PROBLEM_KINDS, ids=lambda kind: kind.name)
-def test_it_comes_with_its_status_title_and_link(kind, app, spec):
+def test_it_comes_with_its_status_title_and_link(kind, app, valid):
     answer = PROVOKED[kind.name](app)
     assert (answer.status, answer.headers["link"]) == (kind.status, kind.help)
     assert answer.headers["content-type"] == "application/problem+json"
     problem = json.loads(answer.body)
-    schema = {"$ref": "#/components/schemas/Problem", "components": spec["components"]}
-    jsonschema.validate(problem, schema, jsonschema.Draft202012Validator)
+    valid("Problem", problem)
     assert (problem["type"], problem["title"]) == (kind.type, kind.title)
     assert problem["instance"] == answer.headers["x-request-id"]
     places = [name for error in problem["errors"] for name in error if name != "detail"]

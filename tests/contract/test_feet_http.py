@@ -1,19 +1,16 @@
-"""Feet of clips over HTTP and on the command line: the default, the two words, and the facts."""
+"""Feet of clips over HTTP: the default, the two words, and the facts."""
 
 import io
 import json
 import zipfile
 
-import jsonschema
 import pytest
 from asking import asker
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.concurrency.readiness import Readiness
 from posefield.inference import session
 from posefield.registry.model_registry import ModelRegistry
-from posefield.registry.model_reload import FixedRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 
 
@@ -23,8 +20,12 @@ def walk(measured_walk_path):
 
 
 @pytest.fixture(scope="module")
-def get(walk):
-    ask = asker(create_app(Readiness(FixedRegistry(ModelRegistry({"walk": walk}))), Settings()))
+def ask(walk):
+    return asker(create_app(ModelRegistry({"walk": walk}), Settings()))
+
+
+@pytest.fixture(scope="module")
+def get(walk, ask):
     controls = {control.name: control.default for control in walk.session.card.controls}
 
     def answer(path="clip.json", **more):
@@ -35,10 +36,9 @@ def get(walk):
     return answer
 
 
-def test_the_facts_are_those_of_the_contract(get, spec):
-    schema = {"$ref": "#/components/schemas/FeetResult", "components": spec["components"]}
+def test_the_facts_are_those_of_the_contract(get, valid):
     told = get(feet="stand").json()["trust"]["feet"]
-    jsonschema.Draft202012Validator(schema).validate(told)
+    valid("FeetResult", told)
     assert len(told["stances"]) >= 2 and told["swings"] >= 2
     assert told["skate"] < told["skate_before"] and told["drift"] < 1e-6
 
@@ -48,8 +48,7 @@ def test_the_default_is_to_stand_and_answers_are_repeatable(get):
     assert get("clip.bvh").content != get("clip.bvh", feet="as_predicted").content
 
 
-def test_a_floor_is_one_answer_in_a_link_a_body_and_a_command(walk, get, spec, tmp_path):
-    ask = asker(create_app(Readiness(FixedRegistry(ModelRegistry({"walk": walk}))), Settings()))
+def test_a_floor_is_one_answer_in_a_link_a_body_and_an_archive(ask, get, valid):
     plane = {"height": 0.1, "slope_x": 0.0, "slope_z": 0.2}
     linked = get("clip.json", floor="0.1,0,0.2")
     body = {"controls": linked.json()["trust"]["controls"], "floor": plane}
@@ -57,8 +56,7 @@ def test_a_floor_is_one_answer_in_a_link_a_body_and_a_command(walk, get, spec, t
     assert sent.status_code == 200 and sent.content == linked.content
     told = linked.json()["trust"]["feet"]
     assert told["floor"] == plane
-    schema = {"$ref": "#/components/schemas/FeetResult", "components": spec["components"]}
-    jsonschema.Draft202012Validator(schema).validate(told)
+    valid("FeetResult", told)
     assert get("clip.bvh", floor="0").content == get("clip.bvh").content
     many = {"format": "json", "clips": [body, {**body, "floor": 0.2}]}
     archive = ask("POST", "/v1/models/walk/clips.zip", json=many)
@@ -72,8 +70,7 @@ def test_a_floor_is_one_answer_in_a_link_a_body_and_a_command(walk, get, spec, t
 
 
 @pytest.mark.parametrize("floor", ["0.1,0", "high", "11", "0,0.5,0"])
-def test_a_floor_that_is_none_is_refused(walk, floor):
-    ask = asker(create_app(Readiness(FixedRegistry(ModelRegistry({"walk": walk}))), Settings()))
+def test_a_floor_that_is_none_is_refused(ask, floor):
     found = ask("GET", "/v1/models/walk/clip.bvh", params={"floor": floor})
     assert found.status_code in (400, 422)
     assert found.json()["errors"][0]["parameter"].startswith("floor")

@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from urllib.parse import urlencode
 
-import jsonschema
 import pytest
 import recorded
 from asking import asker
@@ -19,15 +18,14 @@ JSON = {"content-type": "application/json"}
 
 
 @pytest.fixture
-def assert_refused(ask, spec):
+def assert_refused(ask, valid):
     """Ask, and hold the refusal against the one shape of errors."""
-    schema = {"$ref": "#/components/schemas/Problem", "components": spec["components"]}
 
     def asked(status, kind, method, url, **content):
         answer = ask(method, url, **content)
         assert answer.headers["content-type"] == "application/problem+json", answer.text
         problem = answer.json()
-        jsonschema.validate(problem, schema, jsonschema.Draft202012Validator)
+        valid("Problem", problem)
         assert problem["status"] == answer.status_code == status, problem
         assert problem["type"] == f"urn:posefield:problem:{kind}"
         assert problem["instance"] == answer.headers["x-request-id"]
