@@ -16,7 +16,7 @@ from typing import Any
 import onnx
 import onnxruntime
 
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 
 Feed = dict[str, Any]
 PRODUCTS = ("MatMul", "Gemm")
@@ -34,7 +34,7 @@ class Part:
 
 def of(content: bytes, level: int, feed: Feed) -> dict[str, Part]:
     """Parts of a run of a model's level on one thread, by the name of their group."""
-    model = onnx.load_from_string(subgraph.fix_level(content, level))
+    model = onnx.load_from_string(onnx_file.fix_level(content, level))
     for node in model.graph.node:
         node.name = node.output[0]
     groups = _groups(model.graph)

@@ -11,7 +11,7 @@ from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.motion.crowd_clip import CrowdPoses, Placement
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.crowd_question import CrowdQuestion
+from posefield.validation.crowd_validation import CrowdQuestion
 
 EYES = np.array([0.0, 1.6, 0.0])
 CAMERA = Camera(EYES, math.radians(60.0), 1080.0)

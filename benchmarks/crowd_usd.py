@@ -15,7 +15,7 @@ from rows import Row, table
 from timing import in_turn
 
 from posefield.common.units import Indices
-from posefield.encode.character import joint_names
+from posefield.encode.character import character
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.motion import quat
 from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
@@ -141,7 +141,7 @@ def _schemas(
 def _character(
     stage: Any, at: str, person: Skeleton, made: Motions, index: int, convert: Convert
 ) -> None:
-    joints = joint_names.joint_paths(joint_names.legal_names(person.names), person.parents)
+    joints = character.joint_paths(character.legal_names(person.names), person.parents)
     root = UsdSkel.Root.Define(stage, at)
     skeleton = UsdSkel.Skeleton.Define(stage, f"{at}/Skel")
     animation = UsdSkel.Animation.Define(stage, f"{at}/Anim")

@@ -19,12 +19,12 @@ from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, record, table
 from timing import in_turn
 
-from posefield.encode.character import character, joint_names
+from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.formats import METRES
-from posefield.encode.usd import usd_animation, usd_clip, usd_library
-from posefield.encode.usd_layers import crate_template, layer_metadata
-from posefield.encode.usd_layers.layer_content import LayerBuilder, LayerContent
+from posefield.encode.usd import usd_clip, usd_library
+from posefield.encode.usd_layers import crate_template, layers
+from posefield.encode.usd_layers.layers import LayerBuilder, LayerContent
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -47,7 +47,7 @@ def _layers(answers: list[ClipAnswer]) -> list[Row]:
     one, made = answers[0], list(usd_clip.builders_and_contents(answers, METRES))
     expected = [author.layer(content).ExportToString() for author, content in made]
     for _ in range(2):
-        if list(map(layer_metadata.crate_text, usd_clip.usdc(answers, METRES))) != expected:
+        if list(map(layers.crate_text, usd_clip.usdc(answers, METRES))) != expected:
             raise AssertionError("usdc differs from what usd-core writes")
     with TemporaryDirectory(dir=FOLDER) as folder:
         path, (author, content) = Path(folder, "clip.usdc"), made[0]
@@ -106,7 +106,7 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
     taken = in_turn(
         {
             "whole": lambda: usd_clip.usdc(answers, METRES),
-            "bare": lambda: usd_animation.usdc(answers, METRES),
+            "bare": lambda: usd_clip.animation_usdc(answers, METRES),
             "warned": lambda: usd_clip.usdc(_warned(answers), METRES),
             "new": lambda: _new(answers[:3]),
         },
@@ -151,7 +151,7 @@ def _stage(answer: ClipAnswer, entries: list[usd_library.LibraryEntry]) -> bytes
 
 
 def _crate(author: LayerBuilder, content: LayerContent) -> bytes:
-    return layer_metadata.crate_bytes(author.layer(content))
+    return layers.crate_bytes(author.layer(content))
 
 
 def _first(answers: list[ClipAnswer]) -> tuple[usd_clip.ClipLayerBuilder, LayerContent]:
@@ -230,7 +230,7 @@ def _schemas(clip: Clip, content: LayerContent, convert: Convert, path: Path) ->
 def _skeleton(stage: Any, rig: CharacterRig, content: LayerContent) -> Any:
     made = UsdSkel.Skeleton.Define(stage, "/Character/Skel")
     made.CreateJointsAttr(rig.paths)
-    made.CreateJointNamesAttr(joint_names.legal_names(rig.names))
+    made.CreateJointNamesAttr(character.legal_names(rig.names))
     made.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["bind"]))
     made.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["rest"]))
     return made

@@ -17,7 +17,7 @@ from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, GRID_ENCODER
 from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
 from posefield.inference import session
-from posefield.model_file import checksum
+from posefield.model_file import checked_file
 from posefield.model_file.model_card import Control
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
@@ -96,7 +96,7 @@ def other_version(content: bytes) -> bytes:
             tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
     # The checksum is the last entry.
     del model.metadata_props[-1]
-    return checksum.append_checksum(bytes(model.SerializeToString()))
+    return checked_file.append_checksum(bytes(model.SerializeToString()))
 
 
 def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:

@@ -14,7 +14,7 @@ from paper import naive_kriging
 from paper.naive_kriging import NaiveKriging
 
 from posefield.common.units import Floats
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
@@ -106,7 +106,7 @@ class Contents:
             ABOUT,
         )
         # Nodes that no output needs would be computed, too: those of our own poses and sigma.
-        return subgraph.select_outputs(
+        return onnx_file.select_outputs(
             whole, "rotation_rows", "root_rows", "offset_rows", "durations"
         )
 

@@ -29,7 +29,7 @@ from posefield.common.array_shapes import Frames
 from posefield.feet import foot_placement
 from posefield.performance import composition
 from posefield.performance.passage import RATE
-from posefield.registry import model_registry, shipped_models
+from posefield.registry import model_registry
 from posefield.synthesis.synthesizer import Synthesizer
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -228,7 +228,7 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--record", action="store_true")
     given = parser.parse_args(arguments)
     models = {
-        **model_registry.load([shipped_models.FOLDER / f"{WALK}.onnx"]).models,
+        **model_registry.load([model_registry.SHIPPED_FOLDER / f"{WALK}.onnx"]).models,
         **model_registry.load(given.models).models,
     }
     find = models.__getitem__

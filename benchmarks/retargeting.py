@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from rows import Row, table
 
-from posefield.console.arguments import open_model
+from posefield.console.options import open_model
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import SampledClip, Trust
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.retarget.retargeting import RetargetReport, retarget
 from posefield.rigs.rig import Rig, read_rig
 from posefield.synthesis import clips
@@ -103,7 +103,7 @@ def captured_walks(data: Path) -> list[Motion]:
 
 def shipped_walks() -> list[Motion]:
     """Return clips of the shipped walk, whose feet stand."""
-    model = open_model(shipped_models.FOLDER / "cmu_walk.onnx")
+    model = open_model(model_registry.SHIPPED_FOLDER / "cmu_walk.onnx")
     roles = model.session.card.roles
     return [
         Motion(
@@ -136,7 +136,7 @@ def figures(name: str, found: Sequence[RetargetReport]) -> Iterator[Row]:
 
 def spent(motion: Motion, rig: Rig) -> Row:
     """Return the processor time of 100 frames, against that of the clip's synthesis."""
-    model = open_model(shipped_models.FOLDER / "cmu_walk.onnx")
+    model = open_model(model_registry.SHIPPED_FOLDER / "cmu_walk.onnx")
     times = []
     for run in (
         lambda: clips.synthesize_clip(model, ClipQuestion(controls={}, fps=RATE)),

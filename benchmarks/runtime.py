@@ -15,8 +15,8 @@ from naive_graphs import Contents
 from rows import Row
 from timing import in_turn
 
-from posefield.model_file import subgraph
-from posefield.model_file.row_values import ROW_VALUES
+from posefield.model_file import onnx_file
+from posefield.model_file.model_card import ROW_VALUES
 from posefield.synthesis.poses import POSE_OUTPUTS
 
 FRAMES, POSES = 100, 256
@@ -69,8 +69,8 @@ def rows(made: Family) -> list[Row]:
 def _own(made: Family, outputs: tuple[str, ...]) -> Any:
     """Return a session on outputs of the model at its finest level, as the service opens it."""
     values = [ROW_VALUES[output] for output in outputs]
-    fixed = subgraph.fix_level(made.exported.content, 0)
-    return _session(subgraph.select_outputs(fixed, *values))
+    fixed = onnx_file.fix_level(made.exported.content, 0)
+    return _session(onnx_file.select_outputs(fixed, *values))
 
 
 def _batch_rows(made: Family, content: Contents, ours: Asked) -> list[Row]:

@@ -16,7 +16,7 @@ import orjson
 import uvicorn
 
 from posefield.inference import onnx_runtime, session
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 from posefield.synthesis.poses import POSE_OUTPUTS
 
 
@@ -24,8 +24,8 @@ def main(model: Path, port: int) -> None:
     """Answer for a model until ended."""
     opened = session.load(model)
     names = [control.name for control in opened.card.controls]
-    fixed = subgraph.fix_level(model.read_bytes(), 0)
-    runtime = onnx_runtime.open_session(subgraph.select_outputs(fixed, *POSE_OUTPUTS), model.stem)
+    fixed = onnx_file.fix_level(model.read_bytes(), 0)
+    runtime = onnx_runtime.open_session(onnx_file.select_outputs(fixed, *POSE_OUTPUTS), model.stem)
     ask, identity = runtime.run, f"{model.stem}@{opened.digest}"
     outputs = [*POSE_OUTPUTS]
 

@@ -22,9 +22,9 @@ from serve import ALONE, MANY, QUESTIONS, TOGETHER, crowd_body, get_requests, po
 from serve_load import Cost, Load, in_turn, post
 from serve_process import POSEFIELD, Server, free_port, started
 
-from posefield.encode.files.file_convention import METRES
+from posefield.encode.conventions import METRES
 from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS
-from posefield.http.decoding import crowd_query
+from posefield.http import crowd_operations
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips, crowd_synthesis
@@ -160,7 +160,7 @@ def _together_rows(model: Synthesizer, many: Sequence[dict[str, float]]) -> list
 
 
 def _encoding_seconds(model: Synthesizer, body: bytes) -> dict[str, float]:
-    poses = crowd_synthesis.synthesize_crowd(model, crowd_query.of_body(body, MANY))
+    poses = crowd_synthesis.synthesize_crowd(model, crowd_operations.of_body(body, MANY))
     return _in_turn({name: lambda name=name: CROWD_ENCODERS[name].encode(poses) for name in BINARY})
 
 

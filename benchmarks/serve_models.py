@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 import httpx
 from rows import Row, table
 
-from posefield.model_file import checksum, protobuf_wire
+from posefield.model_file import checked_file, onnx_file
 
 POSEFIELD = Path(sys.executable).with_name("posefield")
 MODEL = Path("build/models/reaching.onnx")
@@ -46,11 +46,9 @@ def content(model: Path, number: int) -> bytes:
 
 def numbered(sealed: bytes, number: int) -> bytes:
     """A model file with a number in its metadata, and the checksum of that."""
-    entry = protobuf_wire.encode_bytes(1, b"number") + protobuf_wire.encode_bytes(
-        2, b"%04d" % number
-    )
-    return checksum.append_checksum(
-        sealed[: -checksum.SIZE] + protobuf_wire.encode_bytes(14, entry)
+    entry = onnx_file.encode_bytes(1, b"number") + onnx_file.encode_bytes(2, b"%04d" % number)
+    return checked_file.append_checksum(
+        sealed[: -checked_file.CHECKSUM_SIZE] + onnx_file.encode_bytes(14, entry)
     )
 
 

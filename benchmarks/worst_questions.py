@@ -9,8 +9,8 @@ from typing import Any
 from posefield.common.errors import InvalidField
 from posefield.constraints.targets import MAX_TARGETS
 from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from posefield.http import crowd_operations
 from posefield.http.api.settings import Settings
-from posefield.http.decoding import crowd_query
 from posefield.question import text_decoding
 from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
@@ -125,7 +125,7 @@ def _crowds(one: _Asked) -> Iterator[Question]:
         said = f"{count} characters, all columns, blended, {ending}"
         yield one.post("crowd of poses", said, f"crowd.{ending}", _columns(one, count))
     # As many numbers as are decoded, to be refused then.
-    count = crowd_query.VALUES * SETTINGS.crowd_limit - 1000
+    count = crowd_operations.VALUES * SETTINGS.crowd_limit - 1000
     asked = {"controls": one.controls, "time": [0] * count}
     yield one.post("crowd of poses", f"{count} numbers", "crowd.arrow", asked)
 
@@ -187,7 +187,7 @@ def _legal(one: _Asked, ending: str, query: str) -> bool:
     try:
         asked = text_decoding.decode_question(WalkQuestion, pairs)
         joints = len(one.model.session.card.skeleton)
-        crowd_query.checked_order(asked, ending, joints, SETTINGS)
+        crowd_operations.checked_order(asked, ending, joints, SETTINGS)
     except InvalidField:
         return False
     return True

@@ -238,6 +238,6 @@ def models(labelled_path, walk_path, tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def shipped_walk():
     """The shipped model of walks, whose skeleton has roles."""
-    from posefield.registry import shipped_models
+    from posefield.registry import model_registry
 
-    return shipped_models.with_shipped([]).find("cmu_walk")
+    return model_registry.with_shipped([]).find("cmu_walk")

@@ -3,8 +3,14 @@
 import numpy as np
 
 from posefield.kriging.kriging_model import Hyper, LabelKernel
-from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, Event, LabelSet, ModelCard, TrainingParameters
+from posefield.model_file.model_card import (
+    Control,
+    Event,
+    LabelSet,
+    Level,
+    ModelCard,
+    TrainingParameters,
+)
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 

@@ -4,7 +4,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from posefield.model_file import checksum, protobuf_wire
+from posefield.model_file import checked_file, onnx_file
 
 METADATA = 14
 """Number of the field of an ONNX file that holds an entry of its metadata."""
@@ -12,20 +12,20 @@ METADATA = 14
 
 def numbered(content: bytes, number: int) -> bytes:
     """Return the same model in other bytes: a number is written into its metadata."""
-    entry = protobuf_wire.encode_bytes(1, b"number") + protobuf_wire.encode_bytes(
-        2, b"%04d" % number
-    )
-    return checksum.append_checksum(
-        content[: -checksum.SIZE] + protobuf_wire.encode_bytes(METADATA, entry)
+    entry = onnx_file.encode_bytes(1, b"number") + onnx_file.encode_bytes(2, b"%04d" % number)
+    return checked_file.append_checksum(
+        content[: -checked_file.CHECKSUM_SIZE] + onnx_file.encode_bytes(METADATA, entry)
     )
 
 
 def written(model: onnx.ModelProto) -> bytes:
     """Return a changed model as posefield would have written it, with the checksum of its bytes."""
-    others = [entry for entry in model.metadata_props if entry.key != checksum.KEY.decode()]
+    others = [
+        entry for entry in model.metadata_props if entry.key != checked_file.CHECKSUM_KEY.decode()
+    ]
     del model.metadata_props[:]
     model.metadata_props.extend(others)
-    return checksum.append_checksum(model.SerializeToString(deterministic=True))
+    return checked_file.append_checksum(model.SerializeToString(deterministic=True))
 
 
 def slow(content: bytes) -> bytes:
@@ -42,7 +42,9 @@ def large(content: bytes, numbers: int = 1_500_000_000) -> bytes:
 def many(content: bytes) -> bytes:
     """Return a model with millions of empty nodes, which take long to read."""
     model = onnx.ModelProto(graph=onnx.GraphProto(node=[onnx.NodeProto()] * 10_000_000))
-    return checksum.append_checksum(content[: -checksum.SIZE] + model.SerializeToString())
+    return checked_file.append_checksum(
+        content[: -checked_file.CHECKSUM_SIZE] + model.SerializeToString()
+    )
 
 
 def _with_sigma(content: bytes, shape: list[int], products: int) -> bytes:

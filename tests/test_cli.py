@@ -14,7 +14,7 @@ from pxr import Usd, UsdSkel
 from rich.text import Text
 
 from posefield import __version__, cli
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry

@@ -15,9 +15,9 @@ SCRIPT = {"segments": [{"kind": "walk", "model": "cmu_walk", "seconds": 1.5}], "
 
 @pytest.fixture(scope="module")
 def shipped_path(shipped_walk):
-    from posefield.registry import shipped_models
+    from posefield.registry import model_registry
 
-    return shipped_models.FOLDER / "cmu_walk.onnx"
+    return model_registry.SHIPPED_FOLDER / "cmu_walk.onnx"
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import pytest
 import serving
 from pxr import Usd, UsdSkel
 
-from posefield.cli import command_demo
+from posefield.cli import command_serve
 from posefield_train.source import bvh
 
 pytestmark = pytest.mark.system
@@ -39,14 +39,14 @@ def made(tmp_path_factory):
 
 def test_every_file_is_written_and_named(made):
     folder, said = made
-    assert {path.name for path in folder.iterdir()} == set(command_demo.FILES)
-    for name, question in command_demo.FILES.items():
+    assert {path.name for path in folder.iterdir()} == set(command_serve.FILES)
+    for name, question in command_serve.FILES.items():
         (line,) = (line for line in said.splitlines() if f"{folder / name} " in line)
         assert f"{(folder / name).stat().st_size:,} bytes" in line and line.endswith(question)
-    assert said.splitlines()[-1].startswith(f"{len(command_demo.FILES)} files in {folder}")
+    assert said.splitlines()[-1].startswith(f"{len(command_serve.FILES)} files in {folder}")
 
 
-@pytest.mark.parametrize("speed", command_demo.SPEEDS)
+@pytest.mark.parametrize("speed", command_serve.SPEEDS)
 def test_walks_have_the_speed_of_their_names(made, speed):
     folder, _ = made
     read = bvh.read(folder / f"walk_{speed}.bvh")
@@ -54,7 +54,7 @@ def test_walks_have_the_speed_of_their_names(made, speed):
     first, last = clip.root_path[[0, -1]]
     walked = float(((last - first)[[0, 2]] ** 2).sum() ** 0.5) / clip.duration
     assert walked == pytest.approx(speed, abs=EXACT * 5)
-    assert min(abs(other - speed) for other in command_demo.SPEEDS if other != speed) > 0.3
+    assert min(abs(other - speed) for other in command_serve.SPEEDS if other != speed) > 0.3
     assert (folder / f"walk_{speed}.glb").read_bytes().startswith(b"glTF")
 
 

@@ -22,8 +22,11 @@ from posefield.http.performance_operations import MAX_SCRIPT_BYTES
 from posefield.performance import join_quality
 from posefield.performance.script import MAX_SECONDS
 from posefield.question import json_decoding
-from posefield.question.performance_batch_question import PerformancesQuestion
-from posefield.question.performance_question import MAX_SEGMENTS, PerformanceQuestion
+from posefield.question.performance_question import (
+    MAX_SEGMENTS,
+    PerformanceQuestion,
+    PerformancesQuestion,
+)
 from posefield.question.performance_report import JoinReport, PerformanceReport
 from posefield_train.cli import commands
 from posefield_train.source.recipe import Recipe
@@ -184,7 +187,7 @@ def test_every_table_column_is_described():
 
 
 def test_every_metric_is_described():
-    source = (ROOT / "service/posefield/http/telemetry/metrics.py").read_text()
+    source = (ROOT / "service/posefield/http/metrics.py").read_text()
     names = re.findall(r'^ +"(posefield_\w+)"', source, re.MULTILINE)
     assert len(names) >= 7
     assert undescribed([*names, "posefield_build"], page("operate/metrics.md")) == []

@@ -8,7 +8,7 @@ import pytest
 
 from posefield.mcp import Toolbox
 from posefield.motion import skeleton
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.source import ingest, recipe
@@ -42,7 +42,7 @@ def trained_folder(real_data, tmp_path_factory):
 
 @pytest.fixture
 def box(trained_folder, tmp_path):
-    return Toolbox(shipped_models.with_shipped([trained_folder]), tmp_path)
+    return Toolbox(model_registry.with_shipped([trained_folder]), tmp_path)
 
 
 def test_every_script_is_listed_here():

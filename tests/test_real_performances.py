@@ -19,7 +19,7 @@ from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question.json_decoding import decode_question
 from posefield.question.performance_question import PerformanceQuestion
-from posefield.registry import model_registry, shipped_models
+from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
@@ -52,7 +52,7 @@ def segments(**walk):
 @pytest.fixture(scope="module")
 def library(real_data):
     """The shipped models, and those of the reach, its return, and a kick."""
-    found = dict(model_registry.load([shipped_models.FOLDER]).models)
+    found = dict(model_registry.load([model_registry.SHIPPED_FOLDER]).models)
     for name in ("hdm05_grab_high", "hdm05_grab_return", "hdm05_kick"):
         own = recipe.read(RECIPES / f"{name}.toml")
         examples, notes = ingest.ingest(own, real_data)

@@ -12,7 +12,7 @@ import serving
 from posefield.inference import session
 from posefield.model_file import checked_file
 from posefield.question.motion_question import ClipQuestion
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -24,7 +24,7 @@ SAME = 1e-5
 
 
 def file(name):
-    return shipped_models.FOLDER / f"{name}.onnx"
+    return model_registry.SHIPPED_FOLDER / f"{name}.onnx"
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +33,13 @@ def cards():
 
 
 def test_the_walk_ships_first_and_is_small():
-    found = sorted(path.name for path in shipped_models.FOLDER.glob("*.onnx"))
+    found = sorted(path.name for path in model_registry.SHIPPED_FOLDER.glob("*.onnx"))
     assert found == [f"{name}.onnx" for name in NAMES]
     assert all(file(name).stat().st_size < 150_000 for name in NAMES)
 
 
 def test_the_notice_quotes_the_licence_of_every_model(cards):
-    notice = " ".join(shipped_models.NOTICE.read_text().split())
+    notice = " ".join(model_registry.NOTICE.read_text().split())
     assert cards["cmu_walk"].provenance["licence"].startswith("Free for all uses, not to be resold")
     for name in NAMES:
         assert f"{name}.onnx" in notice
@@ -59,7 +59,7 @@ def test_models_lists_the_shipped_models(posefield, cards):
     assert re.search(
         r"speed, turn, stride_length +78 +15 +1[23]\d kB .*mocap\.cs\.cmu\.edu", lines[0]
     )
-    assert last.endswith(str(shipped_models.NOTICE))
+    assert last.endswith(str(model_registry.NOTICE))
 
 
 def test_models_lists_local_models_as_json(posefield, model_path):

@@ -98,9 +98,9 @@ def test_nothing_of_our_own_is_patched():
 @pytest.mark.parametrize(
     "line",
     [
-        "from posefield.http.middleware import caching\nmonkeypatch.setattr(caching, 'version', 1)",
+        "from posefield.http import metrics\nmonkeypatch.setattr(metrics, 'version', 1)",
         "import posefield.http.app\nmonkeypatch.setattr(posefield.http.app, 'version', 1)",
-        "monkeypatch.setattr('posefield.http.middleware.caching.version', 1)",
+        "monkeypatch.setattr('posefield.http.metrics.version', 1)",
         "from posefield_train import train\ntrain.ROUNDS = 3",
         "from unittest import mock",
     ],

@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 import pytest
 from backports import zstd
 
-from posefield.http.middleware import compression
+from posefield.http import negotiation
 
 UNPACK = {"zstd": zstd.decompress, "gzip": gzip.decompress}
 
@@ -33,7 +33,7 @@ def raw(ask, url, accepted):
     ],
 )
 def test_a_coding_is_chosen_by_weight(accepted, coding):
-    assert compression.preferred_coding(accepted.encode()) == coding
+    assert negotiation.preferred_coding(accepted.encode()) == coding
 
 
 @pytest.mark.parametrize("coding", UNPACK)

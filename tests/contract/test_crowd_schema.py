@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.encode.formats import CROWD_ENCODERS
-from posefield.http.decoding import crowd_query
+from posefield.http import crowd_operations
 from posefield.motion.crowd_clip import CrowdPoses
 from posefield.motion.skeleton import Skeleton
 
@@ -65,7 +65,7 @@ def test_what_breaks_the_schema_is_refused_and_nothing_else_is_a_bad_body(spec, 
         st.dictionaries(st.sampled_from(fields), VALUES, max_size=3)
     )
     try:
-        crowd_query.of_body(json.dumps(body).encode(), 100)
+        crowd_operations.of_body(json.dumps(body).encode(), 100)
     except FormError:
         assert not schema.is_valid(body)
     except InvalidField:

@@ -9,9 +9,9 @@ import pytest
 from asking import asker
 from pxr import Usd, UsdSkel
 
+from posefield.http import crowd_operations
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.decoding import crowd_query
 
 CROWD = "/v1/models/reach/crowd"
 WALK = "/v1/models/walk/crowd"
@@ -84,7 +84,7 @@ def test_a_body_of_more_values_than_any_crowd_has_is_refused_before_it_is_decode
         headers = {"content-type": "application/json"}
         return ask("POST", f"{CROWD}.arrow", content=body.encode(), headers=headers)
 
-    most = crowd_query.VALUES * crowd_query.FEWEST
+    most = crowd_operations.VALUES * crowd_operations.FEWEST
     answer = refused(most)
     assert answer.status_code == 413 and f"expected at most {most}" in answer.json()["detail"]
     # Negative control: with fewer the decoder finds the fault at the end.

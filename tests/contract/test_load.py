@@ -7,10 +7,10 @@ import httpx
 import pytest
 from starlette.responses import Response
 
+from posefield.http import request_cycle
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import build_app
-from posefield.http.middleware import deadline
 from posefield.http.operations import OPERATIONS
 from posefield.registry.model_registry import ModelRegistry
 
@@ -72,12 +72,12 @@ def test_an_answer_that_takes_too_long_is_given_up():
     ],
 )
 def test_a_client_may_have_less_patience_but_not_more(prefer, expected):
-    assert deadline.requested_deadline(prefer, 30.0) == expected
+    assert request_cycle.requested_deadline(prefer, 30.0) == expected
 
 
 def test_a_task_cancelled_by_others_is_not_late():
     async def cancelled():
-        watch = deadline.DeadlineTimer()
+        watch = request_cycle.DeadlineTimer()
         task = asyncio.create_task(watch.within(30.0, asyncio.sleep(60)))
         await asyncio.sleep(0)
         task.cancel()

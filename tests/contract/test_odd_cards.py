@@ -19,13 +19,12 @@ from asking import asker
 from posefield.common.errors import ModelError
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.concurrency.readiness import Readiness
+from posefield.http.readiness import Readiness
 from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference import session as sessions
 from posefield.inference.session import Session
-from posefield.model_file import card_check, card_reader, onnx_check
-from posefield.registry.model_registry import ModelRegistry
-from posefield.registry.model_reload import FixedRegistry
+from posefield.model_file import card_check, checked_file, onnx_file
+from posefield.registry.model_registry import FixedRegistry, ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 
 DEEP = "[" * 300 + "]" * 300
@@ -83,7 +82,7 @@ class Tried:
     """A model that is opened with odd cards, and asked."""
 
     def __init__(self, content: bytes, spec: dict[str, Any]) -> None:
-        self.onnx = onnx_check.check(content)
+        self.onnx = onnx_file.check(content)
         self.runtime = onnx_runtime.open_session(content, "whole")
         self.session: Session = sessions.open_bytes(content, "odd.onnx")
         self.models = FixedRegistry(ModelRegistry({}))
@@ -95,7 +94,7 @@ class Tried:
     def opened(self, name: str, text: str) -> Session:
         """Session with one entry of the card changed; raises as opening the file does."""
         entries = {**self.onnx.metadata, f"posefield.{name}": text.encode()}
-        card = card_reader.decode(entries)
+        card = checked_file.decode_card(entries)
         card_check.check_graph(card, self.onnx.shapes, self.onnx.values)
         graph_ports.check(self.runtime, card, "odd.onnx")
         return replace(self.session, card=card)

@@ -11,9 +11,13 @@ from asking import asker
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.concurrency.readiness import Readiness
-from posefield.registry.model_registry import ModelRegistry, VersionLimits
-from posefield.registry.model_reload import FixedRegistry, ReloadingRegistry
+from posefield.http.readiness import Readiness
+from posefield.registry.model_registry import (
+    FixedRegistry,
+    ModelRegistry,
+    ReloadingRegistry,
+    VersionLimits,
+)
 
 
 @pytest.fixture

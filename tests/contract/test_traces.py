@@ -15,11 +15,10 @@ from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanE
 from serving import address, process
 
 from posefield.common.errors import InvalidField
+from posefield.http import telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.telemetry import tracing
-from posefield.http.telemetry.telemetry import Telemetry
-from posefield.http.telemetry.tracing import Tracer
+from posefield.http.telemetry import Telemetry, Tracer
 
 PARENT = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"
 
@@ -88,4 +87,4 @@ def test_an_endpoint_without_the_sdk_is_an_error(monkeypatch):
     monkeypatch.setitem(sys.modules, "opentelemetry.sdk.trace", None)
     environ = {"OTEL_EXPORTER_OTLP_ENDPOINT": "http://127.0.0.1:1"}
     with pytest.raises(InvalidField, match=r"expected posefield\[trace\]"):
-        tracing.from_environment(environ)
+        telemetry.environment_tracer(environ)

@@ -11,10 +11,10 @@ import pytest
 from asking import asker
 from prometheus_client.parser import text_string_to_metric_families
 
+from posefield.http import metrics, telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.telemetry import log, metrics
-from posefield.http.telemetry.telemetry import Telemetry
+from posefield.http.telemetry import Telemetry
 
 
 def value(page, name, **labels):
@@ -68,7 +68,7 @@ def told(loaded):
 
     def asked(*args, **given):
         source, target = os.pipe()
-        lines = log.LogBuffer(target)
+        lines = telemetry.LogBuffer(target)
         answer = asker(create_app(loaded, Settings(), Telemetry(lines)))(*args, **given)
         lines.flush()
         os.close(target)
@@ -117,7 +117,7 @@ def test_a_line_holds_nothing_that_a_client_wrote_but_its_id(told):
 
 
 async def written(contents, target):
-    lines = log.LogBuffer(target)
+    lines = telemetry.LogBuffer(target)
     for content in contents:
         lines.add(content)
     lines.flush()

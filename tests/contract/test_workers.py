@@ -21,13 +21,13 @@ BLOCKED = """
 import socket, threading, time, uvicorn
 from functools import partial
 from posefield.registry.model_registry import VersionLimits, ModelRegistry
-from posefield.registry.model_reload import ReloadingRegistry
+from posefield.registry.model_registry import ReloadingRegistry
 from posefield.http.api import contract
 from posefield.http.app import build_app
-from posefield.http.lifespan import StartAnnouncement, lifespan
+from posefield.http.server import StartAnnouncement, lifespan
 from posefield.http.operations import OPERATIONS
 from posefield.http.api.settings import Settings
-from posefield.http.telemetry.telemetry import NO_TELEMETRY
+from posefield.http.telemetry import NO_TELEMETRY
 async def block_the_loop(service, request):
     time.sleep(100)
 own = socket.create_server(("127.0.0.1", 0))

@@ -16,11 +16,11 @@ import proxy
 import running
 import trained
 
-from posefield.model_file import checksum, protobuf_wire
+from posefield.model_file import checked_file, onnx_file
 
 # Another file of the same model: one more entry of metadata, field 14 of onnx.proto.
-REMARK = protobuf_wire.encode_bytes(
-    14, protobuf_wire.encode_bytes(1, b"remark") + protobuf_wire.encode_bytes(2, b"x")
+REMARK = onnx_file.encode_bytes(
+    14, onnx_file.encode_bytes(1, b"remark") + onnx_file.encode_bytes(2, b"x")
 )
 # Seconds: of POSEFIELD_ALIAS_SECONDS and _RELOAD, and until what hangs on them must have happened.
 AGAIN, PATIENCE = 1, 20.0
@@ -109,7 +109,9 @@ def _asked_again(site: Site, folder: Path) -> Iterator[str]:
 
     path = folder / "models/reaching.onnx"
     aside = folder / "new.onnx"
-    aside.write_bytes(checksum.append_checksum(path.read_bytes()[: -checksum.SIZE] + REMARK))
+    aside.write_bytes(
+        checked_file.append_checksum(path.read_bytes()[: -checked_file.CHECKSUM_SIZE] + REMARK)
+    )
     aside.rename(path)
     end = time.monotonic() + PATIENCE
     while (new := _identity(site)) == old and time.monotonic() < end:

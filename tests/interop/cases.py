@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import trained
 
-from posefield.encode.character import joint_names
+from posefield.encode.character import character
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton
@@ -104,13 +104,13 @@ def matrices_of(clip: Clip) -> dict[str, np.ndarray]:
     matrices = np.zeros((*positions.shape[:-1], 4, 4))
     matrices[..., :3, :3], matrices[..., :3, 3] = quat.to_matrix(turns), positions
     matrices[..., 3, 3] = 1.0
-    return {"joints": np.array(joint_names.legal_names(clip.skeleton.names)), "matrices": matrices}
+    return {"joints": np.array(character.legal_names(clip.skeleton.names)), "matrices": matrices}
 
 
 def _names(clip: Clip, extension: str) -> np.ndarray:
     """Return the joint names in a format: glTF allows any names."""
     own = clip.skeleton.names
-    return np.array(own if extension == "glb" else joint_names.legal_names(own))
+    return np.array(own if extension == "glb" else character.legal_names(own))
 
 
 def _answer(frames: int, rate: float) -> ClipAnswer:

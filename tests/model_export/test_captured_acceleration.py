@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.model_file import model_card
-from posefield.model_file.captured_acceleration import RATE
+from posefield.model_file.model_card import ACCELERATION_RATE
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
@@ -34,7 +34,7 @@ def swinging(rate, seconds=2.0):
 
 def expected(count):
     """Return half the acceleration (count,) of a point on the arc, by its two parts."""
-    times = np.arange(1, count + 1) / RATE
+    times = np.arange(1, count + 1) / ACCELERATION_RATE
     speeds = SWING * FREQUENCY * np.cos(FREQUENCY * times)
     gains = -SWING * FREQUENCY**2 * np.sin(FREQUENCY * times)
     return ARM * np.hypot(gains, speeds**2) / 2.0
@@ -43,7 +43,7 @@ def expected(count):
 @pytest.mark.parametrize("rate", [30.0, 100.0, 119.88])
 def test_clips_of_every_rate_have_the_acceleration_of_their_motion(rate):
     found = clip_accelerations(swinging(rate))
-    assert len(found) == int(2.0 * RATE * (1.0 + 1e-9)) - 1
+    assert len(found) == int(2.0 * ACCELERATION_RATE * (1.0 + 1e-9)) - 1
     right = expected(len(found))
     assert np.abs(found - right).max() < PRECISION * right.max()
 

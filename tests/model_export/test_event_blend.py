@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.inference import reduced_motion
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 from posefield_train.adapt import model_reconstruction
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import coefficient_models, universal_kriging
@@ -61,7 +61,7 @@ def test_the_graph_and_the_service_read_the_same_blend(blended, small_recipe, ex
     finest, *coarse = made.card.levels
     assert finest.event == 5 and {level.event for level in coarse} == {0}
     assert {level.event for level in exported.card.levels[1:]} == {0}
-    held = reduced_motion.read(subgraph.initializers(made.content), finest, made.card)
+    held = reduced_motion.read(onnx_file.initializers(made.content), finest, made.card)
     core, times = blended.model.decoder.blended
     assert np.abs(held.core - core.transpose(1, 0, 2)).max() < 1e-6 * np.abs(core).max()
     assert np.abs(held.time - times).max() < 1e-6

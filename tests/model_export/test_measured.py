@@ -10,7 +10,7 @@ from minimal import SKELETON, plain_recipe, recipe_with, small_clip, write_clips
 from test_phase import cycle
 
 from posefield.common.errors import TrainingError
-from posefield.model_file import card_reader, model_card
+from posefield.model_file import checked_file, model_card
 from posefield.motion import measures
 from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train import train
@@ -181,7 +181,7 @@ def test_a_models_examples_are_what_is_measured_of_its_clips(made):
         expected = [measures.evaluate(one, seen(clip)) for one in asked]
         assert np.abs(np.array(kept) - expected).max() < KEPT
     entries = {key: text.encode() for key, text in model_card.dump(own_card).items()}
-    again = card_reader.decode(entries)
+    again = checked_file.decode_card(entries)
     assert [control.measure for control in again.controls] == asked
 
 

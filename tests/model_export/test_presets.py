@@ -9,7 +9,7 @@ from minimal import TOML
 from pydantic import ValidationError
 
 from posefield.common.errors import TrainingError
-from posefield.model_file import card_reader, onnx_check
+from posefield.model_file import checked_file, onnx_file
 from posefield.model_file.model_card import Preset
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
@@ -65,7 +65,7 @@ def test_a_preset_outside_the_clips_is_refused(values, performer, said):
 
 def test_the_card_carries_the_presets_of_the_recipe():
     content = fixture_models.exported("reaching").content
-    card = card_reader.decode(onnx_check.check(content).metadata)
+    card = checked_file.decode_card(onnx_file.check(content).metadata)
     own = fixture_models.small_recipe().presets
     assert list(own) == ["high_shelf", "to_the_side", "seated"]
     expected = [Preset(name, preset.values, {}) for name, preset in own.items()]

@@ -38,7 +38,7 @@ interface Document {
 const WIDTHS: Readonly<Record<string, number>> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 const KINDS = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 
-/** Read `character.glb` (service/posefield/encode/character_file.py). */
+/** Read `character.glb` (service/posefield/encode/glb.py). */
 export function read(content: Uint8Array<ArrayBuffer>): Character {
   const view = new DataView(content.buffer, content.byteOffset);
   const size = view.getUint32(12, true);

@@ -11,8 +11,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.inference import residual_covariance
-from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard, rounded
+from posefield.model_file.model_card import PERFORMER, Control, LabelSet, Level, ModelCard, rounded
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel

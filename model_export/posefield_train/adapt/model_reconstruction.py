@@ -16,7 +16,7 @@ from posefield.common.errors import ModelError
 from posefield.common.units import Floats, Indices
 from posefield.inference import reduced_motion, residual_covariance
 from posefield.kriging import kriging_model
-from posefield.model_file import checked_file, subgraph
+from posefield.model_file import checked_file, onnx_file
 from posefield.model_file.model_card import ModelCard, TrainingParameters
 from posefield_train.adapt.canonical_clips import AdaptableModel
 from posefield_train.align.travel import Travel
@@ -82,7 +82,7 @@ def reconstruct(content: bytes, source: str) -> ReconstructedModel:
     source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
     """
     own_card = checked_file.load_card(content, source)
-    numbers = {name: _as_float64(array) for name, array in subgraph.initializers(content).items()}
+    numbers = {name: _as_float64(array) for name, array in onnx_file.initializers(content).items()}
     file = _ModelFile(numbers, own_card, own_card.making, source)
     return ReconstructedModel(
         _adaptable(file), own_card, own_card.making, checked_file.sha256(content)

@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.array_shapes import ClipFrames, ClipPaths, ClipRotations, ClipTravel, PerClip
 from posefield.common.units import UP, Floats
-from posefield.model_file.row_values import ROW_VALUES
+from posefield.model_file.model_card import ROW_VALUES
 from posefield.motion import quat, root_travel
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.onnx_graph.graph_builder import GraphBuilder

@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 
 from posefield.common.array_shapes import ClipFrames, PerClip
 from posefield.common.units import Floats
-from posefield.model_file.row_values import ROW_VALUES
+from posefield.model_file.model_card import ROW_VALUES
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 DEGREE = 3

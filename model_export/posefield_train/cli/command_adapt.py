@@ -9,8 +9,7 @@ import typer
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.common.units import UpAxis
-from posefield.console.arguments import Json, ModelPath
-from posefield.console.question_options import with_option_groups
+from posefield.console.options import Json, ModelPath, with_option_groups
 from posefield.model_file.model_card import PERFORMER
 from posefield_train.cli import output_files
 from posefield_train.cli.output_files import ProgressPrinter

@@ -9,9 +9,8 @@ import typer
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.common.units import UpAxis
-from posefield.console.arguments import Json
+from posefield.console.options import Json, with_option_groups
 from posefield.console.output import as_json
-from posefield.console.question_options import with_option_groups
 from posefield_train.cli import output_files
 
 if TYPE_CHECKING:

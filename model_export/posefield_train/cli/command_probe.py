@@ -7,7 +7,7 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
-from posefield.console.arguments import Json
+from posefield.console.options import Json
 from posefield.console.output import as_json
 from posefield_train.cli import output_files
 

@@ -10,9 +10,8 @@ import typer
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
-from posefield.console.arguments import Json, encoder_for
+from posefield.console.options import Json, encoder_for, parse_controls, with_option_groups
 from posefield.console.output import as_json, written_message
-from posefield.console.question_options import parse_controls, with_option_groups
 from posefield.question.results import ClipAnswer, Trust
 
 if TYPE_CHECKING:

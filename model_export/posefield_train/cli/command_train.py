@@ -7,9 +7,8 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField, TrainingError
-from posefield.console.arguments import Json
+from posefield.console.options import Json, with_option_groups
 from posefield.console.output import as_json
-from posefield.console.question_options import with_option_groups
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import ExecutorOptions
 from posefield_train.cli.output_files import ProgressPrinter

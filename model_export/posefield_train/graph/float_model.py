@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.model_file import checksum
-from posefield.model_file.row_values import ROW_VALUES
+from posefield.model_file import checked_file
+from posefield.model_file.model_card import ROW_VALUES
 from posefield.motion import skeleton
 from posefield.motion.curves import Curve, as_points
 from posefield_train.align.travel import Travel
@@ -186,7 +186,7 @@ class FloatModel:
             outputs["curves"] = ["batch", "steps", len(self.decoder.curves)]
         if self.contacts:
             outputs["contacts"] = ["batch", "steps", self.contacts.values.shape[1]]
-        return checksum.append_checksum(net.model(inputs, outputs, metadata, about))
+        return checked_file.append_checksum(net.model(inputs, outputs, metadata, about))
 
     def _add_outputs(self, net: GraphBuilder, rows: dict[str, str], place: str) -> None:
         """Add the outputs in their shapes, from rows by output; place: canonical frames (B, S)."""

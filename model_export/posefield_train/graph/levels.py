@@ -12,8 +12,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
-from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import rounded
+from posefield.model_file.model_card import Level, rounded
 from posefield.motion import skeleton
 from posefield_train.graph import truncation_cost
 from posefield_train.graph.float_model import FloatModel

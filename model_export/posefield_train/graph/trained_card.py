@@ -13,19 +13,17 @@ from posefield.common.array_shapes import Frames
 from posefield.common.units import Floats
 from posefield.kriging import typical_clip
 from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
-from posefield.model_file.captured_acceleration import (
-    RATE,
-    USUAL,
-    CapturedAcceleration,
-    mean_accelerations,
-)
-from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import (
+    ACCELERATION_RATE,
+    USUAL_PERCENTILE,
+    CapturedAcceleration,
     Control,
     LabelSet,
+    Level,
     ModelCard,
     Preset,
     TrainingParameters,
+    mean_accelerations,
     rounded,
 )
 from posefield.motion.clip import Clip
@@ -206,7 +204,9 @@ def captured_acceleration(examples: Sequence[Example]) -> CapturedAcceleration |
     every = np.concatenate(found)
     if len(every) == 0:
         return None
-    return CapturedAcceleration(rounded(np.median(every)), rounded(np.percentile(every, USUAL)))
+    return CapturedAcceleration(
+        rounded(np.median(every)), rounded(np.percentile(every, USUAL_PERCENTILE))
+    )
 
 
 def clip_accelerations(clip: Clip) -> Frames:
@@ -217,14 +217,14 @@ def clip_accelerations(clip: Clip) -> Frames:
     """
     places = clip.positions()
     places = places - places[:, :1]
-    step = clip.rate / RATE
+    step = clip.rate / ACCELERATION_RATE
     # Tolerance of a millionth of a frame for the rounding of products.
     times = step * np.arange(int((len(places) - 1) / step + 1e-6) + 1)
     if step == round(step):
         found = places[:: round(step)]
     else:
         found = CubicSpline(np.arange(len(places)), places, axis=0)(times)
-    return mean_accelerations(found, RATE)
+    return mean_accelerations(found, ACCELERATION_RATE)
 
 
 def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:

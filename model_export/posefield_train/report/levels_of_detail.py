@@ -19,8 +19,7 @@ from posefield.inference import cost_model, session
 from posefield.inference.level_selection import Camera
 from posefield.inference.session import Session
 from posefield.model_file import model_card
-from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import ModelCard
+from posefield.model_file.model_card import Level, ModelCard
 from posefield_train.graph import levels
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel

@@ -8,7 +8,7 @@ from posefield.batch.rows import ClipQuery
 from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
 from posefield.common.errors import QueryError
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import ClipEncoder, left_out
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips

@@ -13,7 +13,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.inference import session
 from posefield.motion.joint_roles import NamingConvention
-from posefield.question.body_kind import BodyKind
+from posefield.question.motion_question import BodyKind
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.question.results import ClipAnswer
 from posefield.synthesis.synthesizer import Synthesizer

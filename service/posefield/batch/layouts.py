@@ -15,7 +15,7 @@ from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles
 from posefield.question.results import ClipAnswer
@@ -119,9 +119,9 @@ def _library_misfit(job: ExportJob, query: ClipQuery) -> str | None:
 
 def _animation_layers(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, without a character."""
-    from posefield.encode.usd import usd_animation  # usd-core, which other layouts do not need.
+    from posefield.encode.usd import usd_clip  # usd-core, which other layouts do not need.
 
-    return usd_animation.usdc(answers, convention)
+    return usd_clip.animation_usdc(answers, convention)
 
 
 def _clip_box(name: str, file: str, answer: ClipAnswer) -> ManifestEntry:

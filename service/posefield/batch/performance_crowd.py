@@ -34,9 +34,8 @@ from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 from posefield.motion.skeleton import Skeleton
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
-from posefield.question.body_kind import DEFAULT_BODY, BodyKind
-from posefield.question.performance_batch_question import CrowdStageQuestion
-from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.motion_question import DEFAULT_BODY, BodyKind
+from posefield.question.performance_question import CrowdStageQuestion, PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer

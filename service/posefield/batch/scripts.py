@@ -39,15 +39,15 @@ from posefield.characters.user_character import UserCharacter
 from posefield.common import cancellation
 from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode import performance_files
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.performance_files import PerformanceEncoder
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question import json_decoding
-from posefield.question.performance_batch_question import NamedScript, PerformanceLayout
+from posefield.question.performance_question import NamedScript, PerformanceLayout
 from posefield.question.performance_report import PerformanceAnswer
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.frame_times import MAX_POSES
 
@@ -373,4 +373,4 @@ def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
 @lru_cache(maxsize=1)
 def open_models(places: tuple[Path, ...]) -> ModelRegistry:
     """Return the models, cached so that a process opens them once."""
-    return shipped_models.with_shipped(places)
+    return model_registry.with_shipped(places)

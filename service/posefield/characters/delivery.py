@@ -8,15 +8,14 @@ import numpy as np
 
 from posefield.characters.user_character import UserCharacter
 from posefield.common.errors import InvalidField
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.encode.user_rig.rig_files import FileAxes
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion, Target
-from posefield.question.performance_batch_question import PerformanceLayout
-from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_question import PerformanceLayout, PerformanceQuestion
 from posefield.question.performance_report import HeldJoint, PerformanceAnswer, ScriptWarning
 from posefield.question.results import ClipAnswer, FeetResult, SampledClip, StanceResult
 from posefield.retarget import role_map

@@ -17,15 +17,10 @@ import typer
 from posefield import __version__
 from posefield.cli import (
     command_clip,
-    command_crowd,
-    command_demo,
     command_export,
-    command_inspect,
-    command_mcp,
     command_models,
     command_perform,
     command_serve,
-    command_why,
 )
 from posefield.common.errors import FileError, MotionError, TrainingError, WorkerDied
 from posefield.console.registration import (
@@ -135,10 +130,10 @@ HELP = (
     "3 a file cannot be used, 4 no model can be made of the samples, 5 a process died."
 )
 COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
-    "demo": (command_demo.demo, SERVE, ["demo", "demo --once -o clips"]),
+    "demo": (command_serve.demo, SERVE, ["demo", "demo --once -o clips"]),
     "models": (command_models.models, ASK, ["models", "models my_models --json"]),
     "inspect": (
-        command_inspect.inspect,
+        command_models.inspect,
         ASK,
         ["inspect walk.onnx", "inspect walk.onnx --json"],
     ),
@@ -153,7 +148,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
         ],
     ),
     "crowd": (
-        command_crowd.crowd,
+        command_clip.crowd,
         ASK,
         [
             "crowd walk.onnx --count 100 --seconds 5 -o crowd.usd",
@@ -169,8 +164,8 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
             "perform scripts.jsonl -o performances --format glb",
         ],
     ),
-    "why": (command_why.why, ASK, ["why walk.onnx -c speed=1.2 --nearest 5"]),
-    "suggest": (command_why.suggest, ASK, ["suggest walk.onnx --count 5"]),
+    "why": (command_models.why, ASK, ["why walk.onnx -c speed=1.2 --nearest 5"]),
+    "suggest": (command_models.suggest, ASK, ["suggest walk.onnx --count 5"]),
     "export": (
         command_export.export,
         ASK,
@@ -181,7 +176,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
         ],
     ),
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
-    "mcp": (command_mcp.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),
+    "mcp": (command_serve.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),
     "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),
 }
 """Functions of the commands, their groups and examples."""

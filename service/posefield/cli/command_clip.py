@@ -1,17 +1,26 @@
-"""The `posefield pose` and `posefield clip` commands: one motion of a model."""
+"""The `posefield pose`, `clip` and `crowd` commands: motions of a model."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from msgspec import structs
 
 from posefield.common import atomic_files
-from posefield.console.arguments import Json, ModelPath, encoder_for, open_model
-from posefield.console.character_options import CharacterOptions
-from posefield.console.output import print_warnings, written_message
-from posefield.console.question_options import with_option_groups, with_question_options
+from posefield.common.errors import InvalidField
+from posefield.console.options import (
+    CharacterOptions,
+    Json,
+    ModelPath,
+    encoder_for,
+    open_model,
+    with_option_groups,
+    with_question_options,
+)
+from posefield.console.output import as_json, print_warnings, written_message
 from posefield.encode.formats import POSE_ENCODERS
 from posefield.question.motion_question import FileQuestion, PoseQuestion
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import clips, poses
 
 
@@ -59,3 +68,43 @@ def clip(
     atomic_files.write(content, output)
     print_warnings(answer.trust)
     typer.echo(written_message(output, answer, json))
+
+
+DEFAULT_COUNT = 500
+
+
+@with_question_options(WalkQuestion, usual={"seconds": 10.0}, without={"count"})
+def crowd(
+    model: ModelPath,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="output file: usd, usda, usdc, usdz or npz"),
+    ],
+    question: WalkQuestion,
+    count: Annotated[
+        int | None,
+        typer.Option(help=f"number of characters, each on its own path; default: {DEFAULT_COUNT}"),
+    ] = None,
+    paths: Annotated[
+        Path | None,
+        typer.Option(
+            help="instead of random paths: JSON list of routes with waypoints (x, z pairs, m) and "
+            "speed (m/s)",
+            metavar="FILE",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a walking crowd to a file.
+
+    Each character walks on its own path at its own varying speed.
+    """
+    from posefield.cli import crowd_files
+    from posefield.locomotion import crowd_order
+
+    if paths and count is not None:
+        raise InvalidField("count", f"{count}, expected none: every path has one character")
+    question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
+    asked = crowd_order.from_question(question, crowd_files.routes(paths) if paths else ())
+    facts = crowd_files.write_crowd(open_model(model), asked, question, output)
+    typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

@@ -21,10 +21,14 @@ from posefield.batch.process_pool import Runner
 from posefield.batch.rows import Defaults, SourceOptions, open_source
 from posefield.batch.run import RunOutcome, Shard
 from posefield.common.errors import InvalidField
-from posefield.console.arguments import Json, ModelPath
-from posefield.console.character_options import CharacterOptions
+from posefield.console.options import (
+    CharacterOptions,
+    Json,
+    ModelPath,
+    with_option_groups,
+    with_question_options,
+)
 from posefield.console.output import as_json
-from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.model_file import checked_file
 from posefield.question.motion_question import FileQuestion
 from posefield.registry import model_loading

@@ -1,18 +1,27 @@
-"""The `posefield models` command: the models that ship, and those of files, folders and URLs."""
+"""The `posefield models`, `inspect`, `why` and `suggest` commands: facts of models."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from posefield.batch import rows
 from posefield.common.errors import ModelError
-from posefield.console.arguments import Json
-from posefield.console.output import as_json
+from posefield.console.options import Json, ModelPath, open_model, with_question_options
+from posefield.console.output import LateProgress, as_json, print_warnings
+from posefield.encode.tables import model_tables
+from posefield.inference import cost_model, session
 from posefield.model_file import checked_file
+from posefield.model_file import model_card as cards
 from posefield.model_file.model_card import ModelCard
-from posefield.registry import model_sources, shipped_models
+from posefield.motion import measures
+from posefield.question.model_question import SuggestQuestion, WhyQuestion
+from posefield.registry import model_registry, model_sources
 from posefield.registry.listed_models import ModelFile
+from posefield.synthesis.capture_suggestions import suggest as find_suggestions
+from posefield.synthesis.explanation import explain_result as find_reasons
 
 HEADING = ("name", "controls", "clips", "performers", "size", "file", "licence")
 
@@ -77,14 +86,14 @@ def models(
 
     A file that is no model is named on standard error, and the exit code is then 3.
     """
-    listed = list(_listed([str(shipped_models.FOLDER), *(places or ())]))
+    listed = list(_listed([str(model_registry.SHIPPED_FOLDER), *(places or ())]))
     found = [one for one in listed if isinstance(one, LocalModel)]
     faults = [one for one in listed if isinstance(one, ModelError)]
     if json:
         typer.echo(as_json([model.facts() for model in found]))
     else:
         typer.echo(_table([HEADING, *(model.cells() for model in found)]))
-        typer.echo(f"origin and licences of the shipped models: {shipped_models.NOTICE}")
+        typer.echo(f"origin and licences of the shipped models: {model_registry.NOTICE}")
     for fault in faults:
         typer.echo(f"posefield: {fault}", err=True)
     if faults:
@@ -114,3 +123,130 @@ def _table(rows: list[tuple[str, ...]]) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(map(str.ljust, row, widths)) for row in rows)
     return "\n".join(line.rstrip() for line in lines)
+
+
+def inspect(model: ModelPath, json: Json = False) -> None:
+    """Print a model's controls, levels of detail, errors and licence.
+
+    The time per pose is measured on this machine.
+    """
+    opened = session.load(model)
+    with LateProgress("rounds of timing") as bar:
+        seconds = cost_model.seconds_per_pose(opened, bar.update)
+    plain = {
+        "identity": f"{model.stem}@{opened.digest}",
+        **cards.plain_values(opened.card),
+        "seconds_per_pose": seconds,
+    }
+    typer.echo(as_json(plain) if json else _summary(plain))
+
+
+def _summary(plain: dict[str, Any]) -> str:
+    """Return a summary of a model card, within one screen."""
+    diagnostics = plain["diagnostics"]
+    levels = zip(plain["levels"], plain["seconds_per_pose"], strict=True)
+    lines = [
+        f"{plain['identity']}: {plain['description']}",
+        f"{plain['samples']} clips of {len(plain['skeleton']['names'])} joints, "
+        f"{plain['durations'][0]:.2f} to {plain['durations'][1]:.2f} s, {plain['root']}"
+        f"{', cyclic' if plain['cyclic'] else ''}",
+        f"ranks {plain['levels'][0]['ranks']} of {diagnostics['tensor']}: truncation costs "
+        f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
+        f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+        f"levels of detail, times in batches of {cost_model.ROWS_PER_CALL}:",
+        *(_level(number, *level) for number, level in enumerate(levels)),
+        "controls:",
+        *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
+        *map(_curve, plain.get("curves", [])),
+        *_contacts(plain),
+        *_accelerations(plain),
+        *(f"{own['name']}s: {', '.join(own['names'])}" for own in plain["labels"]),
+        f"licence: {plain['provenance']['licence']}",
+        *(f"note: {note}" for note in diagnostics["notes"]),
+    ]
+    return "\n".join(lines)
+
+
+def _level(number: int, level: dict[str, Any], seconds: float) -> str:
+    return (
+        f"  {number}: ranks {level['ranks']} of {level['samples']} clips, {level['numbers']} "
+        f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
+        f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
+    )
+
+
+def _curve(plain: dict[str, Any]) -> str:
+    """Return one line on a curve: its limits, and the distance that one unit counts as."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g}"
+    return f"curve {plain['name']}: {span}, a unit counts as {100 * plain['distance']:g} cm"
+
+
+def _contacts(plain: dict[str, Any]) -> list[str]:
+    """Return a line on each joint with contacts, and one on the accuracy of the contacts."""
+    names, accuracy = plain["skeleton"]["names"], plain["diagnostics"].get("contacts")
+    found = [
+        f"contacts of {names[own['joint']]}: {100 * own['height']:.1f} cm high, swings of "
+        f"{own['swing']:.2f} s, at most {own['longest_swing']:.2f} s in nine of ten, lifted by "
+        f"{100 * own['clearance']:.1f} cm"
+        for own in plain.get("contacts", [])
+    ]
+    if accuracy:
+        found.append(
+            f"contacts of clips left out: {accuracy['agreement']:.0%} of frames agree, Brier score "
+            f"{accuracy['brier']:.3f}, {accuracy['climatology']:.3f} by the mean of the others"
+        )
+    return found
+
+
+def _accelerations(plain: dict[str, Any]) -> list[str]:
+    """Return a line on the accelerations of the captured clips, if the card has them."""
+    own = plain.get("captured_acceleration")
+    if own is None:
+        return []
+    return [
+        "accelerations of the joints relative to the root in the captured clips: median "
+        f"{own['median']:.1f} m/s², 99th percentile {own['p99']:.1f} m/s²"
+    ]
+
+
+def _control(plain: dict[str, Any], joints: list[str]) -> str:
+    """Return one line on a control: its sampled range, its description and its measure."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
+    own = plain.get("measure")
+    how = f" (measured: {measures.describe(measures.from_dict(own), joints)})" if own else ""
+    return f"  {plain['name']}: {span}, {plain['description']}{how}"
+
+
+@with_question_options(WhyQuestion)
+def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
+    """Print the captured clips nearest to the controls.
+
+    Each clip has its distance, and its weight in the answer.
+    """
+    found = find_reasons(open_model(model), question)
+    print_warnings(found)
+    as_text = model_tables.explanation_text
+    typer.echo(as_json(model_tables.explanation(found)) if json else as_text(found))
+
+
+@with_question_options(SuggestQuestion)
+def suggest(
+    model: ModelPath,
+    question: SuggestQuestion,
+    candidates: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV, Parquet or JSON Lines file with the candidate points; default: points "
+            "across the sampled ranges",
+            metavar="FILE",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the clips to capture next, the most useful first."""
+    synthesizer = open_model(model)
+    given = rows.points(candidates, synthesizer) if candidates else None
+    with LateProgress("points", question.count) as bar:
+        found = find_suggestions(synthesizer, question, given, bar.update)
+    as_text = model_tables.suggestions_text
+    typer.echo(as_json(model_tables.suggestions(found)) if json else as_text(found))

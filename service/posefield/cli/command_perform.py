@@ -9,16 +9,23 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
-from posefield.console.arguments import Json, encoder_for
-from posefield.console.character_options import CharacterOptions
+from posefield.console.options import (
+    CharacterOptions,
+    Json,
+    encoder_for,
+    with_option_groups,
+    with_question_options,
+)
 from posefield.console.output import as_json
-from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.encode import performance_files
 from posefield.question import json_decoding
-from posefield.question.performance_batch_question import CrowdStageQuestion, PerformanceLayout
-from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_question import (
+    CrowdStageQuestion,
+    PerformanceLayout,
+    PerformanceQuestion,
+)
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.synthesis.frame_times import MAX_POSES
 
 if TYPE_CHECKING:
@@ -120,7 +127,7 @@ def perform(
     if one.plan and one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --plan, expected with an output file")
     asked = json_decoding.decode_question(PerformanceQuestion, _read(script))
-    find = shipped_models.with_shipped(model or []).find
+    find = model_registry.with_shipped(model or []).find
     if one.output is None:
         one.refuse("with --plan, expected with an output file")
         report = composition.plan(resolve_script(asked, find), MAX_FRAMES)

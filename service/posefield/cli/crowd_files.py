@@ -12,7 +12,7 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.common.units import Floats
 from posefield.console.progress import ProgressBar
 from posefield.encode import usd_crowd
-from posefield.encode.tables import crowd_tables
+from posefield.encode.tables import motion_tables
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.locomotion import gait, walking_crowd
 from posefield.locomotion import routes as given
@@ -20,7 +20,7 @@ from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.routes import Route
 from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
-from posefield.question.body_kind import DEFAULT_BODY
+from posefield.question.motion_question import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
@@ -48,7 +48,7 @@ def write_crowd(
     feet = _FootSkateMeter(opened, asked.fps)
     watched = _with_progress(made, asked.motions or len(made.motion), feet)
     if ending == "npz":
-        crowd_tables.write_npz(watched, output)
+        motion_tables.write_npz(watched, output)
     else:
         crowd_writer.write(watched, output, question.instancing, question.body or DEFAULT_BODY)
     return {

@@ -1,7 +1,7 @@
 """Types of numbers and texts with bounds.
 
 Python ignores the bounds; msgspec checks them where a field is decoded. The card of a model is
-decoded by service/posefield/model_file/card_reader.py.
+decoded by service/posefield/model_file/checked_file.py.
 """
 
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Cancellation of work whose client has gone, and turns between threads.
+"""Cancellation of work whose client has gone, turns between threads, and progress of long work.
 
 A request handler sets `current`; loops that may take longer than a tenth of a second call `check`.
 anyio.to_thread.run_sync copies the caller's context into its threads; `bind_context` does so for
@@ -10,6 +10,14 @@ import time
 from collections.abc import Callable
 from contextvars import ContextVar, copy_context
 from typing import ParamSpec, TypeVar
+
+ProgressCallback = Callable[[int, int], None]
+"""Function of the number of finished units and of their total."""
+
+
+def ignore_progress(done: int, total: int) -> None:
+    """Show nothing."""
+
 
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")

@@ -19,7 +19,7 @@ from posefield.inference.residual_covariance import ResidualCovariance
 from posefield.inference.session import PredictionState, Session
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import measures, root_travel
 from posefield.motion.measures import MeasuredMotion
@@ -160,7 +160,7 @@ def _task(begun: ConstrainedMotion, aims: Sequence[Constraint]) -> CorrectionTas
 
 def build_corrector(session: Session, level: int) -> LevelCorrector:
     """Return the data for corrections at a level."""
-    weights = subgraph.initializers(session.content)
+    weights = onnx_file.initializers(session.content)
     own = reduced_motion.read(weights, session.card.levels[level], session.card)
     return LevelCorrector(
         session.card,

@@ -25,7 +25,7 @@ from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
 from posefield.question.motion_question import MotionQuestion
 from posefield.question.results import PoseAnswer, Trust
-from posefield.validation import input_limits
+from posefield.validation import question_validation
 from posefield.validation.imputation import ControlImputer
 from posefield.validation.question_validation import ValidatedQuestion
 
@@ -319,7 +319,7 @@ class ConstraintSolver:
         """Return the constraints of targets, at the canonical frames of the given motion."""
         # The duration is known only after the correction; times beyond the longest plausible clip
         # are limited because they may overflow float32.
-        longest = input_limits.duration_range(self._session.card)[1]
+        longest = question_validation.duration_range(self._session.card)[1]
         times = np.array([min(goal.time or 0.0, longest) for goal in targets])
         timed = self._frames(question, held, times) if len(times) else times
         pairs = zip(targets, timed.tolist(), strict=True)

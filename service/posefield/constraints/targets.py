@@ -12,7 +12,7 @@ from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
 from posefield.question.motion_question import MotionQuestion, Target
-from posefield.validation import input_limits
+from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
 
 # Largest coordinate of a target, m: beyond any human reach, and well within float32.
@@ -151,7 +151,7 @@ def _joint_target(card: ModelCard, index: int, target: Target) -> JointTarget:
     when = target.when
     if not isinstance(when, str):
         time = value_validation.check_number(f"{field}/time", when)
-        if not 0.0 <= time <= input_limits.duration_range(card)[1]:
+        if not 0.0 <= time <= question_validation.duration_range(card)[1]:
             raise InvalidField(
                 f"{field}/time",
                 f"{time:g} s, expected 0 to the clip's duration; captured clips last at most "

@@ -11,24 +11,31 @@ from typing import Any, Generic, TypeVar
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode import glb
-from posefield.encode.files import file_convention
-from posefield.encode.files import file_convention as conventions
-from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
-from posefield.encode.files.media_types import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
-from posefield.encode.tables import clip_tables, crowd_tables, model_tables
+from posefield.encode import conventions, glb
+from posefield.encode.conventions import (
+    ARROW,
+    CENTIMETRES,
+    JSON,
+    METRES,
+    MSGPACK,
+    NPZ,
+    Convention,
+    Format,
+    by_extension,
+)
+from posefield.encode.tables import model_tables, motion_tables
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Table, arrow_stream, npz_table
 from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
-from posefield.question.body_kind import BodyKind
+from posefield.question.motion_question import BodyKind
 from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, SigmaGrid
 
 
 def bvh(answer: SampledClip, convention: Convention) -> bytes:
     """Return a BVH file; the format cannot store provenance, unit or up axis."""
-    clip = file_convention.convert_clip(Convention(1.0, convention.up), answer.clip)
+    clip = conventions.convert_clip(Convention(1.0, convention.up), answer.clip)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
 
 
@@ -124,7 +131,7 @@ def table_writer(
 ) -> Callable[[Sequence[SampledClip], Convention], list[bytes]]:
     """Return a function that encodes several results as tables."""
     return sequential_writer(
-        lambda answer, convention: write(clip_tables.table(answer, convention))
+        lambda answer, convention: write(motion_tables.clip_table(answer, convention))
     )
 
 
@@ -155,7 +162,7 @@ CLIP_ENCODERS = by_extension(
     ClipEncoder(
         "usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0, has_body=True
     ),
-    ClipEncoder("json", JSON, sequential_writer(clip_tables.clip_json), 96),
+    ClipEncoder("json", JSON, sequential_writer(motion_tables.clip_json), 96),
     ClipEncoder(
         "bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES, has_curves=False
     ),
@@ -195,25 +202,27 @@ class TableEncoder(Format, Generic[A]):
 
 
 POSE_ENCODERS: dict[str, TableEncoder[PoseAnswer[Any]]] = by_extension(
-    TableEncoder("json", JSON, clip_tables.pose_table, tables.json_table, inline_limit=200),
+    TableEncoder("json", JSON, motion_tables.pose_table, tables.json_table, inline_limit=200),
     TableEncoder(
-        "msgpack", MSGPACK, clip_tables.pose_table, tables.msgpack_table, inline_limit=2000
+        "msgpack", MSGPACK, motion_tables.pose_table, tables.msgpack_table, inline_limit=2000
     ),
-    TableEncoder("npz", NPZ, clip_tables.pose_table, npz_table, inline_limit=2000),
-    TableEncoder("arrow", ARROW, clip_tables.pose_table, arrow_stream, inline_limit=2000),
+    TableEncoder("npz", NPZ, motion_tables.pose_table, npz_table, inline_limit=2000),
+    TableEncoder("arrow", ARROW, motion_tables.pose_table, arrow_stream, inline_limit=2000),
 )
 
 CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
-    TableEncoder("arrow", ARROW, crowd_tables.table, arrow_stream, inline_limit=1000),
-    TableEncoder("npz", NPZ, crowd_tables.table, npz_table, inline_limit=1000),
-    TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack_table, inline_limit=1000),
+    TableEncoder("arrow", ARROW, motion_tables.crowd_table, arrow_stream, inline_limit=1000),
+    TableEncoder("npz", NPZ, motion_tables.crowd_table, npz_table, inline_limit=1000),
+    TableEncoder(
+        "msgpack", MSGPACK, motion_tables.crowd_table, tables.msgpack_table, inline_limit=1000
+    ),
     TableEncoder(
         "json",
         JSON,
-        crowd_tables.table,
+        motion_tables.crowd_table,
         tables.json_table,
         bytes_per_joint=150,
-        most=crowd_tables.MAX_JSON_CHARACTERS,
+        most=motion_tables.MAX_JSON_CHARACTERS,
     ),
 )
 

@@ -1,7 +1,12 @@
-"""Clips as binary glTF 2.0: joint nodes, a body mesh skinned to them, and an animation.
+"""Clips and characters as binary glTF 2.0: joint nodes, a body mesh skinned to them, animation.
 
 glTF is always in metres, seconds and quaternions x y z w, with Y up. Joints keep their names, which
 may be any text in glTF.
+
+In the file of a character at rest, two attributes beyond those of glTF let a reader fit the body to
+bones of other lengths, as the files of clips do: each point moves by (1 - _SHARE) of the
+displacement of the first joint of _ANCHORS, and _SHARE of the second's. The mesh `BodyCoarse` has
+fewer triangles on the same points, for characters seen from afar; no node draws it.
 """
 
 import struct
@@ -14,12 +19,12 @@ import numpy.typing as npt
 import orjson
 
 from posefield.common.units import Floats, Singles
+from posefield.encode import conventions
 from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig, RestPose
-from posefield.encode.files import file_convention
-from posefield.encode.files.file_convention import METRES, Convention
+from posefield.encode.conventions import METRES, Convention
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import CurveValues
@@ -282,7 +287,7 @@ def glb(answer: SampledClip, said: Convention) -> bytes:
 
     Raises InvalidField for a convention other than metres with Y up.
     """
-    file_convention.check_convention(said, METRES, "glb")
+    conventions.check_convention(said, METRES, "glb")
     clip, store = answer.clip, GlbBuffer()
     rig = character.rig(clip.skeleton, said.body)
     resting = character.rest_pose(rig, clip.translations[:1])
@@ -333,3 +338,39 @@ def _tracks(store: GlbBuffer, tracks: Singles, kind: str) -> list[int]:
 
 def _as_float32(values: Floats | Singles) -> Singles:
     return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def character_glb(skeleton: Skeleton, identity: str) -> bytes:
+    """Return the file of a skeleton's character; identity: of the model, stored in the file."""
+    return _character_glb(character.rig(skeleton), identity)
+
+
+@lru_cache(maxsize=64)
+def _character_glb(rig: CharacterRig, identity: str) -> bytes:
+    mesh, store = rig.body, GlbBuffer()
+    assert mesh is not None
+    resting = character.rest_pose(rig, rig.skeleton.offsets[None])
+    parts = character_parts(store, resting)
+    (body,) = parts["meshes"]
+    (primitive,) = body["primitives"]
+    primitive["attributes"] |= _anchors(store, rig.skeleton, mesh)
+    coarse = primitive | {"indices": _coarse_corners(store, mesh)}
+    parts["meshes"].append({"name": "BodyCoarse", "primitives": [coarse]})
+    return container({"asset": asset({"model": identity}), **parts}, store)
+
+
+def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[str, int]:
+    """Return the attributes by which points follow joints at rest; tips move with their joints."""
+    moving = np.array([*range(len(skeleton)), *skeleton.tip_joints])
+    anchors: npt.NDArray[Any] = moving[mesh.places.anchors][mesh.place].astype(np.uint16)
+    shares = mesh.places.shares[mesh.place].astype(np.float32)
+    return {
+        "_ANCHORS": store.add(anchors, "VEC2", target=VERTICES),
+        "_SHARE": store.add(shares, "SCALAR", target=VERTICES),
+    }
+
+
+def _coarse_corners(store: GlbBuffer, mesh: SkinnedMesh) -> int:
+    kind = smallest_index_type(len(mesh.points))
+    corners = mesh.coarse.reshape(-1).astype(kind)
+    return store.add(corners, "SCALAR", target=CORNERS)

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from posefield.common.errors import InvalidField
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import ClipEncoder
-from posefield.question.performance_batch_question import PerformanceLayout
+from posefield.question.performance_question import PerformanceLayout
 from posefield.question.performance_report import PerformanceAnswer
 
 SEGMENTED = ("usda", "usdc", "usdz")

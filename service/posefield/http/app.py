@@ -12,24 +12,21 @@ from posefield.characters import user_character
 from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common.errors import UnknownFormat
 from posefield.common.name_suggestion import did_you_mean
-from posefield.http import request_cycle
+from posefield.http import header_fields, request_cycle
 from posefield.http.access import access_control
 from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
 from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
-from posefield.http.concurrency.readiness import Readiness
-from posefield.http.middleware import cors, request_head
-from posefield.http.middleware.request_head import HeadLimits
+from posefield.http.header_fields import HeadLimits
 from posefield.http.operations import OPERATIONS
 from posefield.http.pages import static_page
+from posefield.http.readiness import Readiness
 from posefield.http.request_cycle import ServerState
 from posefield.http.routing import Route, RouteTree
-from posefield.http.service import Service
-from posefield.http.steps import Handler, Steps
-from posefield.http.telemetry.telemetry import NO_TELEMETRY, Telemetry
-from posefield.registry.model_registry import ModelRegistry
-from posefield.registry.model_reload import FixedRegistry
+from posefield.http.steps import Handler, Service, Steps
+from posefield.http.telemetry import NO_TELEMETRY, Telemetry
+from posefield.registry.model_registry import FixedRegistry, ModelRegistry
 
 log = logging.getLogger(__name__)
 Lifespan = Callable[[ServerState], AbstractAsyncContextManager[None]]
@@ -70,7 +67,7 @@ def build_app(
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
     readiness = Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models
     rules = access_control.from_settings(settings)
-    origins = cors.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
+    origins = header_fields.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
     service = Service(
         readiness,
         settings,
@@ -86,7 +83,7 @@ def build_app(
         for operation in agreed.operations
         for route in _routes(operation, handlers[operation.id])
     )
-    hosts = request_head.names(settings.hosts, f"{PREFIX}HOSTS")
+    hosts = header_fields.host_names(settings.hosts, f"{PREFIX}HOSTS")
     limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
     return App(ServerState(places, service, partial(_missing, places), limits), lifespan)
 

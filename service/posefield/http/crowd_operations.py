@@ -1,12 +1,23 @@
-"""Steps of crowd requests: poses of many characters, and walking crowds."""
+"""Steps of crowd requests: poses of many characters, and walking crowds.
 
-from collections.abc import Iterator
+All lists of a body are columns of the same length, the number of characters; a scalar applies to
+each of them. Without a list there is one character.
+"""
+
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
+from itertools import chain
+from typing import Annotated, Any, Literal
 
+import msgspec
+import numpy as np
 from starlette.requests import Request
 from starlette.responses import Response
 
+from posefield.common.errors import FormError, InvalidField
+from posefield.common.units import Floats, Indices
+from posefield.encode.character import character
 from posefield.encode.formats import (
     CROWD_ENCODERS,
     CROWD_WRITERS,
@@ -14,16 +25,258 @@ from posefield.encode.formats import (
     TableEncoder,
     max_poses,
 )
-from posefield.http import responses
-from posefield.http.concurrency import worker_threads
-from posefield.http.decoding import crowd_query, request_body
+from posefield.encode.usd_crowd import crowd_size
+from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+from posefield.http import responses, steps, worker_threads
+from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
+from posefield.http.api.settings import Settings
 from posefield.http.steps import Context, Steps, from_url
+from posefield.inference.level_selection import Camera, LevelCriteria
+from posefield.locomotion import crowd_order as orders
+from posefield.locomotion import walking_crowd
 from posefield.locomotion.crowd_order import CrowdOrder
-from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
-from posefield.question.body_kind import DEFAULT_BODY, BodyKind
+from posefield.model_file.model_card import ModelCard
+from posefield.motion.crowd_clip import CrowdClip, CrowdPoses, Placement
+from posefield.question import json_decoding as bodies
+from posefield.question.motion_question import (
+    DEFAULT_BODY,
+    MAX_TAKE,
+    BodyKind,
+    ExtrapolationPolicy,
+    LabelValue,
+    RootMode,
+)
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.crowd_validation import (
+    Blending,
+    CharacterTakes,
+    CrowdQuestion,
+    LabelColumn,
+)
+
+DEFAULT_PIXELS = 1.0
+VALUES, FEWEST = 64, 100_000
+"""Maximum values of a character, and minimum number of characters that the limit allows for."""
+# float, since JSON has one number type: 1.0 is a valid level.
+Level = Annotated[float, msgspec.Meta(ge=0, le=127)]
+Seed = Annotated[float, msgspec.Meta(ge=0, le=MAX_TAKE)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Numbers = float | list[float]
+
+
+class CameraBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Camera (schema of the contract)."""
+
+    position: tuple[float, float, float]
+    fov: float
+    height: float
+
+
+class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """CrowdQuestion (schema of the contract)."""
+
+    controls: dict[str, Numbers]
+    time: Numbers
+    position: list[tuple[float, float, float]] | None = None
+    heading: Numbers = 0.0
+    performer: str | list[str | None] | None = None
+    labels: dict[str, LabelValue | list[LabelValue | None]] = {}
+    level: Level | list[Level] | Literal["auto"] = 0.0
+    previous_level: list[Level] | None = None
+    from_level: list[Level] | None = None
+    blend: Share | list[Share] | None = None
+    camera: CameraBody | None = None
+    pixels: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
+    root: RootMode = "travelling"
+    extrapolate: ExtrapolationPolicy = "warn"
+    take: Seed | list[Seed] | Literal["index"] = 0.0
+    variety: Share | list[Share] = 0.7
+    detail: bool = False
+
+
+def of_body(content: bytes, most: float) -> CrowdQuestion:
+    """Return the question of a JSON body.
+
+    most: maximum number of characters. Raises FormError for a malformed body, InvalidField for
+    invalid values and RequestError 413 for too many values.
+    """
+    _check_values(content, most)
+    body = bodies.decode_question(CrowdBody, content)
+    count = _count(body, most)
+    performers, performer = _distinct(body.performer, count)
+    return CrowdQuestion(
+        {name: _column(values, count) for name, values in body.controls.items()},
+        _column(body.time, count),
+        Placement(_positions(body.position, count), _column(body.heading, count)),
+        performers,
+        performer,
+        _detail(body, count),
+        body.root,
+        body.extrapolate,
+        _blending(body, count),
+        {name: LabelColumn(*_distinct(given, count)) for name, given in body.labels.items()},
+        _takes(body, count),
+    )
+
+
+def _check_values(content: bytes, most: float) -> None:
+    """Raise RequestError for more values than a valid body has: decoded, each takes 32 bytes."""
+    found, limit = content.count(b","), VALUES * max(most, FEWEST)
+    if found > limit:
+        raise RequestError(BODY_TOO_LARGE, f"{found} values, expected at most {limit:.0f}")
+
+
+def _count(body: CrowdBody, most: float) -> int:
+    """Return the number of characters; raises InvalidField for lists of different lengths."""
+    fields = {f"controls/{name}": values for name, values in body.controls.items()} | {
+        name: getattr(body, name) for name in CrowdBody.__struct_fields__ if name != "controls"
+    }
+    fields |= {f"labels/{name}": values for name, values in body.labels.items()}
+    sizes = {name: len(values) for name, values in fields.items() if isinstance(values, list)}
+    first, count = next(iter(sizes.items()), ("", 1))
+    for name, size in sizes.items():
+        if not 1 <= size <= most:
+            raise InvalidField(name, f"{size} characters, expected 1 to {most:.0f}")
+        if size != count:
+            raise InvalidField(name, f"{size} characters, expected {count} as in {first}")
+    return count
+
+
+def _column(values: Numbers, count: int) -> Floats:
+    """Return the values (N,)."""
+    # np.fromiter takes two thirds of the time of np.array. Adding 0.0 turns -0 into 0.
+    given = (
+        np.fromiter(values, float, count) if isinstance(values, list) else np.full(count, values)
+    )
+    return given + 0.0
+
+
+def _positions(given: list[tuple[float, float, float]] | None, count: int) -> Floats:
+    if given is None:
+        return np.zeros((count, 3))
+    # np.fromiter takes half the time of np.array for tuples.
+    return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3) + 0.0
+
+
+def _distinct(given: Any, count: int) -> tuple[tuple[Any, ...], Indices]:
+    """Return the distinct labels and the index (N,) of each character's label."""
+    if not isinstance(given, list):
+        return (given,), np.zeros(count, dtype=np.int64)
+    # Weights are dicts, which have no hash; their text has quotes, as that of a name.
+    values = {repr(label): label for label in given}
+    places = {key: place for place, key in enumerate(values)}
+    index = (places[repr(label)] for label in given)
+    return tuple(values.values()), np.fromiter(index, np.int64, len(given))
+
+
+def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:
+    if body.level == "auto":
+        return _view(body)
+    for name in ("previous_level", "camera", "pixels", "budget_ms"):
+        if getattr(body, name) is not None:
+            raise InvalidField(name, 'given without level "auto", expected only with it')
+    return _whole_column("level", body.level, count)
+
+
+def _whole(name: str, given: Sequence[float]) -> Indices:
+    """Return whole numbers (N,); FormError for another number."""
+    values = np.array(given)
+    parts = np.flatnonzero(values % 1.0)
+    if len(parts):
+        place, found = str(parts[0]), values[parts[0]]
+        raise FormError(f"{name}/{place}", f"{found:g}, expected a whole number")
+    return values.astype(np.int64)
+
+
+def _whole_column(name: str, given: Numbers, count: int) -> Indices:
+    """Return whole numbers (N,), of a list or of one number for all; FormError for another."""
+    if isinstance(given, list):
+        return _whole(name, given)
+    return _whole(name, [given]).repeat(count)
+
+
+def _takes(body: CrowdBody, count: int) -> CharacterTakes | None:
+    """Return the takes of the characters; "index" is a seed of its own for each, from 1 on."""
+    if body.take == 0.0 and not body.detail:
+        return None
+    if body.take == "index":
+        seeds = 1 + np.arange(count)
+    else:
+        seeds = _whole_column("take", body.take, count)
+    return CharacterTakes(seeds, _column(body.variety, count), np.full(count, body.detail))
+
+
+def _blending(body: CrowdBody, count: int) -> Blending | None:
+    if body.from_level is None and body.blend is None:
+        return None
+    if body.from_level is None or body.blend is None:
+        raise InvalidField("blend", "expected from_level and blend, or neither")
+    if body.level == "auto" and body.previous_level is None:
+        raise InvalidField("previous_level", 'missing; level "auto" with blend holds it')
+    return Blending(_whole("from_level", body.from_level), _column(body.blend, count))
+
+
+def _view(body: CrowdBody) -> LevelCriteria:
+    if body.camera is None:
+        raise InvalidField("camera", 'missing; level "auto" needs one')
+    lens = body.camera
+    previous = body.previous_level
+    return LevelCriteria(
+        Camera(np.array(lens.position), lens.fov, lens.height),
+        DEFAULT_PIXELS if body.pixels is None else body.pixels,
+        None if body.budget_ms is None else body.budget_ms / 1000.0,
+        None if previous is None else _whole("previous_level", previous),
+    )
+
+
+def checked_order(
+    question: WalkQuestion, ending: str, card: ModelCard, settings: Settings
+) -> CrowdOrder:
+    """Return the order of a question.
+
+    ending: extension of the format. card: of the model. Raises InvalidField for characters, poses,
+    frames or bytes beyond the limits of the settings.
+    """
+    made, flat = orders.from_question(question), question.instancing == "flatten"
+    _check_size(made, flat, settings)
+    skeleton, curves = card.skeleton, len(card.curves)
+    points = character.body_size(skeleton, question.body or DEFAULT_BODY)
+    motions, frames = made.motions or made.count, walking_crowd.frames(made.seconds, made.fps)
+    counts = CrowdCounts(len(skeleton), made.count, motions, frames, points, curves)
+    _check_output(counts, flat, ending, settings)
+    return made
+
+
+def _check_output(counts: CrowdCounts, flat: bool, ending: str, settings: Settings) -> None:
+    taken = crowd_size.file_size_bound(counts, ending, flat)
+    if taken > settings.output_limit:
+        raise InvalidField(
+            "count",
+            f"{taken / 1e6:.1f} MB for {counts.characters} characters and {counts.motions} motions "
+            f"of {counts.frames} frames as {ending}, expected at most "
+            f"{settings.output_limit / 1e6:.1f} MB",
+        )
+
+
+def _check_size(order: CrowdOrder, flat: bool, settings: Settings) -> None:
+    if order.count > settings.crowd_limit:
+        raise InvalidField("count", f"{order.count}, expected at most {settings.crowd_limit}")
+    # A flattened layer has a copy of the motion for each character.
+    shared = None if flat else order.motions
+    poses = walking_crowd.poses(shared or order.count, order.seconds, order.fps)
+    if poses > settings.crowd_poses:
+        raise InvalidField(
+            "count", f"{poses:.3g} poses of all motions, expected at most {settings.crowd_poses}"
+        )
+    longest = walking_crowd.poses(1, order.seconds, order.fps)
+    if longest > settings.crowd_frames:
+        raise InvalidField(
+            "seconds", f"{longest:.6g} frames of a motion, expected at most {settings.crowd_frames}"
+        )
+
 
 Crowds = Context[TableEncoder[CrowdPoses]]
 Walks = Context[CrowdWriter]
@@ -45,7 +298,7 @@ class CrowdTask:
 async def read_crowd(context: Crowds, request: Request) -> bytes:
     """Return the body, whose decoding takes a thread."""
     service = context.service
-    return await request_body.read_body(request, service.settings.crowd_body_limit, service.bodies)
+    return await steps.read_body(request, service.settings.crowd_body_limit, service.bodies)
 
 
 async def limit_crowd(context: Crowds, content: bytes) -> CrowdTask:
@@ -63,7 +316,7 @@ async def pose_crowd(context: Crowds, task: CrowdTask) -> CrowdPoses:
 
 
 def _poses(model: Synthesizer, task: CrowdTask) -> CrowdPoses:
-    return crowd_synthesis.synthesize_crowd(model, crowd_query.of_body(task.content, task.most))
+    return crowd_synthesis.synthesize_crowd(model, of_body(task.content, task.most))
 
 
 async def encode_crowd(context: Crowds, task: CrowdTask, answer: CrowdPoses) -> bytes:
@@ -98,7 +351,7 @@ class WalkTask:
 async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
     """Return the order of a walking crowd; InvalidField beyond the limits."""
     card, settings = context.model.session.card, context.service.settings
-    order = crowd_query.checked_order(question, context.form.extension, card, settings)
+    order = checked_order(question, context.form.extension, card, settings)
     return WalkTask(order, question.instancing, question.body or DEFAULT_BODY)
 
 

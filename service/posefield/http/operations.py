@@ -5,20 +5,19 @@ from functools import partial
 from starlette.requests import Request
 from starlette.responses import Response
 
-from posefield.encode import character_file
+from posefield.encode import glb
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import (
     clip_operations,
     crowd_operations,
+    metrics,
     performance_operations,
     pose_operations,
     responses,
     trust_operations,
+    worker_threads,
 )
-from posefield.http.concurrency import worker_threads
-from posefield.http.service import Service
-from posefield.http.steps import Handler
-from posefield.http.telemetry import metrics
+from posefield.http.steps import Handler, Service
 
 
 async def list_models(service: Service, request: Request) -> Response:
@@ -35,7 +34,7 @@ async def get_character(service: Service, request: Request) -> Response:
     """Return the character of a model at rest, made in a thread: that takes tenths of a second."""
     model = request.scope["model"]
     content = await worker_threads.run_in_thread(
-        character_file.character_glb, model.session.card.skeleton, model.identity
+        glb.character_glb, model.session.card.skeleton, model.identity
     )
     return responses.attachment(content, CLIP_ENCODERS["glb"], model.name)
 

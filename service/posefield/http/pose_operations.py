@@ -8,10 +8,9 @@ from typing import Any
 from starlette.responses import Response
 
 from posefield.constraints.targets import ConstraintSet
-from posefield.encode.files.media_types import JSON
+from posefield.encode.conventions import JSON
 from posefield.encode.formats import POSE_ENCODERS, TableEncoder
-from posefield.http import responses
-from posefield.http.concurrency import worker_threads
+from posefield.http import responses, worker_threads
 from posefield.http.steps import Context, Steps, from_body, from_url
 from posefield.question.motion_question import PoseQuestion
 from posefield.question.results import PoseAnswer

@@ -6,14 +6,16 @@ encode it, and send the response. Authorisation comes before decoding, so that t
 without a key is not read, and revalidation before it, so that a 304 costs no work.
 """
 
+import asyncio
 import logging
 import os
 import re
 import time
-from collections.abc import Callable
+from asyncio import Task
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
@@ -21,33 +23,89 @@ from starlette.types import Message, Receive, Scope, Send
 
 from posefield.common.errors import QueryError
 from posefield.common.name_suggestion import did_you_mean
+from posefield.http import header_fields, metrics, negotiation, telemetry
 from posefield.http.access import access_control
 from posefield.http.access.access_control import AuditedRequest
 from posefield.http.access.api_keys import EVERYONE
 from posefield.http.api import problems
 from posefield.http.api.contract import Operation
-from posefield.http.api.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestError
-from posefield.http.middleware import (
-    caching,
-    compression,
-    cors,
-    deadline,
-    negotiation,
-    security_headers,
+from posefield.http.api.problems import (
+    DEADLINE_EXCEEDED,
+    METHOD_NOT_ALLOWED,
+    OVERLOADED,
+    RequestError,
 )
-from posefield.http.middleware.deadline import DeadlineTimer
-from posefield.http.middleware.request_head import HeadLimits
+from posefield.http.header_fields import HeadLimits
 from posefield.http.routing import PathRoutes, Route, RouteTree
-from posefield.http.service import Service
-from posefield.http.steps import Context, Handler, Steps
-from posefield.http.telemetry import log, metrics
-from posefield.http.telemetry.telemetry import trace_id
+from posefield.http.steps import Context, Handler, Service, Steps
+from posefield.http.telemetry import trace_id
 
 faults = logging.getLogger(__name__)
 
 REQUEST_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 # Process prefix and counter: a random number per request would take four times as long.
 _PROCESS, _NUMBERS = os.urandom(12).hex(), count(1)
+
+
+Result = TypeVar("Result")
+
+CHECK_INTERVAL = 0.1
+"""Seconds between two checks: a timer per request would take a tenth of a pose request's time."""
+
+# RFC 7240, 4.3: time after which the client needs no response, s.
+_WAIT = re.compile(rb"(?:^|[,;\s])wait\s*=\s*([0-9]{1,6})(?![0-9])", re.IGNORECASE)
+
+
+def requested_deadline(prefer: bytes | None, most: float) -> float:
+    """Return the deadline of a request, s: `wait` of its Prefer header, at most `most`."""
+    found = _WAIT.search(prefer) if prefer else None
+    return min(most, float(found[1])) if found else most
+
+
+class DeadlineTimer:
+    """Requests of an event loop with their deadlines."""
+
+    def __init__(self) -> None:
+        self._until: dict[Task[Any], float] = {}
+        self._late: set[Task[Any]] = set()
+        self._checking = False
+
+    async def within(self, limit: float, answer: Awaitable[Result]) -> Result:
+        """Await a response; raises RequestError 503 if it takes longer than `limit` seconds.
+
+        The awaiting task is cancelled then, and `worker_threads.run_in_thread` asks the thread's
+        work to stop.
+        """
+        task, loop = asyncio.current_task(), asyncio.get_running_loop()
+        assert task is not None
+        self._until[task] = loop.time() + limit
+        if not self._checking:
+            self._checking = True
+            loop.call_later(CHECK_INTERVAL, self._check)
+        try:
+            return await answer
+        except asyncio.CancelledError:
+            if task not in self._late:
+                raise
+            task.uncancel()
+            detail = f"no answer within {limit:g} s"
+            raise RequestError(DEADLINE_EXCEEDED, detail, headers={"Retry-After": "1"}) from None
+        finally:
+            del self._until[task]
+            self._late.discard(task)
+
+    def _check(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._checking = bool(self._until)
+        if self._checking:
+            loop.call_later(CHECK_INTERVAL, self._check)
+        now = loop.time()
+        metrics.set_open_requests(len(self._until))
+        late = [task for task, until in self._until.items() if until < now]
+        for task in late:
+            if task not in self._late:
+                self._late.add(task)
+                task.cancel()
 
 
 @dataclass
@@ -122,7 +180,7 @@ async def respond(exchange: Exchange) -> Response:
         return problems.request_error_response(exchange.request, fault)
     except QueryError as error:
         return problems.query_error_response(exchange.request, error)
-    except caching.NotModified:
+    except header_fields.NotModified:
         return Response(status_code=304)
 
 
@@ -138,9 +196,7 @@ async def _respond(exchange: Exchange) -> Response:
     authorise(exchange, route)
     negotiate(exchange, route)
     revalidate(exchange, route)
-    limit = deadline.requested_deadline(
-        exchange.headers.get(b"prefer"), site.service.settings.deadline
-    )
+    limit = requested_deadline(exchange.headers.get(b"prefer"), site.service.settings.deadline)
     return await site.watch.within(limit, answer(route.handler, site.service, exchange.request))
 
 
@@ -163,8 +219,8 @@ def other_method(exchange: Exchange, place: PathRoutes) -> Response:
         detail = f"{method}, expected one of {place.allow}"
         raise RequestError(METHOD_NOT_ALLOWED, detail, headers=allow)
     response = Response(status_code=204, headers=allow)
-    if exchange.service.origins and cors.is_preflight(exchange.headers):
-        response.raw_headers += cors.preflight_headers(place.allow.encode())
+    if exchange.service.origins and header_fields.is_preflight(exchange.headers):
+        response.raw_headers += header_fields.preflight_headers(place.allow.encode())
     return response
 
 
@@ -199,7 +255,7 @@ def negotiate(exchange: Exchange, route: Route) -> None:
     if scope["query_string"] and not route.operation.open_query:
         _check_parameters(exchange.request, route.operation)
     if route.compresses and b"accept-encoding" in exchange.headers:
-        exchange.coding = compression.preferred_coding(exchange.headers[b"accept-encoding"])
+        exchange.coding = negotiation.preferred_coding(exchange.headers[b"accept-encoding"])
     if route.offers:
         scope["format"] = negotiation.negotiated_format(exchange.request, route.offers)
 
@@ -230,7 +286,7 @@ def revalidate(exchange: Exchange, route: Route) -> None:
             parts = model.fingerprint, route.name, scope["query_string"], chosen, whom
             _check_tag(exchange, service.code, *parts)
     elif page := service.pages.get(operation.id):
-        exchange.lifetime = caching.PUBLIC + caching.NO_CACHE
+        exchange.lifetime = header_fields.PUBLIC + header_fields.NO_CACHE
         _check_tag(exchange, page.digest)
 
 
@@ -245,10 +301,10 @@ def _names_character(exchange: Exchange) -> bool:
 
 def _check_tag(exchange: Exchange, *parts: bytes) -> None:
     """Set the entity tag of a response that depends on these parts alone."""
-    exchange.tag = caching.entity_tag(*parts, coding=exchange.coding)
+    exchange.tag = header_fields.entity_tag(*parts, coding=exchange.coding)
     given = exchange.headers.get(b"if-none-match")
-    if given is not None and caching.matches_tag(given.decode("latin-1"), exchange.tag):
-        raise caching.NotModified
+    if given is not None and header_fields.matches_tag(given.decode("latin-1"), exchange.tag):
+        raise header_fields.NotModified
 
 
 async def answer(handler: Handler, service: Service, request: Request) -> Response:
@@ -269,20 +325,20 @@ async def answer(handler: Handler, service: Service, request: Request) -> Respon
 async def send_response(exchange: Exchange, response: Response) -> None:
     """Compress a response, add the common headers and send it."""
     if exchange.coding is not None and response.status_code == 200:
-        await compression.compress_response(response, exchange.coding)
+        await negotiation.compress_response(response, exchange.coding)
     response.raw_headers += _common_headers(exchange, response)
     await response(exchange.scope, exchange.request.receive, exchange.sent)
 
 
 def _common_headers(exchange: Exchange, response: Response) -> list[tuple[bytes, bytes]]:
     """Return the headers of every response: request id, security, connection, CORS and caching."""
-    kind = security_headers.headers_for(response.media_type, response.status_code)
+    kind = header_fields.security_headers(response.media_type, response.status_code)
     headers = [(b"x-request-id", exchange.identity.encode()), *kind]
     if exchange.service.readiness.draining and "connection" not in response.headers:
         # The client's next request must reach a process that continues to run.
         headers.append((b"connection", b"close"))
     if origins := exchange.service.origins:
-        headers += cors.cors_headers(exchange.headers.get(b"origin"), origins)
+        headers += header_fields.cors_headers(exchange.headers.get(b"origin"), origins)
     held = response.status_code in (200, 304)
     if held and exchange.route and exchange.route.vary:
         headers.append((b"vary", exchange.route.vary))
@@ -290,7 +346,7 @@ def _common_headers(exchange: Exchange, response: Response) -> list[tuple[bytes,
         tag = exchange.tag.encode()
         headers += [(b"etag", tag), (b"cache-control", exchange.lifetime)]
     elif "cache-control" not in response.headers:
-        headers.append((b"cache-control", caching.NO_STORE))
+        headers.append((b"cache-control", header_fields.NO_STORE))
     return headers
 
 
@@ -309,7 +365,7 @@ def _log_line(exchange: Exchange, operation: str, took: float) -> dict[str, Any]
     scope = exchange.scope
     model = scope.get("model")
     return {
-        "time": log.timestamp(time.time()),
+        "time": telemetry.timestamp(time.time()),
         "request": exchange.identity,
         "trace": trace_id(exchange.headers),
         "method": scope["method"],

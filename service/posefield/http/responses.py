@@ -8,8 +8,8 @@ import orjson
 from anyio import CapacityLimiter
 from starlette.responses import Response, StreamingResponse
 
-from posefield.encode.files.media_types import Format
-from posefield.http.concurrency import worker_threads
+from posefield.encode.conventions import Format
+from posefield.http import worker_threads
 from posefield.model_file import model_card as cards
 from posefield.question.performance_report import PerformanceReport
 from posefield.question.results import Trust

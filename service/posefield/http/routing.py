@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from posefield.http import negotiation
 from posefield.http.api.contract import Operation
-from posefield.http.middleware import compression
-from posefield.http.middleware.negotiation import Offers
+from posefield.http.negotiation import Offers
 from posefield.http.steps import Handler
 
 
@@ -42,7 +42,7 @@ class Route:
         """True if a response may have a content coding."""
         operation = self.operation
         types = [operation.formats[self.format]] if self.format else operation.media_types
-        return any(map(compression.is_compressible, types))
+        return any(map(negotiation.is_compressible, types))
 
     @cached_property
     def vary(self) -> bytes:

@@ -1,8 +1,13 @@
 """Server process and worker processes, run by uvicorn through its public interface.
 
-See docs/decisions/0001-http-server.md.
+uvicorn writes the head and the body of a response separately, and uvloop makes a system call for
+each. On Linux the second one takes a fifth of the CPU time of a pose request over 32 connections,
+so writes are coalesced: one system call per connection and iteration of the event loop. See
+docs/decisions/0001-http-server.md.
 """
 
+import asyncio
+import faulthandler
 import logging
 import math
 import multiprocessing
@@ -10,31 +15,170 @@ import os
 import resource
 import signal
 import socket
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+import sys
+import threading
+from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
+from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
+from multiprocessing import synchronize
 from pathlib import Path
-from threading import Semaphore
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import uvicorn
 from threadpoolctl import threadpool_limits
+from uvicorn.protocols.http.auto import AutoHTTPProtocol
 from uvicorn.supervisors import Multiprocess
 from uvicorn.supervisors.multiprocess import Process
 
 from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
+from posefield.http import metrics, telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
-from posefield.http.concurrency.readiness import Readiness
-from posefield.http.lifespan import StartAnnouncement, lifespan
-from posefield.http.middleware.coalescing import CoalescingProtocol
-from posefield.http.telemetry import log, metrics, tracing
-from posefield.http.telemetry.telemetry import Telemetry
+from posefield.http.readiness import Readiness
+from posefield.http.request_cycle import ServerState
+from posefield.http.telemetry import Telemetry
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
-from posefield.registry.model_registry import VersionLimits
-from posefield.registry.model_reload import ReloadingRegistry
+from posefield.registry.model_registry import ReloadingRegistry, VersionLimits
+
+MAX_BUFFER = 64 * 1024
+"""Maximum bytes of the buffer: flow control must see larger amounts."""
+
+
+class CoalescingProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
+    """uvicorn's HTTP/1.1 protocol with write coalescing."""
+
+    def connection_made(self, transport: Any) -> None:
+        """Wrap the transport of a new connection."""
+        super().connection_made(CoalescingTransport(transport))
+
+    def on_headers_complete(self) -> None:
+        """Start the request, and collect trailers apart from its headers.
+
+        uvicorn would append trailers to the request's headers, after a proxy has checked those.
+        """
+        super().on_headers_complete()
+        self.headers: list[tuple[bytes, bytes]] = []
+
+
+class CoalescingTransport:
+    """A transport that buffers writes until the next iteration of the event loop."""
+
+    def __init__(self, transport: asyncio.Transport) -> None:
+        self._transport = transport
+        self._call_soon = asyncio.get_running_loop().call_soon
+        self._buffer: list[bytes] = []
+        self._size = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    def write(self, data: bytes) -> None:
+        """Buffer data; it is sent in the next iteration or when the buffer exceeds its maximum."""
+        if not self._buffer:
+            self._call_soon(self._flush)
+        self._buffer.append(data)
+        self._size += len(data)
+        if self._size > MAX_BUFFER:
+            self._flush()
+
+    def writelines(self, pieces: Iterable[bytes]) -> None:
+        """Buffer pieces of data as by `write`."""
+        for piece in pieces:
+            self.write(piece)
+
+    def close(self) -> None:
+        """Send the buffer, then close the transport."""
+        self._flush()
+        self._transport.close()
+
+    def _flush(self) -> None:
+        held, self._buffer, self._size = self._buffer, [], 0
+        # A client that has reset its connection closes the transport before the next iteration;
+        # uvloop raises an error for a write to a closed one.
+        if held and not self._transport.is_closing():
+            self._transport.writelines(held)
+
+
+HEARTBEAT_INTERVAL = 1.0
+"""Period of the heartbeat, s."""
+FORCED_EXIT_DELAY = 5
+"""Seconds until a process is ended by force after the server has shut down."""
+
+
+@dataclass(frozen=True)
+class StartAnnouncement:
+    """Start message on standard output, written by the first process that is ready.
+
+    first: semaphore with value 1, shared by the processes.
+    """
+
+    line: str
+    first: synchronize.Semaphore | threading.Semaphore
+
+    def write(self) -> None:
+        """Write the line unless another process has written it."""
+        if self.first.acquire(False):
+            sys.stdout.write(f"{self.line}\n")
+            sys.stdout.flush()
+
+
+@asynccontextmanager
+async def lifespan(
+    site: ServerState, shelf: ReloadingRegistry, announcement: StartAnnouncement
+) -> AsyncIterator[None]:
+    """Run the reload of models, the heartbeat and the SIGTERM handler during the server's life."""
+    service = site.service
+    _drain_on_sigterm(service.readiness, service.settings.drain)
+    beat = asyncio.create_task(_heartbeat(site, service.settings.unresponsive))
+    with shelf.watch(service.settings.reload):
+        announcement.write()
+        yield
+    beat.cancel()
+    service.telling.close()
+    # A thread that does not stop must not keep the process alive.
+    faulthandler.dump_traceback_later(FORCED_EXIT_DELAY, exit=True)
+
+
+async def _heartbeat(site: ServerState, unresponsive: int) -> None:
+    """Reset the watchdog, update the gauge of open requests and check the parent, once a second.
+
+    A blocked event loop does not reset the watchdog, a C thread that does not need the GIL. After
+    `unresponsive` seconds it writes the stacks of all threads to standard error and ends the
+    process with exit code 1; the supervisor replaces it. A worker whose parent has died raises
+    SIGTERM.
+    """
+    parent = multiprocessing.parent_process()
+    while True:
+        if unresponsive:
+            faulthandler.dump_traceback_later(unresponsive, exit=True)
+        metrics.set_open_requests(site.open)
+        if parent is not None and not parent.is_alive():
+            signal.raise_signal(signal.SIGTERM)
+            return
+        await asyncio.sleep(HEARTBEAT_INTERVAL)
+
+
+def _drain_on_sigterm(readiness: Readiness, seconds: int) -> None:
+    """Install a SIGTERM handler that reports not ready, and shuts down `seconds` later.
+
+    A second SIGTERM shuts down at once. SIGINT keeps its handler, which does not wait.
+    """
+    loop = asyncio.get_running_loop()
+    end: Any = signal.getsignal(signal.SIGTERM)
+
+    def drain(number: int, frame: FrameType | None) -> None:
+        if readiness.draining or not seconds:
+            readiness.draining = True
+            end(number, frame)
+            return
+        readiness.draining = True
+        loop.call_soon_threadsafe(loop.call_later, seconds, end, number, None)
+
+    signal.signal(signal.SIGTERM, drain)
+
 
 faults = logging.getLogger(__name__)
 
@@ -61,7 +205,8 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
     count = settings.workers or usable_processors(CPU_QUOTA_FILE)
     with ExitStack() as stack, suppress(KeyboardInterrupt):
         sockets = _listening_sockets(stack, settings.host, settings.port)
-        first = multiprocessing.get_context("spawn").Semaphore(1) if count > 1 else Semaphore(1)
+        spawn = multiprocessing.get_context("spawn")
+        first = spawn.Semaphore(1) if count > 1 else threading.Semaphore(1)
         announcement = StartAnnouncement(f"posefield: {names} at {_url(sockets[0])}", first)
         if count > 1:
             stack.enter_context(metrics.shared_folder())
@@ -103,10 +248,10 @@ def open_models(
 def _application(
     shelf: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
 ) -> App:
-    lines = log.to_standard_error() if settings.log == "on" else None
+    lines = telemetry.to_standard_error() if settings.log == "on" else None
     beside = partial(lifespan, shelf=shelf, announcement=announcement)
     return create_app(
-        Readiness(shelf), settings, Telemetry(lines, tracing.from_environment()), beside
+        Readiness(shelf), settings, Telemetry(lines, telemetry.environment_tracer()), beside
     )
 
 
@@ -138,7 +283,7 @@ class WorkerSupervisor(Multiprocess):
     shutdown_requested: a signal has requested the shutdown.
     """
 
-    told = False
+    shutdown_requested = False
 
     def run_until_signalled(self) -> None:
         """Run the workers until a signal; raises WorkerDied if the supervisor ends without one."""

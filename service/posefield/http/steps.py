@@ -1,9 +1,10 @@
-"""Steps of an operation that answers a question about a model."""
+"""Steps of an operation that answers a question, the state they share, and bodies of requests."""
 
 import re
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 from urllib.parse import parse_qsl
 
@@ -11,11 +12,135 @@ from msgspec import Struct
 from starlette.requests import Request
 from starlette.responses import Response
 
-from posefield.http.decoding import request_body
-from posefield.http.service import Service
+from posefield.characters.user_character import EMPTY, CharacterFolder
+from posefield.http import header_fields
+from posefield.http.access.access_control import AccessPolicy
+from posefield.http.api.problems import BAD_BODY, BODY_TOO_LARGE, NOT_JSON, OVERLOADED, RequestError
+from posefield.http.api.settings import Settings
+from posefield.http.batching import ClipBatcher, PoseBatcher
+from posefield.http.pages.static_page import StaticPage
+from posefield.http.readiness import Readiness
+from posefield.http.telemetry import NO_TELEMETRY, Telemetry
 from posefield.question import json_decoding, text_decoding
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
+
+MEDIA_TYPE = "application/json"
+
+FREE_BYTES = 64 * 1024
+"""Bytes of each body that do not count: the number of open requests bounds their memory, and small
+requests succeed while large bodies exhaust the limit."""
+
+
+@dataclass
+class BodyMemory:
+    """Memory of the bodies of open requests, beyond the first FREE bytes of each.
+
+    limit: maximum of their sum, bytes. used: their sum, bytes.
+    """
+
+    limit: int
+    used: int = 0
+
+    def take(self, size: int) -> None:
+        """Add `size` bytes; raises RequestError 503 beyond the limit."""
+        if self.used + size > self.limit:
+            detail = f"bodies of other requests take {self.used} of {self.limit} bytes"
+            raise RequestError(OVERLOADED, detail, headers=_CLOSE | {"Retry-After": "1"})
+        self.used += size
+
+    def release(self, size: int) -> None:
+        """Subtract the `size` bytes of a finished request."""
+        self.used -= size
+
+
+async def read_body(request: Request, limit: int, memory: BodyMemory) -> bytes:
+    """Return the body of a JSON request, with a Content-Length or chunked.
+
+    limit: bytes. `request.scope["body_memory"]` is set to the bytes taken from `memory`, also when
+    this raises. Raises RequestError for another media type (415), a body beyond the limit (413), an
+    incomplete body (400) and exhausted memory (503).
+    """
+    _check_media_type(request.headers.get("content-type", ""))
+    declared = _declared_length(request)
+    if declared > limit:
+        raise _too_large(limit)
+    found, taken = bytearray(), 0
+    async for chunk in request.stream():
+        found += chunk
+        if len(found) > limit:
+            raise _too_large(limit)
+        if (beyond := len(found) - FREE_BYTES) > taken:
+            memory.take(beyond - taken)
+            request.scope["body_memory"] = taken = beyond
+    if declared != len(found) and declared:
+        # httptools skips the body of a request with an Upgrade to another protocol (h2c).
+        detail = f"{len(found)} of {declared} bytes arrived; send HTTP/1.1 without `Upgrade`"
+        raise RequestError(BAD_BODY, detail, {"pointer": ""}, _CLOSE)
+    return bytes(found)
+
+
+def _check_media_type(given: str) -> None:
+    name, _, parameters = given.partition(";")
+    charset = parameters.strip().lower()
+    if name.strip().lower() != MEDIA_TYPE or charset not in ("", "charset=utf-8"):
+        raise RequestError(NOT_JSON, f"Content-Type {given!r}, expected {MEDIA_TYPE!r}")
+
+
+def _declared_length(request: Request) -> int:
+    length = request.headers.get("content-length", "")
+    return int(length) if length.isascii() and length.isdigit() and len(length) < 20 else 0
+
+
+def _too_large(limit: int) -> RequestError:
+    detail = f"more than {limit} bytes, expected at most {limit}"
+    return RequestError(BODY_TOO_LARGE, detail, headers=_CLOSE)
+
+
+# The client may still be sending the rest of the body: closing the connection stops it.
+_CLOSE = {"Connection": "close"}
+
+
+@dataclass(frozen=True)
+class Service:
+    """Shared state of all operations.
+
+    contract: version of the contract. pages: by operationId. rules: access policy. origins: for
+    CORS. telling: log and traces. code: digest for entity tags. batcher: of pose requests. desk: of
+    file requests. characters: of users.
+    """
+
+    readiness: Readiness
+    settings: Settings
+    contract: str
+    pages: Mapping[str, StaticPage]
+    access_policy: AccessPolicy
+    origins: frozenset[bytes] = frozenset()
+    telling: Telemetry = NO_TELEMETRY
+    code: bytes = field(default_factory=header_fields.code_digest)
+    pose_batcher: PoseBatcher = field(default_factory=PoseBatcher)
+    clip_batcher: ClipBatcher = field(default_factory=ClipBatcher)
+    characters: CharacterFolder = EMPTY
+
+    @cached_property
+    def bodies(self) -> BodyMemory:
+        """Memory limit on the bodies of open requests."""
+        return BodyMemory(self.settings.bodies_memory)
+
+    def lifetime(self, model: str) -> bytes:
+        """Return the Cache-Control of a response.
+
+        model: key in the path, a name with or without a hash.
+        """
+        return header_fields.cache_control(
+            model, self.settings.alias_seconds, self.access_policy.requires_credentials
+        )
+
+    @property
+    def registry(self) -> ModelRegistry:
+        """Current models; a reload can replace them, so read this once per request."""
+        return self.readiness.models.registry
+
 
 _ESCAPES = re.compile("[%+]")
 
@@ -103,12 +228,12 @@ def from_body(
 ) -> Callable[[Context[Any], Request], Awaitable[QuestionStruct]]:
     """Return the step that decodes a question of this type from a JSON body.
 
-    It raises as `request_body.read` and `json_decoding.decode_question`.
+    It raises as `read_body` and `json_decoding.decode_question`.
     """
 
     async def decode(context: Context[Any], request: Request) -> QuestionStruct:
         service = context.service
-        content = await request_body.read_body(request, service.settings.body_limit, service.bodies)
+        content = await read_body(request, service.settings.body_limit, service.bodies)
         return json_decoding.decode_question(form, content)
 
     return decode

@@ -9,8 +9,7 @@ from starlette.responses import Response
 from posefield.common.errors import InvalidField
 from posefield.encode.formats import GRID_ENCODERS, TableEncoder
 from posefield.encode.tables import model_tables
-from posefield.http import responses
-from posefield.http.concurrency import worker_threads
+from posefield.http import responses, worker_threads
 from posefield.http.steps import Context, Steps, from_body, from_url, unchecked
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.question.results import Explanation, SigmaGrid, Suggestions

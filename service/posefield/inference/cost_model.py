@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import PointControls, PointLabels
-from posefield.common.progress_callback import ProgressCallback, ignore_progress
+from posefield.common.cancellation import ProgressCallback, ignore_progress
 from posefield.common.units import Floats
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.session import Session

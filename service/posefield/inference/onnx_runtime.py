@@ -13,7 +13,7 @@ import onnxruntime
 
 from posefield.common.errors import ModelError
 from posefield.common.units import Singles
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 
 
 def open_session(content: bytes, source: str) -> Any:
@@ -84,7 +84,7 @@ class GraphParts:
         return found
 
     def _open(self, values: tuple[str, ...], level: int) -> _Part:
-        content = subgraph.select_outputs(subgraph.fix_level(self._content, level), *values)
+        content = onnx_file.select_outputs(onnx_file.fix_level(self._content, level), *values)
         session = open_session(content, self._source)
         # Inputs with a default are not among the others.
         ports = [*session.get_inputs(), *session.get_overridable_initializers()]

@@ -16,8 +16,7 @@ from posefield.common.array_shapes import Bones, Frames, JointRotations, RootPat
 from posefield.common.units import Floats
 from posefield.kriging import philox
 from posefield.kriging.philox import Seeds
-from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import ModelCard
+from posefield.model_file.model_card import Level, ModelCard
 from posefield.motion import blend, curves, quat
 from posefield.motion.curves import Curve
 from posefield.motion.rotation_charts import CHARTS, ChartName

@@ -19,8 +19,7 @@ from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
 from posefield.model_file import answer_bounds, checked_file
 from posefield.model_file.answer_bounds import AnswerBounds
-from posefield.model_file.model_card import ModelCard
-from posefield.model_file.row_values import ROW_VALUES, shape_rows
+from posefield.model_file.model_card import ROW_VALUES, ModelCard, shape_rows
 
 # Estimate of memory, by the shipped models: each level has up to six sessions, one for each set of
 # values that is asked for, and a session takes four to five times the file.

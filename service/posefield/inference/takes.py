@@ -19,7 +19,7 @@ from posefield.common.value_cache import ValueCache
 from posefield.inference.session import Session
 from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 
 FIELD_CACHE, DEVIATION_CACHE = 64, 4096
 """Numbers of cached fields, of about 200 kB each, and of deviations at one point, of 300 bytes. A
@@ -130,5 +130,5 @@ class TakeSampler:
 
     @cached_property
     def _root_of_sill(self) -> float:
-        sill = subgraph.initializers(self._session.content)["sill"]
+        sill = onnx_file.initializers(self._session.content)["sill"]
         return float(np.sqrt(sill.item()))

@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.array_shapes import SampleControls
-from posefield.common.progress_callback import ProgressCallback, ignore_progress
+from posefield.common.cancellation import ProgressCallback, ignore_progress
 from posefield.common.units import Floats, Indices
 from posefield.kriging.support import NUGGET, covariances
 

@@ -16,7 +16,7 @@ from posefield.common.units import Floats, Indices
 from posefield.locomotion import stride
 from posefield.model_file.model_card import PERFORMER, LabelSet, ModelCard
 from posefield.question.motion_question import LabelValue
-from posefield.validation.label_validation import label_weights
+from posefield.validation.question_validation import label_weights
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from collections.abc import Collection, Hashable, Iterable, Mapping, Sized
 from itertools import pairwise
 
 from posefield.kriging.covariance import COVARIANCE_MODELS
-from posefield.model_file.model_card import ModelCard
-from posefield.model_file.row_values import ROW_VALUES
+from posefield.model_file.model_card import ROW_VALUES, ModelCard
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 

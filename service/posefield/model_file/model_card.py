@@ -1,17 +1,18 @@
 """The model card: the description of a model in the metadata of its .onnx file.
 
 Every entry is JSON text under a key that begins with "posefield."; `FORMAT` changes whenever an
-older reader would misread a file. `card_reader` reads what `dump` writes.
+older reader would misread a file. `checked_file` reads what `dump` writes.
 """
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, SupportsFloat
+from typing import Annotated, Any, Literal, SupportsFloat
 
 import msgspec
 import numpy as np
 
+from posefield.common.array_shapes import Positions
 from posefield.common.bounded_types import (
     Count,
     Index,
@@ -25,16 +26,101 @@ from posefield.common.bounded_types import (
     Slug,
     Text,
 )
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Singles
 from posefield.kriging.kriging_model import Hyper
-from posefield.model_file.captured_acceleration import CapturedAcceleration
-from posefield.model_file.level_of_detail import Level
 from posefield.motion import measures
 from posefield.motion.curves import Curve
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import Measure
 from posefield.motion.rotation_charts import ChartName
 from posefield.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of detail of a model; the finest comes first, and ranks never grow after it.
+
+    ranks: of the core tensor. samples: number of clips from which coefficients are interpolated.
+    joints: indices of the moving joints; the others keep the family's mean rotation. numbers: count
+    of the numbers in the file that the level reads; bytes: their size in float32. operations:
+    multiply-adds of one pose. rms, p99, max: of the distances, m, between its joints and those of
+    the untruncated model, over random controls, performers and times. pose: the largest root mean
+    square over the joints of one pose, m. effector: root mean square of the event's joint at its
+    event, m. event: number of leading coefficients with a second prediction around the event.
+    """
+
+    ranks: tuple[Count, Count, Count]
+    samples: Count
+    joints: tuple[Index, ...]
+    numbers: Index
+    bytes: Index
+    operations: Index
+    rms: NonNegative
+    p99: NonNegative
+    pose: NonNegative
+    max: NonNegative
+    effector: NonNegative | None
+    event: Index = 0
+
+
+ACCELERATION_RATE = 60.0
+"""Frames a second at which accelerations are measured; at higher rates noise adds to them."""
+USUAL_PERCENTILE = 99.0
+"""Percentile of the accelerations of motions that is their usual largest one."""
+
+
+@dataclass(frozen=True)
+class CapturedAcceleration:
+    """Accelerations in the frames of captured clips, m/s², as `mean_accelerations`
+    at ACCELERATION_RATE.
+
+    median, p99: median and 99th percentile over the frames of all clips together.
+    """
+
+    median: NonNegative
+    p99: NonNegative
+
+
+def mean_accelerations(positions: Positions, rate: float) -> Annotated[Floats, "inner"]:
+    """Return mean accelerations (F - 2,) of joints (F, J, 3) relative to the root, m/s².
+
+    positions: m, of frames at a rate, the root first. They are second differences; none for fewer
+    than three frames.
+    """
+    if len(positions) < 3:
+        return np.zeros(0)
+    second = np.diff(positions - positions[:, :1], n=2, axis=0) * rate**2
+    means: Floats = np.linalg.norm(second, axis=-1).mean(axis=-1)
+    return means
+
+
+ROW_VALUES = {
+    "rotations": "rotation_rows",
+    "root_position": "root_rows",
+    "bone_offsets": "offset_rows",
+    "duration": "duration_column",
+    "sigma": "sigma_columns",
+    "travel": "travel_rows",
+    "curves": "curve_rows",
+}
+"""Name of the value with the rows, by output of the graph."""
+
+
+def shape_rows(output: str, rows: Singles, questions: int, joints: int) -> Any:
+    """Return an output of the graph in its shape, from its rows, without a copy.
+
+    questions: B. Rotations are (B, S, J, 4), bone offsets (B, J, 3), durations and sigmas (B,), all
+    others (B, S, n).
+    """
+    if output in ("duration", "sigma"):
+        # Sigma has two equal columns, so that its sums have one order (`GraphBuilder.row_sums`).
+        return rows[:, 0]
+    if output == "rotations":
+        return rows.reshape(questions, -1, joints, 4)
+    if output == "bone_offsets":
+        return rows.reshape(questions, joints, 3)
+    return rows.reshape(questions, -1, rows.shape[1])
+
 
 FORMAT = 5
 PREFIX = "posefield."

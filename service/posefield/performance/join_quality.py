@@ -18,7 +18,7 @@ from posefield.feet.contact_estimates import DECIMALS, STANDING
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import Character
 from posefield.locomotion import floor_plane
-from posefield.model_file.captured_acceleration import USUAL, mean_accelerations
+from posefield.model_file.model_card import USUAL_PERCENTILE, mean_accelerations
 from posefield.motion.contacts import contact_detection
 from posefield.motion.foot_contacts import FootContact
 from posefield.performance.joins import Blend, Cut, positions
@@ -123,7 +123,9 @@ def usual_acceleration(character: Character, passages: Sequence[Passage]) -> flo
     The passages are as their models made them: without joins.
     """
     found = [accelerations(character, passage, 0, len(passage)) for passage in passages]
-    return max((float(np.percentile(own, USUAL)) for own in found if len(own)), default=0.0)
+    return max(
+        (float(np.percentile(own, USUAL_PERCENTILE)) for own in found if len(own)), default=0.0
+    )
 
 
 def describe_cut(

@@ -25,7 +25,7 @@ from posefield.performance.walker import Walker, WalkerKey
 from posefield.question.performance_question import PerformanceQuestion, Walk
 from posefield.synthesis import crowd_takes, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.crowd_question import CharacterTakes
+from posefield.validation.crowd_validation import CharacterTakes
 
 CYCLE_FRAMES = 60
 """Default number of frames of a steady cycle."""

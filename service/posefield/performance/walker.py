@@ -20,7 +20,7 @@ from posefield.motion import skeleton
 from posefield.question.motion_question import LabelValue
 from posefield.question.value_validation import check_number, check_range
 from posefield.synthesis import walking_feet
-from posefield.validation.label_validation import label_weights
+from posefield.validation.question_validation import label_weights
 
 # Phases at which a cycle is averaged, and at which its feet are measured.
 AVERAGED_PHASES, MEASURED_PHASES = 16, 60

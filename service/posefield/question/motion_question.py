@@ -8,8 +8,19 @@ from msgspec import UNSET, Meta, Struct, UnsetType
 
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.motion.joint_roles import NamingConvention
-from posefield.question.body_kind import Body
 from posefield.question.floor import Floor, at_height
+
+BodyKind = Literal["none", "mannequin", "bones"]
+DEFAULT_BODY: BodyKind = "mannequin"
+
+Body = Annotated[
+    BodyKind | None,
+    Meta(
+        description="body in USD and glTF files: none, mannequin or one box per bone; default: "
+        "mannequin"
+    ),
+]
+
 
 MAX_TAKE = 999_999_999
 """Largest seed of a take: whole numbers in text have at most nine digits."""

@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
-from posefield.question.body_kind import Body
-from posefield.question.motion_question import DEFAULT_VARIETY, FeetMode, LabelValue
+from posefield.question.motion_question import DEFAULT_VARIETY, Body, FeetMode, LabelValue
 
 Instancing = Literal["references", "scenegraph", "flatten"]
 WalkerTake = Literal["index"] | int

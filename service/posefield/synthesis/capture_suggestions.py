@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from posefield.common.cancellation import ProgressCallback, ignore_progress
 from posefield.common.errors import InvalidField
-from posefield.common.progress_callback import ProgressCallback, ignore_progress
 from posefield.common.units import Floats, Indices
 from posefield.kriging import acquisition, kriging_model
 from posefield.kriging.acquisition import VarianceReduction
@@ -15,7 +15,7 @@ from posefield.question.model_question import SuggestQuestion
 from posefield.question.results import Suggestion, Suggestions
 from posefield.question.value_validation import check_range
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation import input_limits, label_validation, question_validation
+from posefield.validation import question_validation
 
 DRAWN_CANDIDATES, MAX_CANDIDATES = 1000, 10_000
 """Number of drawn candidates, and the largest number of given ones."""
@@ -34,7 +34,7 @@ def suggest(
     for an unusable candidate.
     """
     card, own = model.session.card, model.validator.support
-    weights = label_validation.label_weights(card, asked.performer, asked.labels)[0]
+    weights = question_validation.label_weights(card, asked.performer, asked.labels)[0]
     points = _drawn_points(own) if candidates is None else _given_points(model, candidates)
     captured = _captured_indices(card, weights)
     scaled, known = own.scaled(points), own.samples[captured]
@@ -64,7 +64,7 @@ def _given_points(model: Synthesizer, candidates: Sequence[Mapping[str, float]])
     rows = []
     for index, controls in enumerate(candidates):
         try:
-            input_limits.check_names(card, controls)
+            question_validation.check_names(card, controls)
             rows.append([_value(control, controls) for control in card.controls])
         except InvalidField as fault:
             raise InvalidField(f"candidates/{index}/{fault.field}", fault.message) from fault

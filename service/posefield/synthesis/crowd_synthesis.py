@@ -19,8 +19,8 @@ from posefield.motion import blend, curves
 from posefield.motion.crowd_clip import CrowdPoses, Placement
 from posefield.synthesis import crowd_takes
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation import crowd_question, crowd_validation
-from posefield.validation.crowd_question import Blending, CharacterTakes, CrowdQuestion
+from posefield.validation import crowd_validation
+from posefield.validation.crowd_validation import Blending, CharacterTakes, CrowdQuestion
 
 # Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
 SLACK = 1e-5
@@ -91,8 +91,8 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     controls, supported, said = crowd_validation.check_controls(
         card, model.validator.support, question
     )
-    labels = crowd_question.labels(question, card)
-    crowd_question.check_levels(question, len(card.levels))
+    labels = crowd_validation.labels(question, card)
+    crowd_validation.check_levels(question, len(card.levels))
     early = question.times < 0.0
     crowd_validation.raise_for_first("time", question.times, early, "s, expected 0 s or later")
     levels, error_px, sentences = _levels(model, question)

@@ -12,7 +12,7 @@ from posefield.common.array_shapes import Frames, PointControls, PointLabels
 from posefield.common.units import Floats
 from posefield.motion import blend, curves, root_travel
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
-from posefield.validation.crowd_question import CharacterTakes
+from posefield.validation.crowd_validation import CharacterTakes
 
 
 def pose_takes(

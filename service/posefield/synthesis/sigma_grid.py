@@ -12,7 +12,7 @@ from posefield.model_file.model_card import ModelCard
 from posefield.question.model_question import SigmaQuestion
 from posefield.question.results import GridAxis, SigmaGrid
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation import input_limits, label_validation, question_validation
+from posefield.validation import question_validation
 
 # Larger batches exceed a core's cache between operators and take 1.5 times as long per row.
 BATCH = 1024
@@ -25,8 +25,8 @@ def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
     sampled range.
     """
     card = model.session.card
-    input_limits.check_names(card, asked.controls)
-    labels = label_validation.label_weights(card, asked.performer, asked.labels)
+    question_validation.check_names(card, asked.controls)
+    labels = question_validation.label_weights(card, asked.performer, asked.labels)
     across = _axis(card, "across", asked.across, asked.columns, asked)
     along = _axis(card, "along", asked.along, asked.rows, asked)
     fixed = _fixed(card, asked)
@@ -90,5 +90,7 @@ def _points(
 
 
 def _inside(card: ModelCard, points: Floats) -> Booleans:
-    low, high = np.transpose([input_limits.sampled_range(control) for control in card.controls])
+    low, high = np.transpose(
+        [question_validation.sampled_range(control) for control in card.controls]
+    )
     return np.all((points >= low) & (points <= high), axis=1)

@@ -15,7 +15,7 @@ from posefield.locomotion.gait import Gait, fit_gait
 from posefield.model_file.model_card import PERFORMER
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
 from posefield.question.results import ConstraintResult, Deviation, Trust, split_results
-from posefield.validation import input_limits, question_validation
+from posefield.validation import question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
 NO_DETAIL = "detail: this model's file has none to sample"
@@ -53,7 +53,7 @@ class Synthesizer(NamedModel):
     @cached_property
     def durations(self) -> tuple[float, float]:
         """Shortest and longest plausible duration, s."""
-        return input_limits.duration_range(self.session.card)
+        return question_validation.duration_range(self.session.card)
 
     def question(self, asked: MotionQuestion) -> ValidatedQuestion:
         """Return the validated question; open controls are conditional means.
@@ -87,7 +87,7 @@ class Synthesizer(NamedModel):
         low, high = self.durations
         if not low <= duration <= high:
             raise OutsideSamples(
-                "controls", input_limits.implausible_duration(self.session.card, duration)
+                "controls", question_validation.implausible_duration(self.session.card, duration)
             )
         return duration
 

@@ -1,22 +1,159 @@
-"""Validation of questions for one character: controls, performer, level and policy."""
+"""Validation of questions for one character: controls, labels, performer, level and policy.
 
-from collections.abc import Mapping, Sequence
+The limits of a model's inputs are shared with questions for crowds.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples
+from posefield.common.name_suggestion import did_you_mean, similar_name
 from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield.model_file import answer_bounds
-from posefield.model_file.model_card import Control, ModelCard
+from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
 from posefield.question import value_validation
-from posefield.question.motion_question import ExtrapolationPolicy, LabelValue
+from posefield.question.motion_question import (
+    ExtrapolationPolicy,
+    FileQuestion,
+    LabelValue,
+    PoseQuestion,
+)
 from posefield.question.results import Deviation
-from posefield.validation import input_limits
+from posefield.question.text_decoding import parameters
+from posefield.question.value_validation import check_number
 from posefield.validation.imputation import ControlImputer
-from posefield.validation.label_validation import label_weights
+
+# A clip this many times longer or shorter than any captured one is no plausible motion.
+DURATION_FACTOR = 10.0
+
+
+def check_names(card: ModelCard, names: Iterable[str]) -> None:
+    """Raise InvalidField for the first name that is not a control of the model."""
+    for name in names:
+        if card.control(name) is None:
+            own = [c.name for c in card.controls]
+            hint = did_you_mean(name, own) or _option_hint(name)
+            raise InvalidField(
+                f"controls/{name}", f"no such control{hint}; this model has {', '.join(own)}"
+            )
+
+
+def _option_hint(name: str) -> str:
+    """Return the text about an option that is similar to a name, or "".
+
+    In a query string each name that is no option is taken for a control.
+    """
+    forms = (PoseQuestion, FileQuestion)
+    found = similar_name(name, [word for form in forms for word in parameters(form)])
+    return "" if found is None else f" (did you mean the option {found!r}?)"
+
+
+def accepted_range(control: Control) -> tuple[float, float]:
+    """Return the lowest and the highest accepted value of a control.
+
+    The limits prevent overflow of float32.
+    """
+    room = 100.0 * (control.maximum - control.minimum)
+    return control.minimum - room, control.maximum + room
+
+
+def sampled_range(control: Control) -> tuple[float, float]:
+    """Return the lowest and the highest sampled value of a control.
+
+    A slack of a millionth of the range allows for rounding of values that a client read from the
+    card.
+    """
+    slack = 1e-6 * (control.maximum - control.minimum)
+    return control.minimum - slack, control.maximum + slack
+
+
+def duration_range(card: ModelCard) -> tuple[float, float]:
+    """Return the shortest and the longest plausible duration of a clip, s."""
+    low, high = card.durations
+    return low / DURATION_FACTOR, high * DURATION_FACTOR
+
+
+def implausible_duration(card: ModelCard, duration: float) -> str:
+    """Return the message for controls that lead to an implausible duration, s."""
+    low, high = card.durations
+    return (
+        f"so far outside what was sampled that the clip would last {duration:.3g} s; "
+        f"captured clips last {low:.3g} to {high:.3g} s"
+    )
+
+
+def accepted_names(performers: tuple[str, ...]) -> str:
+    """Return the accepted performers as text for a message."""
+    return f"one of {', '.join(performers)}" if performers else "none: this model knows none"
+
+
+ROUNDING = 1e-6
+"""Excess of a sum of weights over one that is the rounding of clients."""
+
+
+def label_weights(
+    card: ModelCard, performer: str | None, named: Mapping[str, LabelValue]
+) -> Floats:
+    """Return the weights (1, p) of the names of all label sets, for the graph.
+
+    Those of a set are zero if it is left open. performer: short for the name in the label set
+    `performer`. named: name or weights by label set. Raises InvalidField for an unknown set or
+    name, for invalid weights, and for a performer given in both ways.
+    """
+    if performer is not None:
+        if PERFORMER in named:
+            raise InvalidField("performer", f"{performer!r} and labels/performer, expected one")
+        check_name("performer", performer, card.performers)
+    for name in named:
+        _check_set(card, name)
+    short = {} if performer is None else {PERFORMER: performer}
+    asked: Mapping[str, LabelValue] = {**named, **short}
+    rows = [_set_weights(own, asked.get(own.name)) for own in card.labels]
+    return np.array([[weight for row in rows for weight in row]], dtype=np.float64)
+
+
+def check_name(field: str, name: str, known: tuple[str, ...]) -> None:
+    """Raise InvalidField for a name that is not among the known ones of its label set."""
+    if name not in known:
+        expected = f"expected {accepted_names(known)}"
+        raise InvalidField(field, f"{name!r}{did_you_mean(name, known)}, {expected}")
+
+
+def _check_set(card: ModelCard, name: str) -> None:
+    known = tuple(own.name for own in card.labels)
+    if name not in known:
+        found = f"{name!r}{did_you_mean(name, known)}"
+        expected = (
+            f"one of the label sets {', '.join(known)}" if known else "none: this model has none"
+        )
+        raise InvalidField(f"labels/{name}", f"{found}, expected {expected}")
+
+
+def _set_weights(own: LabelSet, asked: LabelValue | None) -> list[float]:
+    """Return the weight of each name of a set; zeros for None."""
+    if asked is None:
+        return [0.0] * len(own.names)
+    field = f"labels/{own.name}"
+    if isinstance(asked, str):
+        check_name(field, asked, own.names)
+        return [float(name == asked) for name in own.names]
+    for name, weight in asked.items():
+        check_name(field, name, own.names)
+        if check_number(f"{field}/{name}", weight) < 0.0:
+            raise InvalidField(f"{field}/{name}", f"{weight:g}, expected a weight of 0 to 1")
+    total = sum(asked.values())
+    if not 0.0 < total <= 1.0 + ROUNDING:
+        raise InvalidField(
+            field,
+            f"weights with a sum of {total:.6g}, expected one above 0 and at most 1; what is left "
+            "to 1 stays open",
+        )
+    return [float(asked.get(name, 0.0)) for name in own.names]
+
 
 DEVIATION_SHARE = 1e-3
 """Share of a control's range by which it may act at another value without a word: a slider that
@@ -53,9 +190,7 @@ class QuestionValidator:
 
     def __init__(self, card: ModelCard) -> None:
         self._card = card
-        self._ranges = [
-            (control.name, *input_limits.sampled_range(control)) for control in card.controls
-        ]
+        self._ranges = [(control.name, *sampled_range(control)) for control in card.controls]
         self._names = {control.name for control in card.controls}
         self._open_labels = label_weights(card, None, {})
         self.support = support.fit_support(np.array(card.examples))
@@ -75,7 +210,7 @@ class QuestionValidator:
         OutsideSamples where `extrapolate` is "refuse" and no similar clips were captured.
         """
         if not controls.keys() <= self._names:
-            input_limits.check_names(self._card, controls)
+            check_names(self._card, controls)
         named = named or {}
         if performer is None and not named:
             own = self._open_labels
@@ -145,7 +280,7 @@ def check_control(control: Control, given: float) -> float:
     """Return the value of a control; InvalidField if it is not a number or out of range."""
     field = f"controls/{control.name}"
     value = value_validation.check_number(field, given)
-    value_validation.check_range(field, value, *input_limits.accepted_range(control), control.unit)
+    value_validation.check_range(field, value, *accepted_range(control), control.unit)
     return value
 
 
@@ -205,7 +340,7 @@ def gap_warning(who: str, variance: float, limit: float) -> str:
 
 
 def _range_warning(control: Control, value: float) -> str | None:
-    low, high = input_limits.sampled_range(control)
+    low, high = sampled_range(control)
     if low <= value <= high:
         return None
     return (

@@ -3,7 +3,7 @@
 import re
 import time
 
-from posefield.console.late_progress import LateProgress
+from posefield.console.output import LateProgress
 from posefield.console.progress import ProgressBar
 from posefield_train.cli.output_files import ProgressPrinter
 

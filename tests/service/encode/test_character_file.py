@@ -7,7 +7,7 @@ import conftest
 import numpy as np
 import pytest
 
-from posefield.encode import character_file
+from posefield.encode import glb
 from posefield.encode.character import character
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 
@@ -45,13 +45,13 @@ def person():
 
 @pytest.fixture(scope="module")
 def content(person):
-    return character_file.character_glb(person, "reach@0123456789abcdef")
+    return glb.character_glb(person, "reach@0123456789abcdef")
 
 
 @pytest.mark.parametrize("name", ["NORMAL", "JOINTS_0", "WEIGHTS_0", "corners"])
 def test_the_body_is_that_of_the_clips(walk, name):
     clip = CLIP_ENCODERS["glb"].encode(walk, METRES)
-    rest = character_file.character_glb(walk.clip.skeleton, "walk@0123456789abcdef")
+    rest = glb.character_glb(walk.clip.skeleton, "walk@0123456789abcdef")
     assert np.array_equal(part(rest, name), part(clip, name))
     assert not np.array_equal(part(rest, "POSITION"), part(rest, "NORMAL"))
 

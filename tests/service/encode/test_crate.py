@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 from pxr import Sdf, Vt
 
-from posefield.encode.usd_layers import (
-    crate_sections,
-    crate_template,
-    layer_content,
-    layer_metadata,
-    prim_specs,
-)
-from posefield.encode.usd_layers.layer_content import LayerContent
-from posefield.encode.usd_layers.prim_specs import ValueTypes
+from posefield.encode.usd_layers import crate_sections, crate_template, layers
+from posefield.encode.usd_layers.layers import LayerContent, ValueTypes
 
 UNIT, MIX = 0.01, 1.0 / 3.0
 
@@ -30,7 +23,7 @@ class Plain:
 
     def head(self, content):
         made = Sdf.Layer.CreateAnonymous("moves.usda")
-        layer_metadata.set_custom_data(made, content.facts)
+        layers.set_custom_data(made, content.facts)
         made.timeCodesPerSecond = self.rate
         made.startTimeCode, made.endTimeCode = 0.0, content.frames - 1.0
         made.pseudoRoot.SetInfo("metersPerUnit", UNIT)
@@ -38,12 +31,12 @@ class Plain:
 
     def layer(self, content):
         made = self.head(content)
-        prim = prim_specs.prim(made, "Anim", "SkelAnimation")
-        prim_specs.varying_attribute(prim, "translations", ValueTypes.Float3Array)
-        prim_specs.varying_attribute(prim, "rotations", ValueTypes.QuatfArray)
+        prim = layers.prim(made, "Anim", "SkelAnimation")
+        layers.varying_attribute(prim, "translations", ValueTypes.Float3Array)
+        layers.varying_attribute(prim, "rotations", ValueTypes.QuatfArray)
         extent = Vt.Vec3fArray.FromNumpy(content.values["extent"])
-        prim_specs.varying_attribute(prim, "extent", ValueTypes.Float3Array, extent)
-        prim_specs.set_time_samples(prim, content.samples)
+        layers.varying_attribute(prim, "extent", ValueTypes.Float3Array, extent)
+        layers.set_time_samples(prim, content.samples)
         return made
 
 
@@ -61,14 +54,14 @@ def changed(made, **samples):
 
 
 def template(author, made):
-    pattern = layer_content.first_frame(made).pattern
+    pattern = layers.first_frame(made).pattern
     return crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
 
 
 def written(author, made):
     """The layer by a template, which there is, as usd-core reads it."""
     assert template(author, made) is not None
-    return layer_metadata.crate_text(crate_template.usdc(author, made))
+    return layers.crate_text(crate_template.usdc(author, made))
 
 
 def built(author, made):
@@ -128,7 +121,7 @@ def test_equal_samples_are_written_once_as_usd_does(repeat):
     author, made = Plain(), repeat(content(2))
     assert written(author, made) == built(author, made)
     ours = [len(crate_template.usdc(author, each)) for each in (made, content(2))]
-    theirs = [len(layer_metadata.crate_bytes(author.layer(each))) for each in (made, content(2))]
+    theirs = [len(layers.crate_bytes(author.layer(each))) for each in (made, content(2))]
     # Not all of the padding before arrays is the same.
     assert abs((ours[1] - ours[0]) - (theirs[1] - theirs[0])) <= 16
     assert ours[0] < ours[1]
@@ -166,5 +159,5 @@ def test_what_cannot_be_verified_is_written_by_usd(author):
     assert template(author, content(1)) is None
     for seed in range(4):
         made = content(seed)
-        expected = layer_metadata.crate_bytes(author.layer(made))
+        expected = layers.crate_bytes(author.layer(made))
         assert crate_template.usdc(author, made) == expected

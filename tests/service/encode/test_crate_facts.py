@@ -11,10 +11,7 @@ import pytest
 from test_crate import Plain, built, content
 from test_facts import GIVEN
 
-from posefield.encode.usd_layers import (
-    crate_template,
-    layer_metadata,
-)
+from posefield.encode.usd_layers import crate_template, layers
 
 
 class Word(StrEnum):
@@ -48,10 +45,10 @@ CASES = [
 @pytest.mark.parametrize("facts", CASES, ids=[next(iter(facts)) for facts in CASES])
 def test_facts_are_read_as_those_that_usd_writes(facts):
     made = replace(content(1), facts=facts)
-    found = layer_metadata.crate_text(crate_template.usdc(Plain(), made))
+    found = layers.crate_text(crate_template.usdc(Plain(), made))
     assert found == built(Plain(), made)
     other = replace(made, facts={**facts, "another": 0.1})
-    assert layer_metadata.crate_text(crate_template.usdc(Plain(), other)) != found
+    assert layers.crate_text(crate_template.usdc(Plain(), other)) != found
 
 
 def test_values_that_are_read_where_they_lie_are_aligned():

@@ -7,7 +7,7 @@ import pytest
 from pxr import Kind, Usd, UsdGeom, UsdSkel
 from usd_checks import defects
 
-from posefield.encode.character import joint_names
+from posefield.encode.character import character
 from posefield.encode.usd_crowd import crowd_writer
 
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
@@ -153,9 +153,7 @@ def animation(prim):
 
 
 def test_animations_are_baked_named_and_of_one_sign(stage, clip, made):
-    paths = joint_names.joint_paths(
-        joint_names.legal_names(clip.skeleton.names), clip.skeleton.parents
-    )
+    paths = character.joint_paths(character.legal_names(clip.skeleton.names), clip.skeleton.parents)
     for prim in characters(stage):
         played = stage.GetPrimAtPath(animation(prim))
         assert tuple(played.GetAttribute("joints").Get()) == paths

@@ -23,7 +23,7 @@ from posefield.encode import usd_crowd
 from posefield.encode.character import character
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_crowd import crowd_writer
-from posefield.encode.usd_layers import layer_metadata
+from posefield.encode.usd_layers import layers
 
 FOLDER = Path(__file__).parent
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
@@ -77,8 +77,8 @@ def test_a_folder_has_a_layer_for_each_motion_and_two_more(clip, tmp_path):
 def test_a_single_layer_needs_no_other(ending, instancing, clip, tmp_path):
     crowd_writer.write(clip, tmp_path / f"one.{ending}", instancing)
     assert list(contents(tmp_path)) == [f"one.{ending}"]
-    layers, assets, missing = UsdUtils.ComputeAllDependencies(str(tmp_path / f"one.{ending}"))
-    assert (len(layers), assets, missing) == (1, [], [])
+    opened, assets, missing = UsdUtils.ComputeAllDependencies(str(tmp_path / f"one.{ending}"))
+    assert (len(opened), assets, missing) == (1, [], [])
 
 
 @pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
@@ -189,7 +189,7 @@ def print_digests():
     layer, copy = Sdf.Layer.CreateAnonymous("x.usdc"), Sdf.Layer.CreateAnonymous("x.usdc")
     prim = character_prims.root(layer, "Character", character.rig(person))
     Sdf.CopySpec(layer, prim.path, copy, prim.path)
-    print("CopySpec", hashlib.sha256(layer_metadata.crate_bytes(copy)).hexdigest())  # noqa: T201
+    print("CopySpec", hashlib.sha256(layers.crate_bytes(copy)).hexdigest())  # noqa: T201
 
 
 @pytest.mark.system

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
 
-from posefield.encode.tables import crowd_tables
+from posefield.encode.tables import motion_tables
 from posefield.encode.usd_crowd import crowd_writer
 
 MOTION, FRAMES = [0, 1, 2, 0], 7
@@ -59,10 +59,10 @@ def test_usd_skel_reads_the_weights_of_every_character(made, ending, instancing,
 
 
 def test_npz_has_the_curves_of_every_character(made, tmp_path):
-    crowd_tables.write_npz(crowd(made), tmp_path / "crowd.npz")
+    motion_tables.write_npz(crowd(made), tmp_path / "crowd.npz")
     with np.load(tmp_path / "crowd.npz") as found:
         assert found["curve_names"].tolist() == list(crowds.CURVES)
         assert np.array_equal(found["curves"], made.curves[MOTION])
-    crowd_tables.write_npz(crowd(replace(made, curves=None)), tmp_path / "crowd.npz")
+    motion_tables.write_npz(crowd(replace(made, curves=None)), tmp_path / "crowd.npz")
     with np.load(tmp_path / "crowd.npz") as found:
         assert not [name for name in found.files if "curve" in name]

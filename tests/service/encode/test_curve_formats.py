@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
 
-from posefield.encode.character import joint_names
-from posefield.encode.files.file_convention import METRES
+from posefield.encode.character import character
+from posefield.encode.conventions import METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd import usd_clip
-from posefield.encode.usd_layers import (
-    layer_metadata,
-)
+from posefield.encode.usd_layers import layers
 from posefield.motion.curves import Curve, CurveValues
 from posefield.question.results import ClipAnswer
 
@@ -68,7 +66,7 @@ def test_the_body_has_a_blend_shape_for_each_curve_that_moves_no_point(face, bod
     assert tuple(skinned.GetBlendShapesAttr().Get()) == NAMES
     assert shapes.GetNumBlendShapes() == len(NAMES)
     targets = [path.name for path in skinned.GetBlendShapeTargetsRel().GetTargets()]
-    assert targets == list(joint_names.legal_names(NAMES))
+    assert targets == list(character.legal_names(NAMES))
     for target in skinned.GetBlendShapeTargetsRel().GetTargets():
         shape = UsdSkel.BlendShape(opened.GetPrimAtPath(target))
         assert np.all(np.array(shape.GetOffsetsAttr().Get()) == 0.0)
@@ -101,7 +99,7 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
         expected = author.layer(content).ExportToString().encode()
         assert usd_clip.usda([made], METRES) == [expected]
         (binary,) = usd_clip.usdc([made], METRES)
-        assert layer_metadata.crate_text(binary).encode() == expected
+        assert layers.crate_text(binary).encode() == expected
 
 
 def gltf(content):

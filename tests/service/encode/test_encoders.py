@@ -5,8 +5,8 @@ import numpy as np
 import orjson
 import pytest
 
-from posefield.encode.files import file_convention
-from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
+from posefield.encode import conventions
+from posefield.encode.conventions import CENTIMETRES, METRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import skeleton
 from posefield_train.source import bvh
@@ -93,7 +93,7 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
     ],
 )
 def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):
-    assert file_convention.requested_convention(unit, up, None, usual) == meant
+    assert conventions.requested_convention(unit, up, None, usual) == meant
 
 
 @pytest.mark.parametrize("extension", CLIP_ENCODERS)

@@ -12,8 +12,8 @@ from serving import children
 
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
-from posefield.encode.usd_crowd import STREAMS, crowd_writer, encoding_process
-from posefield.encode.usd_crowd.encoding_process import EncoderDied
+from posefield.encode.usd_crowd import STREAMS, crowd_writer
+from posefield.encode.usd_crowd.crowd_writer import EncoderDied
 
 pytestmark = pytest.mark.system
 
@@ -42,7 +42,7 @@ def folder(monkeypatch, tmp_path):
 @pytest.mark.parametrize("instancing", ["references", "flatten"])
 @pytest.mark.parametrize("ending", STREAMS)
 def test_its_bytes_are_those_of_this_process(crowd, made, ending, instancing):
-    apart = b"".join(encoding_process.stream(crowd, ending, instancing))
+    apart = b"".join(crowd_writer.stream_from_child(crowd, ending, instancing))
     again = replace(crowd, batches=crowds.cut(made, 3))
     assert apart == b"".join(crowd_writer.encode_here(again, ending, instancing))
 
@@ -53,12 +53,12 @@ def test_a_fault_of_the_motions_is_raised_here(crowd):
         raise RuntimeError("broken")
 
     with pytest.raises(RuntimeError, match="broken"):
-        list(encoding_process.stream(replace(crowd, batches=broken()), "usdc", "references"))
+        list(crowd_writer.stream_from_child(replace(crowd, batches=broken()), "usdc", "references"))
 
 
 def test_a_process_that_ends_early_is_a_fault(crowd):
     with pytest.raises(EncoderDied, match="it ended with 1"):
-        list(encoding_process.stream(replace(crowd, rate="none"), "usdc", "references"))
+        list(crowd_writer.stream_from_child(replace(crowd, rate="none"), "usdc", "references"))
 
 
 class Third(Cancellation):
@@ -78,7 +78,7 @@ class Third(Cancellation):
 def test_a_cancelled_crowd_ends_its_process(crowd):
     own, context = Third(), copy_context()
     context.run(cancellation.current.set, own)
-    pieces = encoding_process.stream(crowd, "usdc", "references")
+    pieces = crowd_writer.stream_from_child(crowd, "usdc", "references")
     with pytest.raises(Cancelled):
         context.run(next, pieces)
     assert own.checks == 3

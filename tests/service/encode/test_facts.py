@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from posefield.encode.usd_layers import layer_metadata
+from posefield.encode.usd_layers import layers
 
 GIVEN = {
     "model": "walk@1",
@@ -38,7 +38,7 @@ READ = {
 @pytest.mark.parametrize("ending", ["usda", "usdc"])
 def test_facts_are_read_back(ending, tmp_path):
     made = Sdf.Layer.CreateNew(str(tmp_path / f"facts.{ending}"))
-    made.customLayerData = {"posefield": layer_metadata.usd_dictionary(GIVEN)}
+    made.customLayerData = {"posefield": layers.usd_dictionary(GIVEN)}
     made.Save()
     copy = tmp_path / f"copy.{ending}"
     copy.write_bytes((tmp_path / f"facts.{ending}").read_bytes())

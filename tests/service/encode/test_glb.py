@@ -5,7 +5,7 @@ import pytest
 from pygltflib import GLTF2
 
 from posefield.common.errors import InvalidField
-from posefield.encode.files.file_convention import CENTIMETRES, Convention
+from posefield.encode.conventions import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip

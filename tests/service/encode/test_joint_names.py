@@ -1,16 +1,16 @@
 from itertools import product
 
-from posefield.encode.character import joint_names
+from posefield.encode.character import character
 
 
 def test_illegal_characters_become_underscores():
     given = ["mixamorig:Hips", "Bip001-Pelvis", "Left Leg", "1Head", "", "左"]
     expected = ("mixamorig_Hips", "Bip001_Pelvis", "Left_Leg", "_1Head", "_", "__2")
-    assert joint_names.legal_names(given) == expected
+    assert character.legal_names(given) == expected
 
 
 def test_names_that_meet_are_numbered_and_the_legal_one_keeps_its_own():
-    assert joint_names.legal_names(["a b", "a-b", "a_b", "a_b_2"]) == (
+    assert character.legal_names(["a b", "a-b", "a_b", "a_b_2"]) == (
         "a_b_3",
         "a_b_4",
         "a_b",
@@ -20,14 +20,14 @@ def test_names_that_meet_are_numbered_and_the_legal_one_keeps_its_own():
 
 def test_any_names_become_legal_and_unique():
     given = ["".join(letters) for letters in product("a_1 :é", repeat=3)] + [""]
-    found = joint_names.legal_names(given)
+    found = character.legal_names(given)
     assert len(set(found)) == len(given)
-    assert all(joint_names.LEGAL_NAME.fullmatch(name) for name in found)
-    assert joint_names.legal_names(given) == found
+    assert all(character.LEGAL_NAME.fullmatch(name) for name in found)
+    assert character.legal_names(given) == found
 
 
 def test_a_path_holds_every_ancestor():
-    assert joint_names.joint_paths(["a", "b", "c", "d"], [-1, 0, 1, 0]) == (
+    assert character.joint_paths(["a", "b", "c", "d"], [-1, 0, 1, 0]) == (
         "a",
         "a/b",
         "a/b/c",

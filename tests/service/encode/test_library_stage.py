@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import CENTIMETRES, METRES
-from posefield.encode.usd import clip_arrays, usd_animation, usd_library
-from posefield.encode.usd_layers import layer_metadata
+from posefield.encode.usd import usd_clip, usd_library
+from posefield.encode.usd_layers import layers
 from posefield.question.results import ClipAnswer
 
 INCHES = Convention(0.0254, "z")
@@ -30,8 +30,8 @@ def answers(walk):
 
 def build(folder, answers, convention=METRES, rate=30.0):
     entries = []
-    layers = usd_animation.usdc(answers, convention)
-    for name, answer, layer in zip(NAMES, answers, layers, strict=False):
+    files = usd_clip.animation_usdc(answers, convention)
+    for name, answer, layer in zip(NAMES, answers, files, strict=False):
         file = f"clips/00@/{name}.usdc"
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_bytes(layer)
@@ -98,12 +98,12 @@ def skinned(stage, code):
 def test_layers_are_as_usd_writes_them(answers, convention):
     many = [answers[index] for index in (0, 1, 0, 2, 1)]
     expected = [
-        usd_animation.AnimationLayerBuilder(take.rate, convention, take.rig.paths)
+        usd_clip.AnimationLayerBuilder(take.rate, convention, take.rig.paths)
         .layer(take.content)
         .ExportToString()
-        for take in clip_arrays.arrays_without_character(many, convention)
+        for take in usd_clip.arrays_without_character(many, convention)
     ]
-    found = usd_animation.usdc(many, convention)
-    assert [layer_metadata.crate_text(each) for each in found] == expected
-    assert usd_animation.usdc(many[1:2], convention) == found[1:2]
+    found = usd_clip.animation_usdc(many, convention)
+    assert [layers.crate_text(each) for each in found] == expected
+    assert usd_clip.animation_usdc(many[1:2], convention) == found[1:2]
     assert len(set(expected)) == 3

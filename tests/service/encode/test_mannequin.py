@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from posefield.encode.body import skinned_mesh
-from posefield.encode.body.bone_boxes import bones_body
 from posefield.encode.body.mannequin import mannequin
+from posefield.encode.body.skinned_mesh import bones_body
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.inference import session
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton, forward_kinematics
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 
 LARGEST_BODY = 60_000
 """Bytes by which a body may enlarge a binary file."""
@@ -33,7 +33,7 @@ def star(seed):
 
 
 def shipped(name):
-    return session.load(shipped_models.FOLDER / f"{name}.onnx").card.skeleton
+    return session.load(model_registry.SHIPPED_FOLDER / f"{name}.onnx").card.skeleton
 
 
 def a_pose():

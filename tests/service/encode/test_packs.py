@@ -8,8 +8,8 @@ import zipfile
 
 import pytest
 
+from posefield.encode import archives
 from posefield.encode.archives import ARCHIVE_WRITERS
-from posefield.encode.files import zip_archive
 
 CONTENTS = {
     "clip-000000.usdc": b"first" * 1000,
@@ -101,10 +101,10 @@ def test_a_zip_may_have_more_files_than_sixteen_bits_count(count):
 def test_a_zip_may_be_larger_than_thirty_two_bits_count(tmp_path):
     path, gap = tmp_path / "large.zip", 2200 * 1024 * 1024
     # Gaps in the file stand for two members of 2.2 GiB, whose checksums nobody looks at here.
-    holes = [zip_archive.ZipMember(f"hole{i}", gap, 0, (None,)) for i in range(2)]
-    members = [zip_archive.whole("first", b"start"), *holes, zip_archive.whole("last", b"beyond")]
+    holes = [archives.ZipMember(f"hole{i}", gap, 0, (None,)) for i in range(2)]
+    members = [archives.whole("first", b"start"), *holes, archives.whole("last", b"beyond")]
     with path.open("wb") as out:
-        for piece in zip_archive.zip_chunks(members):
+        for piece in archives.zip_chunks(members):
             out.seek(gap, 1) if piece is None else out.write(piece)
     with zipfile.ZipFile(path) as found:
         assert [e.header_offset > 2**32 for e in found.infolist()] == [False, False, False, True]

@@ -9,7 +9,7 @@ from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips, crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.crowd_question import CrowdQuestion
+from posefield.validation.crowd_validation import CrowdQuestion
 
 SHARES = np.linspace(0.03, 0.97, 7)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
-from posefield.encode.character import joint_names
+from posefield.encode.character import character
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -101,7 +101,7 @@ def test_prims_are_bound_to_each_other(stage):
 def test_joints_have_legal_unique_leaf_names_and_keep_their_own(stage, walk):
     joints = value(stage, "/Skel.joints")
     leaves = [joint.rpartition("/")[2] for joint in joints]
-    assert tuple(leaves) == joint_names.legal_names(walk.clip.skeleton.names)
+    assert tuple(leaves) == character.legal_names(walk.clip.skeleton.names)
     assert tuple(value(stage, "/Skel.jointNames")) == walk.clip.skeleton.names
     assert list(value(stage, "/Anim.joints")) == list(joints)
 

@@ -7,14 +7,10 @@ import conftest
 import numpy as np
 import pytest
 
-from posefield.encode.files.file_convention import CENTIMETRES, Convention
+from posefield.encode.conventions import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.encode.usd import usd_clip
-from posefield.encode.usd_layers import (
-    crate_template,
-    layer_content,
-    layer_metadata,
-)
+from posefield.encode.usd_layers import crate_template, layers
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
@@ -61,10 +57,10 @@ def written(given, convention=METRES, write=usd_clip.usdc):
 def both(given, convention=METRES):
     """Return whether both forms hold what usd-core's layers do, the binary one by a template."""
     author, content = next(usd_clip.builders_and_contents(given, convention))
-    pattern = layer_content.first_frame(content).pattern
+    pattern = layers.first_frame(content).pattern
     assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
     texts = ordinary(given, convention)
-    read = [layer_metadata.crate_text(each) for each in written(given, convention)]
+    read = [layers.crate_text(each) for each in written(given, convention)]
     return (
         read == texts
         and [each.decode() for each in written(given, convention, usd_clip.usda)] == texts

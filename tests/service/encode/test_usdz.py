@@ -4,7 +4,7 @@ import zipfile
 
 import pytest
 
-from posefield.encode.files import zip_archive
+from posefield.encode import archives
 from posefield.encode.formats import CLIP_ENCODERS
 
 
@@ -24,7 +24,7 @@ def test_the_archive_holds_the_binary_layer_alone(archive, walk):
 
 def test_data_are_aligned_after_a_name_of_any_length():
     for length in range(1, 65):
-        data = b"".join(zip_archive.zip_chunks([zip_archive.whole("n" * length, b"data")]))
+        data = b"".join(archives.zip_chunks([archives.whole("n" * length, b"data")]))
         start = data.index(b"data")
         # A local header has 30 bytes, then come the name and the padding, an extra field.
         padding = data[30 + length : start]
@@ -36,10 +36,8 @@ def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):
     contents = {"root.usdc": b"r" * 1000, "folder/a.usdc": b"", "folder/long name.usdc": b"z" * 65}
     lying = tmp_path / "lying"
     lying.write_bytes(b"on disk" * 300_000)
-    members = [zip_archive.whole(name, data) for name, data in contents.items()]
-    data = b"".join(
-        zip_archive.zip_chunks([*members, zip_archive.member_of_file("last.usdc", lying)])
-    )
+    members = [archives.whole(name, data) for name, data in contents.items()]
+    data = b"".join(archives.zip_chunks([*members, archives.member_of_file("last.usdc", lying)]))
     with zipfile.ZipFile(io.BytesIO(data)) as found:
         assert found.testzip() is None
         assert found.namelist() == [*contents, "last.usdc"]

@@ -42,9 +42,9 @@ def table(controls, tmp_path):
 @pytest.fixture
 def export(posefield, table):
     """Function that exports the table; gives exit code, output and errors."""
-    from posefield.registry import shipped_models
+    from posefield.registry import model_registry
 
-    model = shipped_models.FOLDER / "cmu_walk.onnx"
+    model = model_registry.SHIPPED_FOLDER / "cmu_walk.onnx"
 
     def run(*words, workers=1, rows=table):
         return posefield(
@@ -56,7 +56,7 @@ def export(posefield, table):
 
 
 def test_each_file_is_that_of_a_single_clip(export, posefield, controls, rigs, tmp_path):
-    from posefield.registry import shipped_models
+    from posefield.registry import model_registry
 
     whom = ("--character", rigs / "hero.usdc")
     code, _, err = export("-o", tmp_path / "made", *whom)
@@ -65,7 +65,7 @@ def test_each_file_is_that_of_a_single_clip(export, posefield, controls, rigs, t
     single.mkdir(parents=True)
     for own, form in zip(controls, ("usda", "glb", "json"), strict=True):
         asked = [word for name, value in own.items() for word in ("-c", f"{name}={value!r}")]
-        words = (shipped_models.FOLDER / "cmu_walk.onnx", *asked, "--fps", "15", *whom)
+        words = (model_registry.SHIPPED_FOLDER / "cmu_walk.onnx", *asked, "--fps", "15", *whom)
         assert posefield("clip", *words, "-o", single / f"{form}.{form}")[0] == 0
     made = tmp_path / "made" / "clips" / "000"
     assert exporting.content(made) == exporting.content(single)

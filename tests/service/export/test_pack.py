@@ -9,7 +9,7 @@ import pytest
 from posefield.batch import clip_archive
 from posefield.batch.clip_archive import CLIPS, POSES, ArchiveOrder
 from posefield.batch.rows import ClipQuery
-from posefield.encode.files.file_convention import METRES
+from posefield.encode.conventions import METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from families import sample_walk
 
-from posefield.model_file.captured_acceleration import mean_accelerations
+from posefield.model_file.model_card import mean_accelerations
 from posefield.motion import measures
 from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train.source.measured_controls import travel

@@ -8,7 +8,7 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.model_file.captured_acceleration import CapturedAcceleration
+from posefield.model_file.model_card import CapturedAcceleration
 from posefield.motion.clip import Clip
 from posefield.performance import composition
 from posefield.performance.script import resolve_script

@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 import random_scripts  # noqa: E402
 
 from posefield.encode.formats import CLIP_ENCODERS  # noqa: E402
-from posefield.registry import model_registry, shipped_models  # noqa: E402
+from posefield.registry import model_registry  # noqa: E402
 
 COUNTS = {"stroll": 48, "cmu_walk": 12}
 
@@ -29,7 +29,7 @@ def cast_of(path):
 @pytest.fixture(scope="module")
 def casts(walk_path):
     """Models that scripts are drawn from: the procedural walk, and the shipped captured one."""
-    shipped = shipped_models.FOLDER / "cmu_walk.onnx"
+    shipped = model_registry.SHIPPED_FOLDER / "cmu_walk.onnx"
     return {"stroll": cast_of(walk_path), "cmu_walk": cast_of(shipped)}
 
 

@@ -12,7 +12,7 @@ from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
 from posefield.question.motion_question import MotionQuestion
 from posefield.question.performance_question import PerformanceQuestion
-from posefield.registry import model_registry, shipped_models
+from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 
 EXACT, STILL = 1e-3, 1e-5
@@ -27,7 +27,7 @@ def find(models):
     own = reach.session.card.event
     library["free"] = acting.with_card(reach, event=None)
     library["early"] = acting.with_card(reach, event=Event(own.joint, 0.5))
-    library["cmu_walk"] = model_registry.load([shipped_models.FOLDER]).find("cmu_walk")
+    library["cmu_walk"] = model_registry.load([model_registry.SHIPPED_FOLDER]).find("cmu_walk")
     return ModelRegistry(library).find
 
 

@@ -3,15 +3,15 @@
 import pytest
 import rig_files
 
-from posefield.console.arguments import open_model
+from posefield.console.options import open_model
 from posefield.question.motion_question import ClipQuestion
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.synthesis import clips
 
 
 @pytest.fixture(scope="session")
 def walk_model():
-    return open_model(shipped_models.FOLDER / "cmu_walk.onnx")
+    return open_model(model_registry.SHIPPED_FOLDER / "cmu_walk.onnx")
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from posefield.common.errors import QueryError
 from posefield.inference import session
 from posefield.question.floor import Floor
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.synthesis import clip_batch, clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -24,7 +24,7 @@ KINDS = ("shipped", "labelled_path", "walk_path")
 def pair(request):
     """Two models of one file: one answers batches, the other single questions."""
     shipped = request.param == "shipped"
-    file = shipped_models.FOLDER / "cmu_walk.onnx"
+    file = model_registry.SHIPPED_FOLDER / "cmu_walk.onnx"
     path = file if shipped else request.getfixturevalue(request.param)
     opened = session.load(path)
     return Synthesizer(path.stem, opened), Synthesizer(path.stem, opened)

@@ -10,8 +10,8 @@ from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd_crowd import crowd_writer
+from posefield.http import clip_operations, crowd_operations
 from posefield.http.api.settings import Settings
-from posefield.http.decoding import clips_query, crowd_query
 from posefield.locomotion import crowd_order, gait
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.question import json_decoding as bodies
@@ -77,7 +77,9 @@ def suggested(model, walk):
 def archived(model, walk):
     """An archive of clips."""
     asked = {"format": "usdc", "clips": [{"controls": controls(model)}] * 20}
-    found = clips_query.decode_order(model, CLIP_ENCODERS, json.dumps(asked).encode(), Settings())
+    found = clip_operations.decode_order(
+        model, CLIP_ENCODERS, json.dumps(asked).encode(), Settings()
+    )
     return list(clip_archive.archive_members(found))
 
 
@@ -85,7 +87,7 @@ def crowded(model, walk):
     """Poses of a crowd."""
     asked = {"controls": controls(model), "time": [0.1] * 20_000}
     return crowd_synthesis.synthesize_crowd(
-        model, crowd_query.of_body(json.dumps(asked).encode(), 1e6)
+        model, crowd_operations.of_body(json.dumps(asked).encode(), 1e6)
     )
 
 

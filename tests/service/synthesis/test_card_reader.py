@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from model_cards import CARD
 
-from posefield.model_file import card_reader, model_card, onnx_check
+from posefield.model_file import checked_file, model_card, onnx_file
 from posefield.model_file.model_card import Preset, TrainingParameters
 
 WRITTEN = {key: text.encode() for key, text in model_card.dump(CARD).items()}
@@ -30,12 +30,12 @@ def changed(path, value):
 
 def refusal(entries):
     with pytest.raises(ValueError) as caught:
-        card_reader.decode(entries)
+        checked_file.decode_card(entries)
     return str(caught.value)
 
 
 def test_a_card_read_is_the_card_written():
-    read = card_reader.decode(WRITTEN)
+    read = checked_file.decode_card(WRITTEN)
     assert {key: text.encode() for key, text in model_card.dump(read).items()} == WRITTEN
     # To the last bit: weights are computed with them.
     assert read.kriging.scales.tolist() == CARD.kriging.scales.tolist()
@@ -46,9 +46,9 @@ def test_a_card_read_is_the_card_written():
     "model", ["model_path", "labelled_path", "walk_path", "measured_walk_path"]
 )
 def test_what_training_writes_is_read_without_loss(model, request):
-    entries = onnx_check.check(request.getfixturevalue(model).read_bytes()).metadata
+    entries = onnx_file.check(request.getfixturevalue(model).read_bytes()).metadata
     own = {key: text for key, text in entries.items() if key.startswith(model_card.PREFIX)}
-    read = model_card.dump(card_reader.decode(entries))
+    read = model_card.dump(checked_file.decode_card(entries))
     assert {key: text.encode() for key, text in read.items()} == own
 
 
@@ -85,7 +85,7 @@ def test_another_format_is_refused_before_anything_else_is_read(found):
 
 def test_entries_of_other_producers_are_ignored():
     others = {"author": b"not JSON", "x.posefield.note": b"free text"}
-    assert card_reader.decode(WRITTEN | others).name == "reaching"
+    assert checked_file.decode_card(WRITTEN | others).name == "reaching"
 
 
 @pytest.mark.parametrize("text", [b"free text", b"", b'"\xff"', b"NaN"])
@@ -105,7 +105,7 @@ def test_deep_nesting_is_refused(name, inner):
 
 
 def test_a_card_of_too_many_bytes_is_refused():
-    text = json.dumps("x" * card_reader.MAX_BYTES).encode()
+    text = json.dumps("x" * checked_file.MAX_CARD_BYTES).encode()
     assert "bytes, expected at most" in refusal(WRITTEN | {"posefield.description": text})
 
 
@@ -123,7 +123,7 @@ def entries(presets):
 
 
 def test_presets_are_read_as_they_were_written():
-    read = card_reader.decode(entries(PRESETS))
+    read = checked_file.decode_card(entries(PRESETS))
     assert read.presets == PRESETS
     assert entries(read.presets) == entries(PRESETS)
     assert model_card.plain_values(read)["presets"] == (
@@ -152,7 +152,7 @@ def test_presets_are_read_as_they_were_written():
 )
 def test_a_wrong_preset_is_refused(preset, said):
     with pytest.raises(ValueError, match=re.escape(said)):
-        card_reader.decode(entries((PRESETS[0], preset)))
+        checked_file.decode_card(entries((PRESETS[0], preset)))
 
 
 def test_making_is_in_the_file_and_not_sent_to_clients():

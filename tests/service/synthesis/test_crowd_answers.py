@@ -9,7 +9,7 @@ import pytest
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import UP
-from posefield.http.decoding import crowd_query
+from posefield.http import crowd_operations
 from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.motion import quat, skeleton
 from posefield.motion.crowd_clip import Placement
@@ -18,7 +18,7 @@ from posefield.registry import model_registry
 from posefield.synthesis import crowd_synthesis, poses
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import crowd_validation
-from posefield.validation.crowd_question import Blending, CrowdQuestion
+from posefield.validation.crowd_validation import Blending, CrowdQuestion
 
 COUNT = 60
 # The graph answers in float32, and sums a batch in another order than one row; m.
@@ -263,7 +263,7 @@ def taken_question(model, count=FEW, **asked):
     """A crowd of equal characters in the middle of what was sampled."""
     controls = {c.name: [c.default] * count for c in model.session.card.controls}
     body = {"controls": controls, "time": TIME, **asked}
-    return crowd_query.of_body(json.dumps(body).encode(), 1e5)
+    return crowd_operations.of_body(json.dumps(body).encode(), 1e5)
 
 
 def crowd(model, **asked):

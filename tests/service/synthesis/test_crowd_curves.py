@@ -12,7 +12,7 @@ from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import crowd_synthesis, poses
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.crowd_question import Blending, CrowdQuestion
+from posefield.validation.crowd_validation import Blending, CrowdQuestion
 
 COUNT, SECONDS, RATE = 30, 3.0, 30.0
 # The graph answers in float32, and sums a batch in another order than one row.

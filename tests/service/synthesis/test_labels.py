@@ -9,7 +9,7 @@ from asking import asker
 from posefield.common.errors import InvalidField
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.model_file import card_reader, model_card
+from posefield.model_file import checked_file, model_card
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry
@@ -38,7 +38,7 @@ def test_the_card_has_both_sets_in_the_file_and_for_clients(model):
         ("style", ("marching", "plain", "sneaking")),
     ]
     entries = {key: text.encode() for key, text in model_card.dump(card).items()}
-    assert card_reader.decode(entries).labels == card.labels
+    assert checked_file.decode_card(entries).labels == card.labels
     told = model_card.plain_values(card)
     assert told["performers"] == ["ann", "ben"]
     assert [own["name"] for own in told["labels"]] == ["performer", "style"]

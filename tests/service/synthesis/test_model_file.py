@@ -7,7 +7,7 @@ import pytest
 from model_files import numbered, written
 
 from posefield.common.errors import ModelError
-from posefield.model_file import checked_file, checksum
+from posefield.model_file import checked_file
 
 DAMAGED = 500
 
@@ -73,7 +73,7 @@ def test_a_file_that_another_program_has_changed_is_refused(content):
 @pytest.mark.parametrize("found", [b"", b"no model", bytes(range(256)) * 8, b"\0" * 4096])
 def test_something_else_is_refused(found):
     assert refusal(found) == checked_file.NO_CHECKSUM
-    assert refusal(checksum.append_checksum(found)) != checked_file.NO_CHECKSUM
+    assert refusal(checked_file.append_checksum(found)) != checked_file.NO_CHECKSUM
 
 
 @pytest.mark.parametrize(

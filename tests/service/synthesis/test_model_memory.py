@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from posefield.inference import session
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 
 USE = """
 import gc
@@ -53,7 +53,7 @@ print((resident() - before) / 4)
 
 @pytest.mark.parametrize("name", ["reaching", "cmu_walk"])
 def test_models_take_about_the_memory_that_is_estimated(name):
-    file = shipped_models.FOLDER / f"{name}.onnx"
+    file = model_registry.SHIPPED_FOLDER / f"{name}.onnx"
     done = subprocess.run(
         [sys.executable, "-c", USE, file], capture_output=True, text=True, check=True
     )

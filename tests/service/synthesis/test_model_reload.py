@@ -13,8 +13,7 @@ from model_files import numbered
 from posefield.common.errors import ModelError, UnknownModel
 from posefield.inference.trial_process import TrialLimits
 from posefield.model_file import checked_file
-from posefield.registry.model_registry import VersionLimits
-from posefield.registry.model_reload import ReloadingRegistry
+from posefield.registry.model_registry import ReloadingRegistry, VersionLimits
 
 ROOM = VersionLimits()
 

@@ -7,8 +7,7 @@ from model_files import numbered
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file
 from posefield.registry import model_registry
-from posefield.registry.model_registry import VersionLimits
-from posefield.registry.model_reload import ReloadingRegistry
+from posefield.registry.model_registry import ReloadingRegistry, VersionLimits
 from posefield.registry.object_store import connect
 
 pytestmark = pytest.mark.usefixtures("store_environment")

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.common.errors import ModelError
-from posefield.model_file import checked_file, onnx_check, protobuf_wire
+from posefield.model_file import checked_file, onnx_file
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
@@ -25,7 +25,7 @@ def model(model_path):
 def refusal(model):
     content = model if isinstance(model, bytes) else model.SerializeToString()
     with pytest.raises(ValueError) as caught:
-        onnx_check.check(content)
+        onnx_file.check(content)
     return str(caught.value)
 
 
@@ -64,17 +64,17 @@ def merged(one, other):
 
 
 def test_operators_are_those_that_the_exporter_writes_and_no_others(written):
-    assert {node.op_type for model in written for node in model.graph.node} == onnx_check.OPERATORS
+    assert {node.op_type for model in written for node in model.graph.node} == onnx_file.OPERATORS
 
 
 def test_fields_are_those_that_the_exporter_writes_and_no_others(written):
-    assert functools.reduce(merged, map(used, written)) == onnx_check.MODEL
+    assert functools.reduce(merged, map(used, written)) == onnx_file.MODEL
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_what_is_found_is_what_onnx_finds(name, request):
     content = request.getfixturevalue(name).read_bytes()
-    model, found = onnx.load_from_string(content), onnx_check.check(content)
+    model, found = onnx.load_from_string(content), onnx_file.check(content)
     metadata = {entry.key: entry.value.encode() for entry in model.metadata_props}
     assert found.metadata == metadata
     assert found.shapes == {t.name: tuple(t.dims) for t in model.graph.initializer}
@@ -132,7 +132,7 @@ def test_a_key_that_stands_twice_is_refused(model):
 @given(st.lists(st.integers(0, 2**63 - 1)), st.text(), st.integers(0, 2**31 - 1))
 def test_what_google_writes_is_read(axes, name, kind):
     tensor = onnx.TensorProto(dims=axes, name=name, data_type=kind)
-    found = list(protobuf_wire.fields(tensor.SerializeToString()))
+    found = list(onnx_file.wire_fields(tensor.SerializeToString()))
     assert [field.value for field in found if field.number == 1] == axes
     assert [field.value for field in found if field.number == 2] == [kind]
     assert [field.content.decode() for field in found if field.number == 8] == [name]
@@ -142,9 +142,9 @@ def test_what_google_writes_is_read(axes, name, kind):
 @given(st.integers(0, 2**31 - 1), st.binary(max_size=300), st.text())
 def test_google_reads_what_is_written(kind, numbers, name):
     content = (
-        protobuf_wire.encode_varint(2, kind)
-        + protobuf_wire.encode_bytes(9, numbers)
-        + protobuf_wire.encode_bytes(8, name.encode())
+        onnx_file.encode_varint(2, kind)
+        + onnx_file.encode_bytes(9, numbers)
+        + onnx_file.encode_bytes(8, name.encode())
     )
     tensor = onnx.TensorProto.FromString(content)
     assert (tensor.data_type, tensor.raw_data, tensor.name) == (kind, numbers, name)
@@ -153,7 +153,7 @@ def test_google_reads_what_is_written(kind, numbers, name):
 @given(st.binary(max_size=200))
 def test_any_bytes_are_fields_or_refused(content):
     try:
-        found = list(protobuf_wire.fields(content))
+        found = list(onnx_file.wire_fields(content))
     except ValueError:
         return
     assert b"".join(field.encoded for field in found) == content
@@ -172,4 +172,4 @@ def test_any_bytes_are_fields_or_refused(content):
 )
 def test_a_message_that_is_cut_or_none_is_refused(content, said):
     with pytest.raises(ValueError, match=said):
-        list(protobuf_wire.fields(content))
+        list(onnx_file.wire_fields(content))

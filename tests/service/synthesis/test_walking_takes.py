@@ -18,18 +18,18 @@ from posefield.locomotion import (
 )
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion import skeleton
-from posefield.registry import shipped_models
+from posefield.registry import model_registry
 from posefield.synthesis import crowd_takes, walking_feet, walking_takes
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.synthesis.walking_takes import WalkerTakes
-from posefield.validation.crowd_question import CharacterTakes
+from posefield.validation.crowd_validation import CharacterTakes
 
 FRAMES, RATE = 40, 30.0
 
 
 @pytest.fixture(scope="module")
 def model():
-    path = shipped_models.FOLDER / "cmu_walk.onnx"
+    path = model_registry.SHIPPED_FOLDER / "cmu_walk.onnx"
     return Synthesizer("cmu_walk", session.load(path))
 
 

@@ -7,13 +7,13 @@ import pytest
 import recorded
 
 from posefield.common.errors import InvalidField
-from posefield.http.concurrency.pose_batching import MAX_BATCH, PoseBatcher
+from posefield.http.batching import MAX_POSES, PoseBatcher
 from posefield.inference import session
 from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import poses
 from posefield.synthesis.synthesizer import Synthesizer
 
-HASTE = [3.0 + number / (2 * MAX_BATCH + 7) for number in range(2 * MAX_BATCH + 7)]
+HASTE = [3.0 + number / (2 * MAX_POSES + 7) for number in range(2 * MAX_POSES + 7)]
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_one_call_answers_all_of_a_turn(model):
     asked = [question(own, haste) for haste in HASTE]
     feeds.clear()
     together(own, asked)
-    assert rows(feeds) == [2, 2, MAX_BATCH, MAX_BATCH, 7]
+    assert rows(feeds) == [2, 2, MAX_POSES, MAX_POSES, 7]
 
 
 def test_each_gets_the_bytes_that_it_gets_alone(model):

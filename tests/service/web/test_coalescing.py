@@ -7,7 +7,7 @@ import pytest
 import uvloop
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from posefield.http.middleware.coalescing import MAX_BUFFER, CoalescingProtocol, CoalescingTransport
+from posefield.http.server import MAX_BUFFER, CoalescingProtocol, CoalescingTransport
 
 
 class Recorder(asyncio.Transport):

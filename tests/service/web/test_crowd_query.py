@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from model_cards import CARD
 
 from posefield.common.errors import FormError, InvalidField
-from posefield.http.decoding import crowd_query
+from posefield.http import crowd_operations
 from posefield.inference.level_selection import LevelCriteria
 from posefield.model_file.model_card import LabelSet
-from posefield.validation import crowd_question
+from posefield.validation import crowd_validation
 
 CAMERA = {"position": [0, 1.7, -5], "fov": 1.0, "height": 1080}
 WHOLE = {
@@ -32,7 +32,7 @@ FOUND = (FormError, InvalidField)
 
 
 def asked(most=100, **body):
-    return crowd_query.of_body(json.dumps(body).encode(), most)
+    return crowd_operations.of_body(json.dumps(body).encode(), most)
 
 
 def changed(**body):
@@ -107,7 +107,7 @@ def test_what_breaks_the_form_is_pointed_at(body, where):
 )
 def test_a_number_too_large_to_be_finite_is_pointed_at(number, body, where):
     with pytest.raises(FormError) as caught:
-        crowd_query.of_body((body % number).encode(), 100)
+        crowd_operations.of_body((body % number).encode(), 100)
     assert f"/{caught.value.field}" == (where or "/")
 
 
@@ -139,11 +139,11 @@ def card(names):
 def test_labels_of_several_sets_are_columns_in_the_order_of_the_card():
     given = {"style": ["tired", {"calm": 0.75, "tired": 0.25}, None, "tired"]}
     found = asked(**changed(controls={}, performer=["bo", None, "ada", "bo"], labels=given))
-    rows = crowd_question.labels(found, card(("ada", "bo")))
+    rows = crowd_validation.labels(found, card(("ada", "bo")))
     assert rows[:, :2].tolist() == [[0, 1], [0, 0], [1, 0], [0, 1]]
     assert rows[:, 2:].tolist() == [[0, 1], [0.75, 0.25], [0, 0], [0, 1]]
     same = asked(**changed(controls={}, time=[0] * 3, labels={"style": "calm"}))
-    assert crowd_question.labels(same, card(("ada", "bo")))[:, 2:].tolist() == [[1, 0]] * 3
+    assert crowd_validation.labels(same, card(("ada", "bo")))[:, 2:].tolist() == [[1, 0]] * 3
 
 
 @pytest.mark.parametrize(
@@ -162,21 +162,21 @@ def test_labels_of_several_sets_are_columns_in_the_order_of_the_card():
 def test_labels_that_no_model_has_are_refused_with_the_first_character(labels, said):
     with pytest.raises(InvalidField, match=re.escape(said)):
         question = asked(**changed(controls={}, time=[0, 0], performer="bo", labels=labels))
-        crowd_question.labels(question, card(("ada", "bo")))
+        crowd_validation.labels(question, card(("ada", "bo")))
 
 
 @pytest.mark.parametrize("known", [(), ("ada", "bo")])
 def test_the_first_character_of_whom_nothing_is_known_is_named(known):
     found = asked(**changed(controls={}, performer=[None, None, "eve", "ivan", "eve"]))
     with pytest.raises(InvalidField, match="performer/2: 'eve', expected ") as caught:
-        crowd_question.labels(found, card(known))
+        crowd_validation.labels(found, card(known))
     assert caught.value.index == 2
 
 
 @given(st.binary())
 def test_any_bytes_are_a_question_or_refused(content):
     with pytest.raises(FormError):
-        crowd_query.of_body(content, 100)
+        crowd_operations.of_body(content, 100)
 
 
 JSONS = st.recursive(

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefield.http.middleware.negotiation import preferred_format
+from posefield.http.negotiation import preferred_format
 
 CLIP = (
     ("usdc", "model/vnd.usdc"),

@@ -5,9 +5,9 @@ import asyncio
 import pytest
 from starlette.requests import Request
 
+from posefield.http import steps
 from posefield.http.api.problems import RequestError
-from posefield.http.decoding import request_body
-from posefield.http.decoding.request_body import FREE_BYTES, BodyMemory
+from posefield.http.steps import FREE_BYTES, BodyMemory
 
 LIMIT = 4 * FREE_BYTES
 
@@ -29,7 +29,7 @@ def request(*chunks, **headers):
 
 
 def read(asked, memory=None):
-    return asyncio.run(request_body.read_body(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
+    return asyncio.run(steps.read_body(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
 
 
 def refused(asked, memory=None):

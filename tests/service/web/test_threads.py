@@ -10,7 +10,7 @@ from anyio import CapacityLimiter
 
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancelled
-from posefield.http.concurrency import worker_threads
+from posefield.http import worker_threads
 
 
 class Work:

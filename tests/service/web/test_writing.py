@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 from msgspec import structs
 
-from posefield.encode.files.file_convention import CENTIMETRES, METRES
+from posefield.encode.conventions import CENTIMETRES, METRES
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.http.concurrency import clip_batching
-from posefield.http.concurrency.clip_batching import ClipBatcher
+from posefield.http import batching
+from posefield.http.batching import ClipBatcher
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips, frame_times
@@ -72,7 +72,7 @@ def written(encoder, wanted):
 def test_what_is_wanted_at_once_is_written_together(calls, answers):
     encoder, made = calls
     files = written(encoder, [(METRES, answer) for answer in answers])
-    assert made == [clip_batching.MAX_BATCH, len(answers) - clip_batching.MAX_BATCH]
+    assert made == [batching.MAX_CLIPS, len(answers) - batching.MAX_CLIPS]
     assert files == [USDC.encode(answer, METRES) for answer in answers]
 
 
@@ -111,7 +111,7 @@ def made(model, asked, encoder=USDC, most=frame_times.MAX_POSES):
 def test_clips_that_are_asked_for_at_once_are_made_together(calls, model, questions, answers):
     encoder, sizes = calls
     found = made(model, questions, encoder)
-    assert sum(sizes) == len(questions) and max(sizes) == clip_batching.MAX_BATCH
+    assert sum(sizes) == len(questions) and max(sizes) == batching.MAX_CLIPS
     assert [own.content for own in found] == [USDC.encode(answer) for answer in answers]
     assert [own.answer.trust for own in found] == [answer.trust for answer in answers]
 
@@ -120,7 +120,7 @@ def test_a_clip_that_may_be_long_is_made_alone(calls, model, questions):
     encoder, sizes = calls
     long = structs.replace(questions[0], fps=990.0)
     (found,) = made(model, [long], encoder)
-    assert len(found.answer.clip) > clip_batching.MAX_BATCHED_FRAMES
+    assert len(found.answer.clip) > batching.MAX_BATCHED_FRAMES
     assert found.content == USDC.encode(clips.synthesize_clip(model, long))
     made(model, [*questions[:2], long, long], encoder)
     assert sorted(sizes) == [1, 1, 1, 2]

@@ -1,6 +1,12 @@
-"""Character without motion: a skeleton in its rest pose and the body mesh skinned to it."""
+"""Character without motion: a skeleton in its rest pose and the body mesh skinned to it.
 
-from collections.abc import Mapping
+With a colon, hyphen, space or leading digit in a joint name some readers of USD silently drop the
+whole skeleton; readers that identify joints by their leaf name alone merge joints with equal names.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -9,16 +15,55 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.body.bone_boxes import bones_body
+from posefield.encode import conventions
 from posefield.encode.body.mannequin import mannequin
-from posefield.encode.body.skinned_mesh import SkinnedMesh
-from posefield.encode.character import extent, joint_names
+from posefield.encode.body.skinned_mesh import SkinnedMesh, bones_body
+from posefield.encode.character import extent
 from posefield.encode.character import extent as reach
 from posefield.encode.character.extent import BodyBounds, PointTree
-from posefield.encode.files import file_convention
-from posefield.encode.files.file_convention import METRES, Convention
+from posefield.encode.conventions import METRES, Convention
 from posefield.motion.skeleton import Skeleton
-from posefield.question.body_kind import DEFAULT_BODY, BodyKind
+from posefield.question.motion_question import DEFAULT_BODY, BodyKind
+
+LEGAL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def legal_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Return unique legal names in the given order; legal names are kept.
+
+    Of several names that become equal, the later ones get the endings _2, _3, and so on.
+    """
+    given = list(names)
+    taken = {name for name in given if LEGAL_NAME.fullmatch(name)}
+    counts: Counter[str] = Counter()
+    return tuple(
+        n if n in taken else _unique_name(_legal_characters(n), taken, counts) for n in given
+    )
+
+
+def joint_paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
+    """Return the joint tokens of UsdSkel: names of ancestors and joint, separated by slashes."""
+    found: list[str] = []
+    for leaf, parent in zip(leaves, parents, strict=True):
+        found.append(leaf if parent < 0 else f"{found[parent]}/{leaf}")
+    return tuple(found)
+
+
+def _legal_characters(name: str) -> str:
+    cleaned = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return cleaned if LEGAL_NAME.fullmatch(cleaned) else f"_{cleaned}"
+
+
+def _unique_name(name: str, taken: set[str], counts: Counter[str]) -> str:
+    """Return a name that is not taken; counts: the last ending tried, by name."""
+    found = name
+    while True:
+        counts[name] += 1
+        found = name if counts[name] == 1 else f"{name}_{counts[name]}"
+        if found not in taken:
+            taken.add(found)
+            return found
+
 
 CharacterArrays = Mapping[str, npt.NDArray[Any]]
 """Arrays of one character by name.
@@ -72,7 +117,7 @@ class _SkeletonKey:
 @lru_cache(maxsize=64)
 def _cached_rig(key: _SkeletonKey, kind: BodyKind) -> CharacterRig:
     joints = key.skeleton
-    paths = joint_names.joint_paths(joint_names.legal_names(joints.names), joints.parents)
+    paths = joint_paths(legal_names(joints.names), joints.parents)
     body = _mesh(joints, kind)
     bounds = extent.bounds(joints, body)
     return CharacterRig(joints, joints.names, paths, reach.tree(joints), body, bounds)
@@ -117,7 +162,7 @@ def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.ND
     local = _translation_matrices(convention, rest.offsets)
     made: dict[str, npt.NDArray[Any]] = {"bind": bind, "rest": local}
     if rest.rig.body is not None:
-        points = file_convention.convert_positions(convention, rest.points)
+        points = conventions.convert_positions(convention, rest.points)
         made["points"] = points
     return made
 
@@ -137,7 +182,7 @@ def _translation_matrices(convention: Convention, metres: Floats) -> Floats:
     """Return translation matrices (..., 4, 4) for row vectors, as in USD."""
     made = np.zeros((*metres.shape[:-1], 4, 4))
     made[...] = np.eye(4)
-    made[..., 3, :3] = file_convention.rounded_lengths(
-        convention, file_convention.convert_positions(convention, metres)
+    made[..., 3, :3] = conventions.rounded_lengths(
+        convention, conventions.convert_positions(convention, metres)
     )
     return made

@@ -9,15 +9,14 @@ import numpy as np
 from pxr import Gf, Vt
 
 from posefield.common.units import Singles
+from posefield.encode import conventions
 from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
-from posefield.encode.character import joint_names
+from posefield.encode.character import character
 from posefield.encode.character.character import CharacterArrays, CharacterRig
-from posefield.encode.files import file_convention
-from posefield.encode.files.file_convention import METRES, Convention
-from posefield.encode.usd_layers import prim_specs
-from posefield.encode.usd_layers.layer_content import WEIGHTS
-from posefield.encode.usd_layers.prim_specs import ValueTypes
+from posefield.encode.conventions import METRES, Convention
+from posefield.encode.usd_layers import layers
+from posefield.encode.usd_layers.layers import WEIGHTS, ValueTypes
 
 BINDING_SCHEMAS = ("SkelBindingAPI",)
 PRIMVAR_READER = "UsdPrimvarReader_float3"
@@ -64,23 +63,23 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
 
 
 def _normals(mesh: SkinnedMesh, convention: Convention) -> Singles:
-    return np.ascontiguousarray(file_convention.convert_directions(convention, mesh.normals))
+    return np.ascontiguousarray(conventions.convert_directions(convention, mesh.normals))
 
 
 def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:
     """Return a new SkelRoot with a skeleton, and a body bound to it, without numeric values."""
-    made = prim_specs.prim(parent, name, "SkelRoot", BINDING_SCHEMAS)
+    made = layers.prim(parent, name, "SkelRoot", BINDING_SCHEMAS)
     made.kind = "component"
-    prim_specs.varying_attribute(made, "extent", ValueTypes.Float3Array)
-    skeleton = prim_specs.prim(made, "Skel", "Skeleton", BINDING_SCHEMAS)
-    prim_specs.add_relationship(made, "skel:skeleton", skeleton.path)
+    layers.varying_attribute(made, "extent", ValueTypes.Float3Array)
+    skeleton = layers.prim(made, "Skel", "Skeleton", BINDING_SCHEMAS)
+    layers.add_relationship(made, "skel:skeleton", skeleton.path)
     _skeleton(skeleton, rig)
     arrays = _mesh_arrays(rig, convention)
     if arrays is not None:
-        mesh = prim_specs.prim(made, "Body", "Mesh", MESH_SCHEMAS)
-        prim_specs.add_relationship(mesh, "skel:skeleton", skeleton.path)
+        mesh = layers.prim(made, "Body", "Mesh", MESH_SCHEMAS)
+        layers.add_relationship(mesh, "skel:skeleton", skeleton.path)
         _mesh(mesh, arrays)
-        prim_specs.add_relationship(
+        layers.add_relationship(
             mesh, "material:binding", _material(made, tinted=bool(arrays.tinted))
         )
     return made
@@ -111,7 +110,7 @@ def set_values(root: Any, values: UsdValues) -> None:
 def bind_animation(root: Any, animation: Any) -> None:
     """Bind the skeleton of a SkelRoot to the SkelAnimation at a path."""
     skeleton = root.layer.GetPrimAtPath(root.path.AppendChild("Skel"))
-    prim_specs.add_relationship(skeleton, "skel:animationSource", animation)
+    layers.add_relationship(skeleton, "skel:animationSource", animation)
 
 
 def add_blend_shapes(root: Any, rig: CharacterRig, curves: Sequence[str]) -> None:
@@ -122,33 +121,33 @@ def add_blend_shapes(root: Any, rig: CharacterRig, curves: Sequence[str]) -> Non
     if rig.body is None or not curves:
         return
     mesh = root.layer.GetPrimAtPath(root.path.AppendChild("Body"))
-    prim_specs.uniform_attribute(
+    layers.uniform_attribute(
         mesh, "skel:blendShapes", ValueTypes.TokenArray, Vt.TokenArray(list(curves))
     )
     shapes = []
-    for name in joint_names.legal_names(curves):
-        shape = prim_specs.prim(mesh, name, "BlendShape")
+    for name in character.legal_names(curves):
+        shape = layers.prim(mesh, name, "BlendShape")
         offsets, points = Vt.Vec3fArray.FromNumpy(NO_OFFSET), Vt.IntArray([0])
-        prim_specs.uniform_attribute(shape, "offsets", ValueTypes.Vector3fArray, offsets)
-        prim_specs.uniform_attribute(shape, "pointIndices", ValueTypes.IntArray, points)
+        layers.uniform_attribute(shape, "offsets", ValueTypes.Vector3fArray, offsets)
+        layers.uniform_attribute(shape, "pointIndices", ValueTypes.IntArray, points)
         shapes.append(shape.path)
-    prim_specs.add_relationship(mesh, "skel:blendShapeTargets", *shapes)
+    layers.add_relationship(mesh, "skel:blendShapeTargets", *shapes)
 
 
 def animation(parent: Any, name: str, paths: tuple[str, ...], curves: Sequence[str] = ()) -> Any:
     """Return a new SkelAnimation of these joints and curves, without samples."""
-    made = prim_specs.prim(parent, name, "SkelAnimation")
-    prim_specs.uniform_attribute(made, "joints", ValueTypes.TokenArray, Vt.TokenArray(paths))
-    prim_specs.varying_attribute(made, "translations", ValueTypes.Float3Array)
-    prim_specs.varying_attribute(made, "rotations", ValueTypes.QuatfArray)
+    made = layers.prim(parent, name, "SkelAnimation")
+    layers.uniform_attribute(made, "joints", ValueTypes.TokenArray, Vt.TokenArray(paths))
+    layers.varying_attribute(made, "translations", ValueTypes.Float3Array)
+    layers.varying_attribute(made, "rotations", ValueTypes.QuatfArray)
     # Without scales some readers silently show the rest pose.
-    prim_specs.varying_attribute(
+    layers.varying_attribute(
         made, "scales", ValueTypes.Half3Array, Vt.Vec3hArray(len(paths), Gf.Vec3h(1, 1, 1))
     )
     if curves:
         names = Vt.TokenArray(list(curves))
-        prim_specs.uniform_attribute(made, "blendShapes", ValueTypes.TokenArray, names)
-        prim_specs.varying_attribute(made, WEIGHTS, ValueTypes.FloatArray)
+        layers.uniform_attribute(made, "blendShapes", ValueTypes.TokenArray, names)
+        layers.varying_attribute(made, WEIGHTS, ValueTypes.FloatArray)
     return made
 
 
@@ -159,28 +158,28 @@ def _attribute(root: Any, prim: str, name: str) -> Any:
 
 def _skeleton(prim: Any, rig: CharacterRig) -> None:
     paths, names = Vt.TokenArray(rig.paths), Vt.TokenArray(rig.names)
-    prim_specs.uniform_attribute(prim, "joints", ValueTypes.TokenArray, paths)
-    prim_specs.uniform_attribute(prim, "jointNames", ValueTypes.TokenArray, names)
+    layers.uniform_attribute(prim, "joints", ValueTypes.TokenArray, paths)
+    layers.uniform_attribute(prim, "jointNames", ValueTypes.TokenArray, names)
     for name in ("bindTransforms", "restTransforms"):
-        prim_specs.uniform_attribute(prim, name, ValueTypes.Matrix4dArray)
+        layers.uniform_attribute(prim, name, ValueTypes.Matrix4dArray)
 
 
 def _mesh(prim: Any, arrays: _MeshArrays) -> None:
-    prim_specs.varying_attribute(prim, "points", ValueTypes.Point3fArray)
-    prim_specs.vertex_attribute(prim, "normals", ValueTypes.Normal3fArray, arrays.normals)
-    prim_specs.varying_attribute(prim, "faceVertexCounts", ValueTypes.IntArray, arrays.counts)
-    prim_specs.varying_attribute(prim, "faceVertexIndices", ValueTypes.IntArray, arrays.corners)
-    prim_specs.uniform_attribute(prim, "subdivisionScheme", ValueTypes.Token, "none")
-    prim_specs.varying_attribute(prim, "extent", ValueTypes.Float3Array)
+    layers.varying_attribute(prim, "points", ValueTypes.Point3fArray)
+    layers.vertex_attribute(prim, "normals", ValueTypes.Normal3fArray, arrays.normals)
+    layers.varying_attribute(prim, "faceVertexCounts", ValueTypes.IntArray, arrays.counts)
+    layers.varying_attribute(prim, "faceVertexIndices", ValueTypes.IntArray, arrays.corners)
+    layers.uniform_attribute(prim, "subdivisionScheme", ValueTypes.Token, "none")
+    layers.varying_attribute(prim, "extent", ValueTypes.Float3Array)
     _colours(prim, arrays)
     for name, kind, value in (
         ("jointIndices", ValueTypes.IntArray, arrays.joints),
         ("jointWeights", ValueTypes.FloatArray, arrays.weights),
     ):
-        prim_specs.vertex_attribute(prim, f"primvars:skel:{name}", kind, value).SetInfo(
+        layers.vertex_attribute(prim, f"primvars:skel:{name}", kind, value).SetInfo(
             "elementSize", arrays.influences
         )
-    prim_specs.varying_attribute(
+    layers.varying_attribute(
         prim, "primvars:skel:geomBindTransform", ValueTypes.Matrix4d, Gf.Matrix4d(1.0)
     )
 
@@ -189,11 +188,11 @@ def _colours(prim: Any, arrays: _MeshArrays) -> None:
     """Create the colours that readers without materials show."""
     name = "primvars:displayColor"
     if arrays.tinted is None:
-        spec = prim_specs.varying_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
+        spec = layers.varying_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
         spec.SetInfo("interpolation", "constant")
         return
-    prim_specs.vertex_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
-    prim_specs.varying_attribute(prim, f"{name}:indices", ValueTypes.IntArray, arrays.tinted)
+    layers.vertex_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
+    layers.varying_attribute(prim, f"{name}:indices", ValueTypes.IntArray, arrays.tinted)
 
 
 def _material(parent: Any, *, tinted: bool) -> Any:
@@ -201,26 +200,26 @@ def _material(parent: Any, *, tinted: bool) -> Any:
 
     tinted: whether it takes its colour from the mesh instead of having one of its own.
     """
-    made = prim_specs.prim(parent, "Material", "Material")
+    made = layers.prim(parent, "Material", "Material")
     surface = _shader(made, "Surface", "UsdPreviewSurface")
-    colour = prim_specs.varying_attribute(surface, "inputs:diffuseColor", ValueTypes.Color3f)
+    colour = layers.varying_attribute(surface, "inputs:diffuseColor", ValueTypes.Color3f)
     if tinted:
         reader = _shader(made, "Colour", PRIMVAR_READER)
-        prim_specs.varying_attribute(reader, "inputs:varname", ValueTypes.String, "displayColor")
-        result = prim_specs.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
+        layers.varying_attribute(reader, "inputs:varname", ValueTypes.String, "displayColor")
+        result = layers.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
         _connect(colour, result)
     else:
         colour.default = Gf.Vec3f(*skinned_mesh.SKIN)
     for name, value in (("roughness", skinned_mesh.ROUGHNESS), ("metallic", 0.0)):
-        prim_specs.varying_attribute(surface, f"inputs:{name}", ValueTypes.Float, value)
-    output = prim_specs.varying_attribute(surface, "outputs:surface", ValueTypes.Token)
-    _connect(prim_specs.varying_attribute(made, "outputs:surface", ValueTypes.Token), output)
+        layers.varying_attribute(surface, f"inputs:{name}", ValueTypes.Float, value)
+    output = layers.varying_attribute(surface, "outputs:surface", ValueTypes.Token)
+    _connect(layers.varying_attribute(made, "outputs:surface", ValueTypes.Token), output)
     return made.path
 
 
 def _shader(parent: Any, name: str, kind: str) -> Any:
-    made = prim_specs.prim(parent, name, "Shader")
-    prim_specs.uniform_attribute(made, "info:id", ValueTypes.Token, kind)
+    made = layers.prim(parent, name, "Shader")
+    layers.uniform_attribute(made, "info:id", ValueTypes.Token, kind)
     return made
 
 

@@ -19,12 +19,11 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from posefield.common.units import Booleans
-from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import character_prims, clip_arrays, usd_clip
-from posefield.encode.usd.clip_arrays import ClipArrays
-from posefield.encode.usd.usd_clip import ClipLayerBuilder
-from posefield.encode.usd_layers import layer_metadata, prim_specs
-from posefield.encode.usd_layers.prim_specs import ValueTypes
+from posefield.encode.conventions import Convention
+from posefield.encode.usd import character_prims, usd_clip
+from posefield.encode.usd.usd_clip import ClipArrays, ClipLayerBuilder
+from posefield.encode.usd_layers import layers
+from posefield.encode.usd_layers.layers import ValueTypes
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
 PERFORMANCE = Sdf.Path("/Performance")
@@ -49,7 +48,7 @@ def usda(answer: PerformanceAnswer, convention: Convention) -> bytes:
 
 def usdc(answer: PerformanceAnswer, convention: Convention) -> bytes:
     """Return the layer in binary form."""
-    return layer_metadata.crate_bytes(_layer(answer, convention))
+    return layers.crate_bytes(_layer(answer, convention))
 
 
 def usdz(answer: PerformanceAnswer, convention: Convention) -> bytes:
@@ -71,15 +70,15 @@ def segment_frames(begins: float, ends: float, rate: float, frames: int) -> rang
 
 def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
     """Return the layer; its prims are valid while the caller holds it."""
-    (arrays,) = clip_arrays.arrays_with_character([answer], convention)
+    (arrays,) = usd_clip.arrays_with_character([answer], convention)
     author = ClipLayerBuilder(arrays.rate, convention, arrays.rig, arrays.curves)
     made = author.layer(arrays.content)
     with Sdf.ChangeBlock():
-        scope = prim_specs.prim(made, PERFORMANCE.name, "Scope")
+        scope = layers.prim(made, PERFORMANCE.name, "Scope")
         facts = answer.trust.facts()
         segments = facts.pop("segments")
-        scope.customData = {layer_metadata.FACTS: layer_metadata.usd_dictionary(facts)}
-        group = prim_specs.prim(scope, SEGMENTS.name, "Scope")
+        scope.customData = {layers.FACTS: layers.usd_dictionary(facts)}
+        group = layers.prim(scope, SEGMENTS.name, "Scope")
         for index, own in enumerate(segments):
             _add_segment(group, index, own, arrays)
     _add_contacts(made, answer.trust, arrays)
@@ -89,11 +88,11 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
 def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
     paths = arrays.rig.paths
     prim = character_prims.animation(group, segment_name(index), paths, arrays.curves)
-    prim.customData = {layer_metadata.FACTS: layer_metadata.usd_dictionary(facts)}
+    prim.customData = {layers.FACTS: layers.usd_dictionary(facts)}
     frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
     rows = slice(frames.start, frames.stop)
     samples = {name: whole[rows] for name, whole in arrays.content.samples.items()}
-    prim_specs.set_time_samples(prim, samples, frames.start)
+    layers.set_time_samples(prim, samples, frames.start)
 
 
 def _add_contacts(made: Any, report: PerformanceReport, arrays: ClipArrays) -> None:
@@ -109,8 +108,8 @@ def _add_contacts(made: Any, report: PerformanceReport, arrays: ClipArrays) -> N
         found[:, joints.index(stance.joint)] |= during
     scope = made.GetPrimAtPath(PERFORMANCE)
     names = Vt.TokenArray(joints)
-    prim_specs.uniform_attribute(scope, CONTACT_JOINTS, ValueTypes.TokenArray, names)
-    attribute = prim_specs.varying_attribute(scope, CONTACT, ValueTypes.BoolArray)
+    layers.uniform_attribute(scope, CONTACT_JOINTS, ValueTypes.TokenArray, names)
+    attribute = layers.varying_attribute(scope, CONTACT, ValueTypes.BoolArray)
     scope.attributes[CONTACT_JOINTS].custom = attribute.custom = True
     for frame in _changes(found):
         values = Vt.BoolArray([bool(value) for value in found[frame]])

@@ -1,24 +1,135 @@
 """Clips as USD layers: a bound skeleton, its baked animation and a skinned body.
 
+Layers of the animation alone are for stages in which many clips animate one character.
+
 The layers are written without a stage, which is faster; every opened stage also leaks memory. The
-names of prims are constant, because USD never frees a name.
+names of prims are constant, because USD never frees a name. The arrays of many clips are computed
+together, with the same result as one by one.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import cache, lru_cache
+from itertools import groupby, pairwise
+from typing import Any, NamedTuple
 
+import numpy as np
 from pxr import Sdf
 
+from posefield.common import cancellation
+from posefield.common.units import Singles
+from posefield.encode import archives, conventions
+from posefield.encode.character import animation_samples, character, extent
+from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.encode.character.character import CharacterRig
-from posefield.encode.files import zip_archive
-from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import character_prims, clip_arrays
-from posefield.encode.usd_layers import crate_template, prim_specs
-from posefield.encode.usd_layers.layer_content import LayerContent
-from posefield.encode.usd_layers.layer_metadata import BaseLayerBuilder
+from posefield.encode.conventions import Convention
+from posefield.encode.usd import character_prims
+from posefield.encode.usd_layers import crate_template, layers
+from posefield.encode.usd_layers.layers import (
+    WEIGHTS,
+    Array,
+    BaseLayerBuilder,
+    LayerContent,
+    Samples,
+)
+from posefield.motion.clip import Clip
 from posefield.question.results import SampledClip
+
+FRAMES_AT_ONCE = 3200
+"""Frames of clips that are computed at a time; a longer clip is computed alone."""
+
+
+WITHOUT_BODY = Convention(1.0, "y", "none")
+
+
+class ClipArrays(NamedTuple):
+    """Rig, frame rate, layer content and names of the curves of one clip."""
+
+    rig: CharacterRig
+    rate: float
+    content: LayerContent
+    curves: tuple[str, ...]
+
+
+def arrays_with_character(
+    answers: Sequence[SampledClip], convention: Convention
+) -> Iterator[ClipArrays]:
+    """Yield arrays in the order of their results, with samples, character values and facts."""
+    for rig, some in _grouped_by_rig(answers, convention):
+        made = animation_samples.from_clips([answer.clip for answer in some])
+        rest = character.rest_pose(rig, made.offsets)
+        boxes = extent.bounding_boxes(rig.tree, made, rest.radii)
+        values = character.character_arrays(rest, convention)
+        values["extent"] = conventions.convert_box(convention, boxes).astype(np.float32)
+        for index, samples in enumerate(_samples(made, some, convention)):
+            own = {name: array[index] for name, array in values.items()}
+            yield _clip_arrays(rig, some[index], samples, own)
+
+
+def arrays_without_character(
+    answers: Sequence[SampledClip], convention: Convention
+) -> Iterator[ClipArrays]:
+    """Yield arrays in the order of their results, with samples and facts only."""
+    for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
+        made = animation_samples.from_clips([answer.clip for answer in some])
+        for answer, samples in zip(some, _samples(made, some, convention), strict=True):
+            yield _clip_arrays(rig, answer, samples, {})
+
+
+def _grouped_by_rig(
+    answers: Sequence[SampledClip], convention: Convention
+) -> Iterator[tuple[CharacterRig, list[SampledClip]]]:
+    """Yield consecutive results of one skeleton, at most FRAMES_AT_ONCE frames at a time."""
+    _keep_freed_memory()
+    for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
+        part: list[SampledClip] = []
+        frames = 0
+        for answer in some:
+            frames += len(answer.clip)
+            if part and frames > FRAMES_AT_ONCE:
+                yield character.rig(part[0].clip.skeleton, convention.body), part
+                part, frames = [], len(answer.clip)
+            part.append(answer)
+        yield character.rig(part[0].clip.skeleton, convention.body), part
+
+
+@cache
+def _keep_freed_memory() -> None:
+    """Make glibc keep up to 64 MB of freed memory.
+
+    It would return large blocks to the system, and requesting their pages again would take as long
+    as all other work. Its thresholds grow with the size of freed blocks (mallopt(3),
+    M_MMAP_THRESHOLD).
+    """
+    np.empty(31 << 20, np.uint8)
+
+
+def _clip_arrays(
+    rig: CharacterRig, answer: SampledClip, samples: Samples, values: Mapping[str, Array]
+) -> ClipArrays:
+    cancellation.check()
+    content = LayerContent(samples, values, answer.trust.facts())
+    names = answer.clip.curves.names if answer.clip.curves else ()
+    return ClipArrays(rig, answer.clip.rate, content, tuple(names))
+
+
+def _samples(
+    made: AnimationSamples, answers: Sequence[SampledClip], convention: Convention
+) -> Iterator[Samples]:
+    translations = conventions.convert_positions(convention, made.translations)
+    rotations = conventions.convert_rotations(convention, made.rotations)
+    for answer, (first, last) in zip(answers, pairwise(made.starts), strict=True):
+        own = {"translations": translations[first:last], "rotations": rotations[first:last]}
+        yield own | _weights(answer.clip)
+
+
+def _weights(clip: Clip) -> dict[str, Singles]:
+    """Return the curves (F, C) of a clip as weights of blend shapes; nothing without them."""
+    if clip.curves is None:
+        return {}
+    # USD's deduplication does not distinguish -0 from 0.
+    return {WEIGHTS: np.ascontiguousarray(clip.curves.values, np.float32) + np.float32(0.0)}
+
 
 ROOT = Sdf.Path("/Character")
 ANIMATION = ROOT.AppendChild("Anim")
@@ -40,7 +151,7 @@ class ClipLayerBuilder(BaseLayerBuilder):
             character_prims.set_values(
                 made.GetPrimAtPath(ROOT), character_prims.values(content.values)
             )
-            prim_specs.set_time_samples(made.GetPrimAtPath(ANIMATION), content.samples)
+            layers.set_time_samples(made.GetPrimAtPath(ANIMATION), content.samples)
         return made
 
 
@@ -60,10 +171,10 @@ def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[st
 
 def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers as text."""
-    layers = (
+    built = (
         author.layer(content) for author, content in builders_and_contents(answers, convention)
     )
-    return [layer.ExportToString().encode() for layer in layers]
+    return [layer.ExportToString().encode() for layer in built]
 
 
 def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
@@ -78,12 +189,44 @@ def usdz(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
 
 def usdz_package(layer: bytes) -> bytes:
     """Return a USDZ file that holds one binary layer."""
-    return b"".join(zip_archive.zip_chunks([zip_archive.whole("clip.usdc", layer)]))
+    return b"".join(archives.zip_chunks([archives.whole("clip.usdc", layer)]))
 
 
 def builders_and_contents(
     answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[tuple[ClipLayerBuilder, LayerContent]]:
     """Yield the author and the content of the layer of each answer."""
-    for take in clip_arrays.arrays_with_character(answers, convention):
+    for take in arrays_with_character(answers, convention):
         yield ClipLayerBuilder(take.rate, convention, take.rig, take.curves), take.content
+
+
+ANIMATION_NAME = "Anim"
+
+
+@dataclass(frozen=True)
+class AnimationLayerBuilder(BaseLayerBuilder):
+    """Layers of an animation of joints with given paths, and of curves with given names."""
+
+    paths: tuple[str, ...]
+    curves: tuple[str, ...] = ()
+
+    def layer(self, content: LayerContent) -> Any:
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
+        made = Sdf.Layer.CreateAnonymous("animation.usda")
+        self.set_metadata(made, ANIMATION_NAME, content)
+        with Sdf.ChangeBlock():
+            layers.set_time_samples(
+                character_prims.animation(made, ANIMATION_NAME, self.paths, self.curves),
+                content.samples,
+            )
+        return made
+
+
+def animation_usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
+    """Return binary layers of the clips' animations, with the facts and without a character."""
+    return [
+        crate_template.usdc(
+            AnimationLayerBuilder(take.rate, convention, take.rig.paths, take.curves), take.content
+        )
+        for take in arrays_without_character(answers, convention)
+    ]

@@ -19,12 +19,12 @@ import numpy as np
 from pxr import Sdf
 
 from posefield.common.units import Floats
-from posefield.encode.character import character, joint_names
+from posefield.encode import conventions
+from posefield.encode.character import character
 from posefield.encode.character import extent as reach
-from posefield.encode.files import file_convention
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims
-from posefield.encode.usd_layers import layer_metadata, prim_specs
+from posefield.encode.usd_layers import layers
 from posefield.motion.skeleton import Skeleton
 from posefield.question.results import SampledClip
 
@@ -71,11 +71,11 @@ def library_stage(
     rate: of the stage, frames a second. The stage is as long as the longest clip. curves: names of
     the clips' curves, for which the body has blend shapes.
     """
-    prims = joint_names.legal_names(each.name for each in entries)
+    prims = character.legal_names(each.name for each in entries)
     character_layer = _character_layer(skeleton, convention, rate, entries)
     root = character_layer.GetPrimAtPath(ROOT)
     character_prims.add_blend_shapes(root, character.rig(skeleton, convention.body), curves)
-    prim_specs.prim(root, CLIPS.name, "Scope")
+    layers.prim(root, CLIPS.name, "Scope")
     for name in prims[:1]:
         character_prims.bind_animation(root, CLIPS.AppendChild(name))
     text: str = character_layer.ExportToString()
@@ -90,7 +90,7 @@ def _character_layer(
     """Return the layer of the stage with its character alone."""
     rig, made = character.rig(skeleton, convention.body), Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
-    layer_metadata.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
+    layers.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
     root = character_prims.root(made, ROOT.name, rig, convention)
     numbers = character.rest_pose_arrays(rig, convention)
     extent = _library_box(numbers["extent"], entries, convention)
@@ -116,5 +116,5 @@ def _asset_path(file: str) -> str:
 def _library_box(rest: Floats, entries: Sequence[LibraryEntry], convention: Convention) -> Floats:
     """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
     boxes = np.array([(each.low, each.high) for each in entries]).reshape(-1, 2, 3)
-    every = np.concatenate([rest[None], file_convention.convert_box(convention, boxes)])
+    every = np.concatenate([rest[None], conventions.convert_box(convention, boxes)])
     return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]).astype(np.float32)

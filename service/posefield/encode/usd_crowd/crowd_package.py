@@ -13,16 +13,16 @@ from pxr import Sdf
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
+from posefield.encode import archives
+from posefield.encode.archives import ZipMember
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig
-from posefield.encode.files import zip_archive
-from posefield.encode.files.zip_archive import ZipMember
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_crowd import crowd_scene
 from posefield.encode.usd_crowd.crowd_scene import MotionSamples
-from posefield.encode.usd_layers import layer_metadata, prim_specs
+from posefield.encode.usd_layers import layers
 from posefield.motion.crowd_clip import CrowdClip
-from posefield.question.body_kind import BodyKind
+from posefield.question.motion_question import BodyKind
 
 
 def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKind) -> Any:
@@ -33,12 +33,12 @@ def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKi
     character_prims.add_blend_shapes(prototype, rig, crowd.curves)
     character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
     prototype.specifier = Sdf.SpecifierClass
-    group = prim_specs.prim(root, crowd_scene.MOTIONS.name, "Scope")
+    group = layers.prim(root, crowd_scene.MOTIONS.name, "Scope")
     notes = []
     for index, motion in enumerate(crowd_scene.all_motions(crowd, rig)):
         name = crowd_scene.motion_name(index)
         animation = character_prims.animation(group, name, rig.paths, crowd.curves)
-        prim_specs.set_time_samples(animation, motion.samples)
+        layers.set_time_samples(animation, motion.samples)
         notes.append(motion.summary)
     crowd_scene.add_references(made, crowd, instanced)
     crowd_scene.add_to_references(made, crowd, notes)
@@ -87,7 +87,7 @@ def _copy_motion(
         root = layer.GetPrimAtPath(crowd_scene.character_path(index))
         own = character_prims.animation(root, root.name, rig.paths, crowd.curves)
         if first is None:
-            prim_specs.set_time_samples(own, motion.samples)
+            layers.set_time_samples(own, motion.samples)
             first = own.path
         else:
             # Each spec lacks at most one field, so the order of copying does not matter.
@@ -117,9 +117,9 @@ def size_bound(crowd: CrowdClip) -> int:
 def check_size(crowd: CrowdClip) -> None:
     """Raise InvalidField if an archive of the crowd could exceed the limits of a zip."""
     taken, members = size_bound(crowd), crowd_scene.motion_count(crowd) + 3
-    if taken > zip_archive.BYTES or members > zip_archive.MEMBERS:
+    if taken > archives.BYTES or members > archives.MEMBERS:
         found = f"{taken / 1e9:.1f} GB in {members} layers"
-        expected = f"{zip_archive.BYTES / 1e9:.1f} GB in {zip_archive.MEMBERS}"
+        expected = f"{archives.BYTES / 1e9:.1f} GB in {archives.MEMBERS}"
         raise InvalidField("format", f"{found}, expected at most {expected} in a usdz; take usd")
 
 
@@ -129,16 +129,16 @@ def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
     root = made.GetPrimAtPath(crowd_scene.ROOT)
     made.subLayerPaths.append(f"./{folder}/{SUMMARY}")
     with Sdf.ChangeBlock():
-        prototype = prim_specs.prim(root, crowd_scene.PROTOTYPE.name, "SkelRoot")
+        prototype = layers.prim(root, crowd_scene.PROTOTYPE.name, "SkelRoot")
         prototype.specifier, prototype.kind = Sdf.SpecifierClass, "component"
         crowd_scene.set_payload(prototype, f"./{folder}/{CHARACTER}")
-        group = prim_specs.prim(root, crowd_scene.MOTIONS.name, "Scope")
+        group = layers.prim(root, crowd_scene.MOTIONS.name, "Scope")
         for name in map(crowd_scene.motion_name, range(crowd_scene.motion_count(crowd))):
             crowd_scene.set_payload(
-                prim_specs.prim(group, name, "SkelAnimation"), f"./{folder}/{name}.usdc"
+                layers.prim(group, name, "SkelAnimation"), f"./{folder}/{name}.usdc"
             )
     crowd_scene.add_references(made, crowd, instanced)
-    return layer_metadata.crate_bytes(made)
+    return layers.crate_bytes(made)
 
 
 def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, bytes]]:
@@ -148,7 +148,7 @@ def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, b
     prim = character_prims.root(standing, "Character", rig)
     character_prims.add_blend_shapes(prim, rig, crowd.curves)
     character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
-    yield CHARACTER, layer_metadata.crate_bytes(standing)
+    yield CHARACTER, layers.crate_bytes(standing)
     for index, motion in enumerate(crowd_scene.all_motions(crowd, rig)):
         notes.append(motion.summary)
         yield (
@@ -157,17 +157,17 @@ def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, b
         )
     last = _layer(crowd_scene.ROOT.name, crowd)
     crowd_scene.add_to_references(last, crowd, notes)
-    yield SUMMARY, layer_metadata.crate_bytes(last)
+    yield SUMMARY, layers.crate_bytes(last)
 
 
 def members(crowd: CrowdClip, instanced: bool, body: BodyKind) -> Iterator[ZipMember]:
     """Yield all layers as members of an archive, the entry first."""
-    yield zip_archive.whole("crowd.usdc", root_layer(crowd, instanced, FOLDER))
+    yield archives.whole("crowd.usdc", root_layer(crowd, instanced, FOLDER))
     for name, content in referenced_layers(crowd, body):
-        yield zip_archive.whole(f"{FOLDER}/{name}", content)
+        yield archives.whole(f"{FOLDER}/{name}", content)
 
 
 def _layer(default: str, crowd: CrowdClip) -> Any:
     made = Sdf.Layer.CreateAnonymous("part.usdc")
-    layer_metadata.set_layer_metadata(made, default, crowd.frames, crowd.rate)
+    layers.set_layer_metadata(made, default, crowd.frames, crowd.rate)
     return made

@@ -28,11 +28,10 @@ from posefield.common.units import Floats, Indices, Singles
 from posefield.encode.character import animation_samples, extent
 from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.encode.character.character import CharacterRig
-from posefield.encode.files.file_convention import METRES
-from posefield.encode.usd.usd_animation import AnimationLayerBuilder
-from posefield.encode.usd_layers import crate_template, layer_metadata, prim_specs
-from posefield.encode.usd_layers.layer_content import WEIGHTS, LayerContent, Samples
-from posefield.encode.usd_layers.prim_specs import ValueTypes
+from posefield.encode.conventions import METRES
+from posefield.encode.usd.usd_clip import AnimationLayerBuilder
+from posefield.encode.usd_layers import crate_template, layers
+from posefield.encode.usd_layers.layers import WEIGHTS, LayerContent, Samples, ValueTypes
 from posefield.motion import quat
 from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 
@@ -165,15 +164,15 @@ def new_layer(crowd: CrowdClip, form: str) -> Any:
     before it writes it, which takes half as much memory again.
     """
     made = Sdf.Layer.CreateAnonymous(f"crowd.{form}")
-    layer_metadata.set_layer_metadata(made, ROOT.name, crowd.frames, crowd.rate)
-    made.customLayerData = {layer_metadata.FACTS: layer_metadata.usd_dictionary(crowd.facts)}
-    prim_specs.prim(made, ROOT.name, "Xform", MODEL_SCHEMAS).kind = "assembly"
+    layers.set_layer_metadata(made, ROOT.name, crowd.frames, crowd.rate)
+    made.customLayerData = {layers.FACTS: layers.usd_dictionary(crowd.facts)}
+    layers.prim(made, ROOT.name, "Xform", MODEL_SCHEMAS).kind = "assembly"
     return made
 
 
 def characters_prim(made: Any) -> Any:
     """Return a new prim for the characters."""
-    characters = prim_specs.prim(made.GetPrimAtPath(ROOT), CHARACTERS.name, "Xform", MODEL_SCHEMAS)
+    characters = layers.prim(made.GetPrimAtPath(ROOT), CHARACTERS.name, "Xform", MODEL_SCHEMAS)
     characters.kind = "group"
     return characters
 
@@ -193,12 +192,12 @@ def add_references(made: Any, crowd: CrowdClip, instanced: bool) -> None:
     prototype = Sdf.ReferenceListOp.Create(prependedItems=[Sdf.Reference("", PROTOTYPE)])
     for some in character_blocks(crowd):
         with Sdf.ChangeBlock():
-            prims = [prim_specs.prim(characters, character_name(i), "SkelRoot") for i in some]
+            prims = [layers.prim(characters, character_name(i), "SkelRoot") for i in some]
             for prim, played in zip(prims, crowd.motion[some], strict=True):
                 prim.SetInfo("references", prototype)
                 if instanced:
                     prim.SetInfo("instanceable", True)
-                prim_specs.add_relationship(
+                layers.add_relationship(
                     prim, "skel:animationSource", MOTIONS.AppendChild(motion_name(played))
                 )
             set_transforms(prims, crowd.placement.select(some))
@@ -218,8 +217,8 @@ def set_transforms(prims: Sequence[Any], placement: Placement) -> None:
     """
     order = Vt.TokenArray(["xformOp:transform"])
     for prim, matrix in zip(prims, _matrices(placement), strict=True):
-        prim_specs.varying_attribute(prim, "xformOp:transform", ValueTypes.Matrix4d, matrix)
-        prim_specs.uniform_attribute(prim, "xformOpOrder", ValueTypes.TokenArray, order)
+        layers.varying_attribute(prim, "xformOp:transform", ValueTypes.Matrix4d, matrix)
+        layers.uniform_attribute(prim, "xformOpOrder", ValueTypes.TokenArray, order)
 
 
 def _matrices(placement: Placement) -> Any:
@@ -262,7 +261,7 @@ def _placed_boxes(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -
         with Sdf.ChangeBlock():
             for index in some:
                 _set_extent(made, character_path(index), own[index])
-    whole = prim_specs.float3_array(placed_box(crowd.placement, own))
+    whole = layers.float3_array(placed_box(crowd.placement, own))
     for path in (ROOT, CHARACTERS):
         _attribute(made, path.AppendProperty("extentsHint"), ValueTypes.Float3Array).default = whole
 
@@ -275,7 +274,7 @@ def _enlarged_float32(boxes: Sequence[Floats]) -> Floats:
 def _set_extent(made: Any, prim: Any, box: Floats) -> None:
     _attribute(
         made, prim.AppendProperty("extent"), ValueTypes.Float3Array
-    ).default = prim_specs.float3_array(box)
+    ).default = layers.float3_array(box)
 
 
 def _set_levels(made: Any, prim: Any, note: MotionSummary) -> None:

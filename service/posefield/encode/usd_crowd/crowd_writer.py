@@ -1,16 +1,30 @@
-"""Writers of crowds as USD, to a file or to a stream."""
+"""Writers of crowds as USD, to a file or to a stream; large ones in a child process.
 
+usd-core holds a layer in memory until it has been exported, and Python's lock while it writes it,
+for seconds where the layer is large: all other threads of this process would stop meanwhile, and
+the work could not be cancelled. It also never frees a path. A child has its own lock and memory,
+and can be killed (decision 0029).
+"""
+
+import pickle
 import re
+import subprocess
+import sys
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import IO, Any
 
 from posefield.common import atomic_files
+from posefield.common import cancellation as cancel
+from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.common.errors import FileError, InvalidField
 from posefield.common.name_suggestion import did_you_mean
+from posefield.encode import archives
 from posefield.encode.character import character
-from posefield.encode.files import zip_archive
 from posefield.encode.usd_crowd import (
     FILES,
     INSTANCING,
@@ -18,12 +32,99 @@ from posefield.encode.usd_crowd import (
     crowd_package,
     crowd_scene,
     crowd_size,
-    encoding_process,
 )
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
-from posefield.encode.usd_layers import layer_metadata
+from posefield.encode.usd_layers import layers
 from posefield.motion.crowd_clip import CrowdClip
-from posefield.question.body_kind import DEFAULT_BODY, BodyKind
+from posefield.question.motion_question import DEFAULT_BODY, BodyKind
+
+CHILD_MODULE = "posefield.encode.usd_crowd.encoding_child"
+POLL_INTERVAL = 0.1
+"""Seconds between two checks of the cancellation."""
+
+
+class EncoderDied(Exception):
+    """Raised if the child process ended before it had written the whole crowd."""
+
+
+def stream_from_child(
+    crowd: CrowdClip, ending: str, instancing: str, body: BodyKind = DEFAULT_BODY
+) -> Iterator[bytes]:
+    """Yield the bytes of a crowd as usda, usdc or usdz, in chunks of a file made by a child.
+
+    The child has ended when the first chunk is yielded: a client that reads slowly keeps a file
+    open, but no process. Raises the errors of computing the motions, Cancelled, and EncoderDied.
+    """
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"crowd.{ending}")
+        words = [sys.executable, "-P", "-m", CHILD_MODULE, str(path), instancing, body]
+        with subprocess.Popen(words, stdin=subprocess.PIPE) as child:
+            assert child.stdin is not None
+            with _running_feeder(_Feeder(crowd, child.stdin, Cancellation()), child) as feeder:
+                _wait(child)
+        if feeder.fault is not None:
+            raise feeder.fault
+        if child.returncode:
+            raise EncoderDied(f"it ended with {child.returncode}")
+        yield from atomic_files.read_chunks(path)
+
+
+@dataclass
+class _Feeder:
+    """Thread that writes a crowd and its motions, as they are computed, to a child.
+
+    cancellation: stops it within a moment. fault: the error of computing the motions.
+    """
+
+    crowd: CrowdClip
+    pipe: IO[bytes]
+    cancellation: Cancellation
+    fault: Exception | None = None
+
+    def run(self) -> None:
+        """Write the crowd, unless the child has ended or the work is cancelled."""
+        # A thread has a context of its own.
+        cancel.current.set(self.cancellation)
+        try:
+            self._write(replace(self.crowd, batches=()))
+            for batch in self.crowd.batches:
+                self._write(batch)
+            self._write(None)
+        except (BrokenPipeError, Cancelled):
+            pass
+        except Exception as fault:
+            self.fault = fault
+        finally:
+            # Without the None at the end the child fails, and writes no file.
+            with suppress(BrokenPipeError):
+                self.pipe.close()
+
+    def _write(self, part: object) -> None:
+        cancel.check()
+        pickle.dump(part, self.pipe, protocol=pickle.HIGHEST_PROTOCOL)
+        self.pipe.flush()
+
+
+@contextmanager
+def _running_feeder(feeder: _Feeder, child: subprocess.Popen[bytes]) -> Iterator[_Feeder]:
+    """Run a feeder during the block; both it and the child have ended after the block."""
+    thread = threading.Thread(target=feeder.run, name="crowd")
+    thread.start()
+    try:
+        yield feeder
+    finally:
+        feeder.cancellation.cancel()
+        # A write that waits for the child to read fails once the child has ended.
+        child.kill()
+        thread.join()
+
+
+def _wait(child: subprocess.Popen[bytes]) -> None:
+    while child.poll() is None:
+        cancel.check()
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(POLL_INTERVAL)
+
 
 CHILD_PROCESS_SIZE = 32_000_000
 """Bytes of a layer that usd-core writes in about 0.2 s, in which no other thread runs."""
@@ -50,7 +151,7 @@ def write(
         _write_folder(crowd, path, instancing == "scenegraph", body)
     else:
         with atomic_files.replacing(path) as made:
-            layer_metadata.export_layer(_layer(crowd, _form(ending), instancing, body), made)
+            layers.export_layer(_layer(crowd, _form(ending), instancing, body), made)
 
 
 def stream(
@@ -77,7 +178,7 @@ def stream(
     apart = (
         crowd_size.layer_size_bound(counts, ending, instancing == "flatten") > CHILD_PROCESS_SIZE
     )
-    return (encoding_process.stream if apart else encode_here)(crowd, ending, instancing, body)
+    return (stream_from_child if apart else encode_here)(crowd, ending, instancing, body)
 
 
 def encode_here(
@@ -115,22 +216,22 @@ def _layer(crowd: CrowdClip, form: str, instancing: str, body: BodyKind) -> Any:
 def _single_file(crowd: CrowdClip, ending: str, instancing: str, body: BodyKind) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, f"crowd.{ending}")
-        layer_metadata.export_layer(_layer(crowd, _form(ending), instancing, body), path)
+        layers.export_layer(_layer(crowd, _form(ending), instancing, body), path)
         yield from atomic_files.read_chunks(path)
 
 
 def _usdz(crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
     if instancing != "flatten":
         members = crowd_package.members(crowd, instancing == "scenegraph", body)
-        return zip_archive.zip_chunks(members)
+        return archives.zip_chunks(members)
     return _flat_usdz(crowd, body)
 
 
 def _flat_usdz(crowd: CrowdClip, body: BodyKind) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, "crowd.usdc")
-        layer_metadata.export_layer(crowd_package.flat_layer(crowd, "usdc", body), path)
-        yield from zip_archive.zip_chunks([zip_archive.member_of_file(path.name, path)])
+        layers.export_layer(crowd_package.flat_layer(crowd, "usdc", body), path)
+        yield from archives.zip_chunks([archives.member_of_file(path.name, path)])
 
 
 CROWD_LAYER_NAME = re.compile(r"(m\d{5,}|character|summary)\.usdc")

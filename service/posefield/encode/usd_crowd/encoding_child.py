@@ -2,7 +2,7 @@
 
 `python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING BODY` reads pickles from
 standard input: the crowd without motions, batches of them, and None. It writes the file PATH.
-`encoding_process.stream` starts it.
+`crowd_writer.stream_from_child` starts it.
 """
 
 import pickle
@@ -14,7 +14,7 @@ from typing import IO, cast
 
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.motion.crowd_clip import Motions
-from posefield.question.body_kind import BodyKind
+from posefield.question.motion_question import BodyKind
 
 
 def main() -> None:

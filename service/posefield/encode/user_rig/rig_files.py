@@ -1,21 +1,126 @@
-"""Files of motions of a user's character in every format, and refusals of what they cannot hold."""
+"""Files of motions of a user's character in every format, and refusals of what they cannot hold.
+
+glTF cannot refer to the skin of another file. Engines and three.js bind an animation to the user's
+own file by the names of its nodes, whose local transforms it holds.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, Self
 
+import numpy as np
+
 from posefield.common.errors import InvalidField
-from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode.files.file_convention import METRES, Convention
+from posefield.common.units import Floats, LengthUnit, Singles, UpAxis
+from posefield.encode import glb
+from posefield.encode.conventions import METRES, Convention
 from posefield.encode.formats import ClipEncoder
-from posefield.encode.user_rig import rig_glb, rig_stage
+from posefield.encode.glb import GlbBuffer
+from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
+from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield.question.body_kind import BodyKind
-from posefield.question.motion_question import ClipQuestion
+from posefield.question.motion_question import BodyKind, ClipQuestion
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.results import SampledClip
+from posefield.rigs.rest_joints import RestJoints
 from posefield.rigs.rig import Rig
+
+CONSTANT_TOLERANCE = 1e-9
+"""Largest variation of a joint's translation, in units of the file, that is taken as constant."""
+OUTER = "Armature"
+
+
+def animation_glb(answer: SampledClip, rest: RestJoints) -> bytes:
+    """Return the file: nodes of the joints in the rest pose of the file, and their animation.
+
+    A node above them has the transform from the space of the root joint to the world, unless it
+    is the identity.
+    """
+    store = GlbBuffer()
+    document = {
+        "asset": glb.asset(answer.trust.facts()),
+        "scene": 0,
+        **_nodes(rest),
+        "animations": [_animation(store, answer, rest)],
+    }
+    return glb.container(document, store)
+
+
+def _nodes(rest: RestJoints) -> dict[str, Any]:
+    """Return the scene and its nodes; node j is joint j."""
+    nodes: list[dict[str, Any]] = [
+        {"name": name, "rotation": turn, "translation": place} | _scale(size)
+        for name, turn, place, size in zip(
+            rest.names,
+            rest.rotations[:, [1, 2, 3, 0]].tolist(),
+            rest.translations.tolist(),
+            rest.scales,
+            strict=True,
+        )
+    ]
+    for joint, parent in enumerate(rest.parents[1:], start=1):
+        nodes[parent].setdefault("children", []).append(joint)
+    outer = _outer_node(rest)
+    root = 0
+    if outer:
+        root = len(nodes)
+        nodes.append({"name": _free_name(rest.names), **outer, "children": [0]})
+    return {"scenes": [{"nodes": [root]}], "nodes": nodes}
+
+
+def _free_name(taken: tuple[str, ...]) -> str:
+    found = OUTER
+    while found in taken:
+        found += "_"
+    return found
+
+
+def _outer_node(rest: RestJoints) -> dict[str, Any]:
+    """Return the transform above the root joint; nothing for the identity."""
+    outer = rest.outer
+    found = _scale(outer.scale)
+    if not np.isclose(abs(outer.rotation[0]), 1.0):
+        found["rotation"] = outer.rotation[[1, 2, 3, 0]].tolist()
+    if not np.allclose(outer.translation, 0.0):
+        found["translation"] = outer.translation.tolist()
+    return found
+
+
+def _scale(size: Floats) -> dict[str, Any]:
+    return {} if np.allclose(size, 1.0) else {"scale": size.tolist()}
+
+
+def _animation(store: GlbBuffer, answer: SampledClip, rest: RestJoints) -> dict[str, Any]:
+    """Return channels of all rotations, and of the translations that are not those of the rest."""
+    clip = answer.clip
+    rotations = quat.unroll(quat.normalize(rest.file_rotations(clip.rotations)))
+    translations = rest.file_translations(clip.translations)
+    when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
+    turns = _as_float32(np.moveaxis(rotations, 1, 0)[..., [1, 2, 3, 0]])
+    spread = np.abs(translations - rest.translations).max(axis=(0, 2))
+    moved = [0, *(np.flatnonzero(spread[1:] > CONSTANT_TOLERANCE) + 1).tolist()]
+    paths = _as_float32(np.moveaxis(translations[:, moved], 1, 0))
+    outputs = [
+        *((joint, "rotation", store.add(own, "VEC4")) for joint, own in enumerate(turns)),
+        *(
+            (joint, "translation", store.add(own, "VEC3"))
+            for joint, own in zip(moved, paths, strict=True)
+        ),
+    ]
+    return {
+        "name": "clip",
+        "samplers": [{"input": when, "output": output} for _, _, output in outputs],
+        "channels": [
+            {"sampler": index, "target": {"node": joint, "path": path}}
+            for index, (joint, path, _) in enumerate(outputs)
+        ],
+    }
+
+
+def _as_float32(values: Floats) -> Singles:
+    return np.ascontiguousarray(values, dtype=np.float32)
+
 
 LAYERS = ("usda", "usdc", "usdz")
 """Formats of USD."""
@@ -141,7 +246,7 @@ class RigTarget:
             return _layer_bytes(form.extension, self._layer(answer))
         if form.extension == "glb":
             own = self.rig.rest if self.stage is None else rig_stage.in_metres(self.rig.rest)
-            return rig_glb.animation_glb(answer, own)
+            return animation_glb(answer, own)
         return form.encode(answer, replace(convention, body="none"))
 
     def _layer(self, answer: SampledClip) -> Any:
@@ -155,10 +260,10 @@ class RigTarget:
 
 def _layer_bytes(extension: str, layer: Any) -> bytes:
     from posefield.encode.usd import usd_clip
-    from posefield.encode.usd_layers import layer_metadata
+    from posefield.encode.usd_layers import layers
 
     if extension == "usda":
         text: str = layer.ExportToString()
         return text.encode()
-    binary = layer_metadata.crate_bytes(layer)
+    binary = layers.crate_bytes(layer)
     return binary if extension == "usdc" else usd_clip.usdz_package(binary)

@@ -18,11 +18,11 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 from posefield.common.array_shapes import Bones, JointRotations
 from posefield.common.errors import UsdError
 from posefield.common.units import Floats, Singles
-from posefield.encode.character import joint_names
-from posefield.encode.files.file_convention import METRES, Convention
+from posefield.encode.character import character
+from posefield.encode.conventions import METRES, Convention
 from posefield.encode.usd import character_prims
-from posefield.encode.usd_layers import layer_metadata, prim_specs
-from posefield.encode.usd_layers.prim_specs import ValueTypes
+from posefield.encode.usd_layers import layers
+from posefield.encode.usd_layers.layers import ValueTypes
 from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion import quat
@@ -148,7 +148,7 @@ def referring_layer(answer: SampledClip, rest: RestJoints, stage: RigStage, refe
         schemas = Sdf.TokenListOp.Create(prependedItems=list(character_prims.BINDING_SCHEMAS))
         skeleton.SetInfo("apiSchemas", schemas)
         animation = Sdf.Path(stage.animation)
-        prim_specs.add_relationship(skeleton, "skel:animationSource", animation)
+        layers.add_relationship(skeleton, "skel:animationSource", animation)
         _add_animation(root, animation.name, stage.joints, answer, rest)
     return made
 
@@ -157,11 +157,11 @@ def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
     """Return a layer of the same joints in metres with Y up and their motion, without a skin."""
     own = rig_stage.in_metres(rest)
     made = Sdf.Layer.CreateAnonymous("clip.usda")
-    paths = joint_names.joint_paths(joint_names.legal_names(own.names), own.parents)
+    paths = character.joint_paths(character.legal_names(own.names), own.parents)
     schemas = character_prims.BINDING_SCHEMAS
     with Sdf.ChangeBlock():
         _set_metadata(made, answer, SKELETON_ROOT, METRES)
-        root = prim_specs.prim(made, SKELETON_ROOT, "SkelRoot", schemas)
+        root = layers.prim(made, SKELETON_ROOT, "SkelRoot", schemas)
         root.kind = "component"
         places = answer.clip.positions().reshape(-1, 3)
         box = np.stack([places.min(axis=0), places.max(axis=0)])
@@ -174,8 +174,8 @@ def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
 
 def _set_metadata(made: Any, answer: SampledClip, root: str, convention: Convention) -> None:
     clip = answer.clip
-    layer_metadata.set_layer_metadata(made, root, len(clip), clip.rate, convention)
-    layer_metadata.set_custom_data(made, answer.trust.facts())
+    layers.set_layer_metadata(made, root, len(clip), clip.rate, convention)
+    layers.set_custom_data(made, answer.trust.facts())
 
 
 def _set_extent(made: Any, answer: SampledClip, rest: RestJoints, stage: RigStage) -> None:
@@ -187,25 +187,23 @@ def _set_extent(made: Any, answer: SampledClip, rest: RestJoints, stage: RigStag
 
 
 def _add_extent(root: Any, box: Floats) -> None:
-    value = prim_specs.float3_array(box)
-    prim_specs.varying_attribute(root, "extent", ValueTypes.Float3Array, value)
+    value = layers.float3_array(box)
+    layers.varying_attribute(root, "extent", ValueTypes.Float3Array, value)
 
 
 def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
     """Add a skeleton, whose bind pose is its rest pose."""
-    skeleton = prim_specs.prim(root, "Skel", "Skeleton", character_prims.BINDING_SCHEMAS)
-    prim_specs.add_relationship(root, "skel:skeleton", skeleton.path)
+    skeleton = layers.prim(root, "Skel", "Skeleton", character_prims.BINDING_SCHEMAS)
+    layers.add_relationship(root, "skel:skeleton", skeleton.path)
     places = rest.skeleton.at_rest(rest.skeleton.offsets)
     tokens = {"joints": list(paths), "jointNames": list(rest.names)}
     for name, values in tokens.items():
-        prim_specs.uniform_attribute(skeleton, name, ValueTypes.TokenArray, Vt.TokenArray(values))
+        layers.uniform_attribute(skeleton, name, ValueTypes.TokenArray, Vt.TokenArray(values))
     for name, poses in (
         ("bindTransforms", (rest.orientations, places)),
         ("restTransforms", (rest.rotations, rest.translations)),
     ):
-        prim_specs.uniform_attribute(
-            skeleton, name, ValueTypes.Matrix4dArray, _matrix_array(*poses)
-        )
+        layers.uniform_attribute(skeleton, name, ValueTypes.Matrix4dArray, _matrix_array(*poses))
 
 
 def _matrix_array(rotations: JointRotations, translations: Bones) -> Any:
@@ -224,7 +222,7 @@ def _add_animation(
     made = character_prims.animation(root, name, tuple(joints))
     sizes = Vt.Vec3hArray([Gf.Vec3h(*size) for size in rest.scales.tolist()])
     made.attributes["scales"].default = sizes
-    prim_specs.set_time_samples(made, samples)
+    layers.set_time_samples(made, samples)
 
 
 def _as_float32(values: Floats) -> Singles:

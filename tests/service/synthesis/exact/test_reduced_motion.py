@@ -12,7 +12,7 @@ from posefield.constraints.constraint import (
 )
 from posefield.inference import residual_covariance, session
 from posefield.kriging import leave_one_out
-from posefield.model_file import subgraph
+from posefield.model_file import onnx_file
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 
@@ -112,7 +112,7 @@ def gap(found, trained) -> float:
 def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_exported):
     """The file holds its samples in an order of its own."""
     opened = session.open_bytes(labelled_exported.content, "labelled.onnx")
-    weights = subgraph.initializers(opened.content)
+    weights = onnx_file.initializers(opened.content)
     samples = opened.kriging_weights.samples
     found = residual_covariance.sample_coefficients(opened.card, weights, samples)
     bases = labelled.model.decoder.reduced.bases[2]

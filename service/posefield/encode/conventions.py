@@ -1,4 +1,4 @@
-"""Conventions of files: unit of length, up axis and body, and conversion to them.
+"""Formats of files, and their conventions: unit of length, up axis and body.
 
 For Z up the whole character is rotated with the axes, including the joints' own axes, so that the
 rotations of the rest pose remain the identity: (x, y, z) becomes (x, -z, y), which is exact.
@@ -14,7 +14,30 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, LengthUnit, Singles, UpAxis
 from posefield.motion.clip import Clip
-from posefield.question.body_kind import DEFAULT_BODY, BodyKind
+from posefield.question.motion_question import DEFAULT_BODY, BodyKind
+
+JSON = "application/json"
+ARROW = "application/vnd.apache.arrow.stream"
+MSGPACK = "application/vnd.msgpack"
+# No type is registered for archives of arrays; some browsers would unpack application/zip.
+NPZ = "application/x-npz"
+
+
+@dataclass(frozen=True)
+class Format:
+    """Name and media type of a format; the name is the extension of its files."""
+
+    extension: str
+    media_type: str
+
+
+F = TypeVar("F", bound=Format)
+
+
+def by_extension(*formats: F) -> dict[str, F]:
+    """Return formats by their extensions, in the given order."""
+    return {each.extension: each for each in formats}
+
 
 METRES_PER_UNIT: dict[LengthUnit, float] = {"m": 1.0, "cm": 0.01}
 

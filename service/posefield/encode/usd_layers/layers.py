@@ -1,18 +1,93 @@
-"""Metadata and binary form of USD layers."""
+"""USD layers: their content, metadata and binary form, and helpers that write prims into them."""
 
 import errno
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from pxr import Sdf, Tf, Vt
 
 from posefield.common.errors import FileError
-from posefield.encode.files.file_convention import METRES, Convention
-from posefield.encode.usd_layers.layer_content import LayerContent
+from posefield.common.units import Floats, Singles
+from posefield.encode.conventions import METRES, Convention
+
+Array = npt.NDArray[Any]
+Samples = Mapping[str, Singles]
+"""Samples (F, ...) of attributes at the time codes 0 to F - 1, by name."""
+
+WEIGHTS = "blendShapeWeights"
+"""Name of the samples (F, C) of curves; those of other attributes are vectors (F, N, n)."""
+
+
+class LayerPattern(NamedTuple):
+    """Shapes of a content.
+
+    samples: name and shape. values: name, shape and type. facts: whether it has any.
+    """
+
+    samples: tuple[tuple[str, tuple[int, ...]], ...]
+    values: tuple[tuple[str, tuple[int, ...], str], ...]
+    facts: bool
+
+
+@dataclass(frozen=True)
+class LayerContent:
+    """Content of a layer: samples of attributes, values by name, and facts.
+
+    No number is -0: it counts as equal to 0, and equal samples are stored once.
+    """
+
+    samples: Samples
+    values: Mapping[str, Array]
+    facts: Mapping[str, Any]
+
+    @property
+    def frames(self) -> int:
+        """Return the number of samples of each attribute."""
+        return len(next(iter(self.samples.values())))
+
+    @property
+    def pattern(self) -> LayerPattern:
+        """Return the shapes of the content."""
+        return LayerPattern(
+            tuple((name, rows.shape) for name, rows in self.samples.items()),
+            tuple((name, found.shape, found.dtype.char) for name, found in self.values.items()),
+            bool(self.facts),
+        )
+
+
+class LayerBuilder(Protocol):
+    """Kind of layer; equal kinds build equal layers of equal content."""
+
+    @property
+    def rate(self) -> float:
+        """Return the frames a second."""
+
+    def with_rate(self, rate: float) -> Self:
+        """Return the same kind at other frames a second."""
+
+    def layer(self, content: LayerContent) -> Any:
+        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
+
+    def __hash__(self) -> int: ...
+
+
+def first_frame(content: LayerContent) -> LayerContent:
+    """Return the content with the first sample of each attribute alone."""
+    return replace(content, samples={name: rows[:1] for name, rows in content.samples.items()})
+
+
+def random_content(pattern: LayerPattern, facts: Mapping[str, Any], seed: int) -> LayerContent:
+    """Return a content of these shapes with these facts, and values at random that all differ."""
+    rng = np.random.default_rng(seed)
+    samples = {name: rng.standard_normal(shape, np.float32) for name, shape in pattern.samples}
+    values = {n: rng.standard_normal(shape).astype(kind) for n, shape, kind in pattern.values}
+    return LayerContent(samples, values, facts)
+
 
 LARGEST_INTEGER = 2**63 - 1
 """Largest integer that every reader of a layer supports."""
@@ -184,3 +259,64 @@ def export_layer(made: Any, path: Path) -> None:
         made.Export(str(path), args={"format": form})
     except Tf.ErrorException as fault:
         raise OSError(errno.EIO, str(fault.args[0].commentary)) from fault
+
+
+ValueTypes = Sdf.ValueTypeNames
+
+
+def prim(parent: Any, name: str, kind: str, apis: Sequence[str] = ()) -> Any:
+    """Return a new prim of a schema with applied API schemas."""
+    spec = Sdf.PrimSpec(parent, name, Sdf.SpecifierDef, kind)
+    if apis:
+        spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=list(apis)))
+    return spec
+
+
+def varying_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
+    """Return a new varying attribute, with a default value unless it is None."""
+    spec = Sdf.AttributeSpec(owner, name, kind)
+    if value is not None:
+        spec.default = value
+    return spec
+
+
+def uniform_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> None:
+    """Create an attribute that does not vary over time, with a value unless it is None."""
+    spec = Sdf.AttributeSpec(owner, name, kind, Sdf.VariabilityUniform)
+    if value is not None:
+        spec.default = value
+
+
+def vertex_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
+    """Return a new attribute with one element per point of a mesh."""
+    spec = varying_attribute(owner, name, kind, value)
+    spec.SetInfo("interpolation", "vertex")
+    return spec
+
+
+def add_relationship(owner: Any, name: str, *targets: Any) -> None:
+    """Create a relationship to the prims at paths."""
+    spec = Sdf.RelationshipSpec(owner, name, custom=False)
+    spec.targetPathList.explicitItems = list(targets)
+
+
+def float3_array(values: Floats) -> Any:
+    """Return a float3[] of an array (N, 3)."""
+    return Vt.Vec3fArray.FromNumpy(values.astype(np.float32))
+
+
+def set_time_samples(prim: Any, values: Samples, first: int = 0) -> None:
+    """Set the time samples of translations, rotations and weights, if any, of a SkelAnimation.
+
+    first: time code of the first sample.
+    """
+    kinds = {"translations": Vt.Vec3fArray, "rotations": Vt.QuatfArray, WEIGHTS: Vt.FloatArray}
+    for name, kind in kinds.items():
+        if name in values:
+            _set_attribute_samples(prim, name, map(kind.FromNumpy, values[name]), first)
+
+
+def _set_attribute_samples(prim: Any, name: str, values: Iterable[Any], first: int) -> None:
+    layer, path = prim.layer, prim.path.AppendProperty(name)
+    for frame, value in enumerate(values, first):
+        layer.SetTimeSample(path, frame, value)

@@ -1,7 +1,8 @@
-"""Batching of concurrent clips in a thread: their synthesis and encoding, or their encoding alone.
+"""Batching of concurrent requests: poses into one inference call, clips in a thread.
 
-Clips of a batch share much of the work, and a thread switch takes a tenth of a millisecond. There
-is no timer: requests that arrive during a batch form the next one.
+There is no timer. A batch of poses holds the requests of one iteration of the event loop. Clips of
+a batch share much of the work, and a thread switch takes a tenth of a millisecond: those that
+arrive during a batch form the next one.
 """
 
 import asyncio
@@ -14,15 +15,16 @@ from typing import Any, NamedTuple
 from anyio import to_thread
 
 from posefield.common import cancellation
-from posefield.encode.files.file_convention import Convention
+from posefield.encode.conventions import Convention
 from posefield.encode.formats import ClipEncoder
-from posefield.http.concurrency import worker_threads
+from posefield.http import metrics, worker_threads
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clip_batch, clips
+from posefield.synthesis import clip_batch, clips, poses
+from posefield.synthesis.poses import OutputRow, PreparedPoseQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
-MAX_BATCH = 32
+MAX_CLIPS = 32
 """Maximum clips of a batch: all of its requests wait for the whole batch, some 15 ms."""
 
 MAX_BATCHED_FRAMES = 1000
@@ -91,8 +93,8 @@ class ClipBatcher:
 
     async def _work(self, key: Hashable, work: Work) -> None:
         while waiting := self._waiting[key]:
-            self._waiting[key] = waiting[MAX_BATCH:]
-            await _work_batch(work, waiting[:MAX_BATCH])
+            self._waiting[key] = waiting[MAX_CLIPS:]
+            await _work_batch(work, waiting[:MAX_CLIPS])
         del self._waiting[key]
 
 
@@ -139,3 +141,72 @@ async def _work_batch(work: Work, own: Pending) -> None:
             future.set_exception(result)
         else:
             future.set_result(result)
+
+
+MAX_POSES = 64
+"""Maximum size of a batch: larger ones do not reduce the cost per pose."""
+
+PendingPoses = list[tuple[PreparedPoseQuestion, "Future[OutputRow]"]]
+
+
+class PoseBatcher:
+    """Batches of the current iteration of an event loop."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[tuple[str, int], tuple[Synthesizer, PendingPoses]] = {}
+        self._arrived = self._previous = 0
+
+    async def row(self, model: Synthesizer, asked: PreparedPoseQuestion) -> OutputRow:
+        """Return the graph's output for a question; the batch does not affect its bytes.
+
+        A question is batched if it is for one time, the model's level is exact in batches, and the
+        previous iteration had at least two questions.
+        """
+        self._count_arrival()
+        if (
+            self._previous < 2
+            or len(asked.when) > 1
+            or not poses.is_batch_exact(model, asked.level)
+        ):
+            metrics.count_inference(1)
+            return poses.run_batch(model, [asked])[0]
+        return await self._enqueue(model, asked)
+
+    def _count_arrival(self) -> None:
+        """Count the questions of an iteration, which predict the number in the next one."""
+        if not self._arrived:
+            asyncio.get_running_loop().call_soon(self._end_iteration)
+        self._arrived += 1
+
+    def _end_iteration(self) -> None:
+        self._previous, self._arrived = self._arrived, 0
+
+    def _enqueue(self, model: Synthesizer, asked: PreparedPoseQuestion) -> "Future[OutputRow]":
+        loop = asyncio.get_running_loop()
+        if not self._waiting:
+            loop.call_soon(self._evaluate_batches)
+        # Keyed by identity: requests may be for two versions of a model at the same time.
+        key = model.identity, asked.level
+        future: Future[OutputRow] = loop.create_future()
+        self._waiting.setdefault(key, (model, []))[1].append((asked, future))
+        return future
+
+    def _evaluate_batches(self) -> None:
+        waiting, self._waiting = self._waiting, {}
+        for model, own in waiting.values():
+            for first in range(0, len(own), MAX_POSES):
+                _evaluate_batch(model, own[first : first + MAX_POSES])
+
+
+def _evaluate_batch(model: Synthesizer, own: PendingPoses) -> None:
+    metrics.count_inference(len(own))
+    try:
+        rows = poses.run_batch(model, [asked for asked, _ in own])
+    except Exception as fault:
+        for _, future in own:
+            if not future.done():
+                future.set_exception(fault)
+        return
+    for (_, future), row in zip(own, rows, strict=True):
+        if not future.done():
+            future.set_result(row)

@@ -1,1 +1,0 @@
-"""Properties of files: media types, unit and axes, archives."""

@@ -1,1 +1,0 @@
-"""Threads of a worker, batching of concurrent requests, and whether it is ready for them."""

@@ -1,1 +1,0 @@
-"""Decoding of requests to questions."""

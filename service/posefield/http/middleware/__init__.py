@@ -1,1 +1,0 @@
-"""HTTP features of every request: caching, compression, CORS, negotiation, deadlines."""
