@@ -213,13 +213,6 @@ def test_a_file_without_keys_lets_nobody_start(tmp_path):
         create_app(ModelRegistry({}), Settings(keys_file=str(tmp_path / "nowhere")))
 
 
-@pytest.mark.parametrize("missing", ["jwt_keys", "jwt_issuer", "jwt_audience"])
-def test_half_of_what_tokens_need_is_refused(missing, signed):
-    trusted = {**signed[0], missing: ""}
-    with pytest.raises(InvalidField, match=f"POSEFIELD_{missing.upper()}: missing"):
-        create_app(ModelRegistry({}), Settings(**trusted))
-
-
 def test_an_algorithm_of_shared_secrets_is_refused(signed):
     for algorithm in ("HS256", "none", "rs256"):
         with pytest.raises(InvalidField, match="POSEFIELD_JWT_ALGORITHM"):

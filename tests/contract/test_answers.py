@@ -12,7 +12,6 @@ from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import build_app
 from posefield.http.operations import OPERATIONS
-from posefield.model_file import model_card as cards
 from posefield.question.motion_question import PoseQuestion
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis import poses
@@ -23,12 +22,6 @@ FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpac
 
 def url(path, controls, **more):
     return f"{path}?{urlencode({**controls, **more}, doseq=True)}"
-
-
-def test_the_card_is_the_whole_card(ask, loaded):
-    model = loaded.find("reach")
-    card = json.loads(json.dumps(cards.plain_values(model.session.card)))
-    assert ask("GET", "/v1/models/reach").json() == {"identity": model.identity, **card}
 
 
 @pytest.mark.parametrize("extension", FORMATS)

@@ -6,7 +6,6 @@ import openapi_spec_validator
 import pytest
 import yaml
 
-from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api import contract, problems
 from posefield.http.api.settings import Settings
 from posefield.http.app import build_app
@@ -48,11 +47,6 @@ def test_formats_and_media_types_are_those_of_the_encoders(name):
     assert all(form == each.extension for form, each in OPERATIONS[name].formats.items())
     assert sorted(operation.media_types) == sorted(encoders.values())
     assert operation.formats == (encoders if "{format}" in operation.path else {})
-
-
-def test_many_clips_have_the_formats_of_one(spec):
-    schemas = spec["components"]["schemas"]
-    assert schemas["ClipsQuestion"]["properties"]["format"]["enum"] == [*CLIP_ENCODERS]
 
 
 def changed(spec, change):

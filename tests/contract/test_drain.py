@@ -83,15 +83,6 @@ def opened_for_good(child):
     return wire
 
 
-def test_an_open_request_is_answered_before_the_end(models):
-    with process(models, POSEFIELD_DRAIN="0") as child, opened_for_good(child) as wire:
-        child.send_signal(signal.SIGTERM)
-        time.sleep(0.5)
-        wire.sendall(b"{}")
-        assert wire.recv(65536).startswith(b"HTTP/1.1 400 ")
-        assert child.wait(20) == 0
-
-
 def test_what_takes_too_long_is_cut_off(models):
     with process(models, POSEFIELD_GRACE="1", POSEFIELD_DRAIN="0") as child:
         with opened_for_good(child) as wire:

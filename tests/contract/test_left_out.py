@@ -76,9 +76,3 @@ def test_a_file_says_it_in_a_header(extension, ask, chosen, controls):
         assert found.content == whole.content
     else:
         assert b"inferred" in found.content and b"inferred" not in whole.content
-
-
-def test_a_crowd_needs_every_control(ask):
-    refused = ask("POST", f"{MODEL}/crowd.json", json={"controls": GIVEN, "time": 0})
-    assert refused.status_code == 422, refused.text
-    assert refused.json()["errors"][0]["pointer"] == "/controls/stature"

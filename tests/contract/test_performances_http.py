@@ -2,7 +2,7 @@
 
 import bad_scripts
 import pytest
-from bad_scripts import ABSENT, REFUSED, UNREADABLE
+from bad_scripts import REFUSED, UNREADABLE
 
 from posefield.encode import performance_files
 
@@ -24,13 +24,6 @@ def test_a_bad_script_is_a_problem_with_a_pointer(ask, scripts, status):
     assert [own["pointer"] for own in found["errors"]] == [pointer]
     assert words in found["errors"][0]["detail"]
     assert len(found["detail"]) < 1000
-
-
-def test_an_absent_model_is_not_found(ask):
-    document, pointer = next(iter(ABSENT.values()))
-    found = assert_problem(ask("POST", ADDRESS, json=document), 404)
-    assert [own["pointer"] for own in found["errors"]] == [pointer]
-    assert "there are reach@" in found["errors"][0]["detail"]
 
 
 def test_a_plan_is_json(ask):

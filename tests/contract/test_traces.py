@@ -1,6 +1,5 @@
 """Tests of OpenTelemetry spans: one per request, in the client's trace, sent to the endpoint."""
 
-import sys
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlencode
@@ -14,8 +13,6 @@ from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from serving import address, process
 
-from posefield.common.errors import InvalidField
-from posefield.http import telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.telemetry import Telemetry, Tracer
@@ -81,10 +78,3 @@ def test_spans_reach_the_endpoint_that_is_set(models, collector):
         child.terminate()
         assert child.wait(20) == 0
     assert names == ["GET getLiveness"]
-
-
-def test_an_endpoint_without_the_sdk_is_an_error(monkeypatch):
-    monkeypatch.setitem(sys.modules, "opentelemetry.sdk.trace", None)
-    environ = {"OTEL_EXPORTER_OTLP_ENDPOINT": "http://127.0.0.1:1"}
-    with pytest.raises(InvalidField, match=r"expected posefield\[trace\]"):
-        telemetry.environment_tracer(environ)

@@ -11,7 +11,7 @@ import pytest
 from asking import asker
 from prometheus_client.parser import text_string_to_metric_families
 
-from posefield.http import metrics, telemetry
+from posefield.http import telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.telemetry import Telemetry
@@ -136,10 +136,3 @@ def test_lines_are_written_whole():
     assert [len(piece) for piece in pieces] == [4000, 4000, 2000, 9000, 4000, 4000, 2000]
     lines = [json.loads(line) for line in b"".join(pieces).splitlines()]
     assert lines == [*[short] * 100, long, *[short] * 100]
-
-
-def test_a_version_that_is_gone_is_shown_to_be():
-    metrics.set_models(["gone@0123456789abcdef"], {})
-    metrics.set_models([], {})
-    page = metrics.metrics_text().decode()
-    assert 'posefield_model{hash="0123456789abcdef",model="gone"} 0.0' in page

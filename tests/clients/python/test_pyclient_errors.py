@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import pickle
 
 import pytest
 import scripted
@@ -17,12 +16,6 @@ from posefield.http.api import problems
 from posefield.http.api.problems import PROBLEM_KINDS
 
 LIST = b'{"models": []}'
-
-
-def subclasses(kind):
-    for each in kind.__subclasses__():
-        yield each
-        yield from subclasses(each)
 
 
 def raised(address, ask=lambda client: client.models(), retry=NEVER, **given):
@@ -84,13 +77,6 @@ def test_a_kind_that_is_newer_than_the_client_is_a_problem():
         fault = raised(server.address)
     assert type(fault) is Problem
     assert fault.kind == "moon-too-full"
-
-
-def test_what_can_help_to_ask_again_is_asked_again():
-    again = {each.__name__ for each in subclasses(PosefieldError) if each.again}
-    busy = {kind.name.replace("-", "") for kind in problems.LOAD_PROBLEMS} | {"busy"}
-    network = {"unreachable", "timedout", "broken", "incompleteanswer"}
-    assert {name.lower() for name in again} == busy | network
 
 
 FAR = {"joint": "RightHand", "position": (0, 1, 5), "at": "end"}
@@ -225,12 +211,3 @@ def test_a_gateways_own_problem_is_asked_again(said, kind, status):
         assert type(fault) is kind
         assert fault.again
         assert fault.retry_after == 7
-
-
-def test_errors_travel_between_processes():
-    version = answer(b'{"contract": "9.1.0"}')
-    with scripted.serving(refusal(PROBLEM_KINDS[0]), answer(b"{}"), version) as server:
-        for fault in (raised(server.address), raised(server.address)):
-            again = pickle.loads(pickle.dumps(fault))
-            assert type(again) is type(fault)
-            assert (str(again), vars(again)) == (str(fault), vars(fault))

@@ -165,14 +165,6 @@ def test_arrays_that_do_not_fit_each_other_are_no_answer(wrong):
         read(packed(POSE | wrong))
 
 
-def test_arrays_cannot_be_written_to_and_show_their_shapes(address, controls):
-    with Client(address) as client:
-        pose = client.model("reach").pose([0, 0.1], **controls)
-    with pytest.raises(ValueError, match="read-only"):
-        pose.rotations[0] = 0
-    assert "times=<float64 (2,)>" in repr(pose) and "trust=<reach@" in repr(pose)
-
-
 def test_a_card_is_asked_for_once(address):
     with Client(address) as client:
         model = client.model("reach")

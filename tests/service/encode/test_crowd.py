@@ -4,7 +4,7 @@ import conftest
 import crowds
 import numpy as np
 import pytest
-from pxr import Kind, Usd, UsdGeom, UsdSkel
+from pxr import Usd, UsdGeom, UsdSkel
 from usd_checks import defects
 
 from posefield.encode.character import character
@@ -117,18 +117,6 @@ def skinned(prim, frame):
 def stands(prim, points):
     matrix = np.array(UsdGeom.XformCache(0).GetLocalToWorldTransform(prim))
     return points @ matrix[:3, :3] + matrix[3, :3]
-
-
-def test_the_model_hierarchy_is_assembly_group_components(stage):
-    models = {str(prim.GetPath()): Usd.ModelAPI(prim).GetKind() for prim in stage.Traverse()}
-    found = {path: kind for path, kind in models.items() if kind}
-    assert found == {
-        "/Crowd": Kind.Tokens.assembly,
-        "/Crowd/Characters": Kind.Tokens.group,
-        **{f"/Crowd/Characters/c{i:05}": Kind.Tokens.component for i in range(len(MOTION))},
-    }
-    assert all(stage.GetPrimAtPath(path).IsModel() for path in found)
-    assert stage.GetDefaultPrim().GetPath() == "/Crowd"
 
 
 def test_instances_share_one_prototype_and_others_none(stage, instancing):

@@ -148,15 +148,6 @@ def watch(batch, earlier):
     return copy
 
 
-@pytest.mark.parametrize(("ending", "instancing"), [("usdc", "references"), ("usdz", "flatten")])
-def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, temporary):
-    sent = crowd_writer.stream(clip, ending, instancing)
-    next(sent)
-    assert contents(temporary) != {}
-    sent.close()
-    assert list(temporary.iterdir()) == []
-
-
 # Names of fields that come into being before usd-core is loaded have addresses in the order given.
 PRINT_DIGESTS = """
 import sys

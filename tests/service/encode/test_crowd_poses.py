@@ -16,7 +16,6 @@ from posefield.motion.crowd_clip import CrowdPoses
 TENSORS = ("rotations", "root_position", "bone_offsets")
 NUMBERS = ("duration", "sigma", "supported", "levels", "error_px")
 TYPES = {"levels": np.int8, "supported": np.bool_}
-UNITS = ("length", "time", "rotation", "up", "frame", "error_px")
 
 
 def crowd(skeleton, characters):
@@ -94,17 +93,6 @@ def test_every_bit_comes_back(extension, poses):
         assert np.array_equal(columns[name], getattr(poses, name)), name
         assert columns[name].dtype == TYPES.get(name, np.float32), name
     assert not np.array_equal(columns["rotations"][::-1], poses.rotations)
-
-
-@pytest.mark.parametrize("extension", READERS)
-def test_a_block_says_what_it_is(extension, poses):
-    _, facts = READERS[extension](poses)
-    assert facts["model"] == poses.model
-    assert tuple(facts["names"]) == poses.skeleton.names
-    assert tuple(facts["parents"]) == poses.skeleton.parents
-    assert tuple(facts["warnings"]) == poses.warnings
-    assert facts["units"]["rotation"].startswith("unit quaternion w x y z")
-    assert set(UNITS) < set(facts["units"])
 
 
 def test_arrow_is_read_without_a_copy(poses):

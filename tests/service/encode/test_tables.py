@@ -4,7 +4,6 @@ import dataclasses
 import io
 import json
 import zipfile
-from contextvars import copy_context
 
 import msgpack
 import numpy as np
@@ -12,8 +11,6 @@ import orjson
 import pyarrow as pa
 import pytest
 
-from posefield.common import cancellation
-from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import npz_archive
@@ -110,18 +107,6 @@ def test_large_arrays_are_written_in_pieces_that_do_not_show():
     expected = orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
     assert tables.json_object(content) == expected
     assert tables.json_object({}) == b"{}"
-
-
-def test_writing_large_arrays_stops_when_it_is_cancelled():
-    own = Cancellation()
-    context = copy_context()
-    context.run(cancellation.current.set, own)
-    small, large = {"a": np.zeros(4)}, {"a": np.zeros(tables.JSON_BLOCK + 1)}
-    assert context.run(tables.json_object, large)
-    own.cancel()
-    assert context.run(tables.json_object, small)
-    with pytest.raises(Cancelled):
-        context.run(tables.json_object, large)
 
 
 ARRAYS = {

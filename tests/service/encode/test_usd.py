@@ -106,14 +106,6 @@ def test_joints_have_legal_unique_leaf_names_and_keep_their_own(stage, walk):
     assert list(value(stage, "/Anim.joints")) == list(joints)
 
 
-def test_neighbouring_quaternions_have_one_sign(stage, walk):
-    rotations = stage.GetAttributeAtPath("/Character/Anim.rotations")
-    found = np.array([rotations.Get(frame) for frame in range(len(walk.clip))])
-    assert np.all(np.sum(found[1:] * found[:-1], axis=-1) > 0)
-    given = walk.clip.rotations
-    assert np.any(np.sum(given[1:] * given[:-1], axis=-1) < 0)
-
-
 def test_usd_skins_the_body_as_we_blend_its_joints_and_within_the_extent(stage, walk):
     points, joints, extent = skinned(stage)
     weights = np.array(value(stage, "/Body.primvars:skel:jointWeights")).reshape(joints.shape)

@@ -22,16 +22,6 @@ def test_the_archive_holds_the_binary_layer_alone(archive, walk):
         assert found.read(entry) == CLIP_ENCODERS["usdc"].encode(walk)
 
 
-def test_data_are_aligned_after_a_name_of_any_length():
-    for length in range(1, 65):
-        data = b"".join(archives.zip_chunks([archives.whole("n" * length, b"data")]))
-        start = data.index(b"data")
-        # A local header has 30 bytes, then come the name and the padding, an extra field.
-        padding = data[30 + length : start]
-        assert start % 64 == 0
-        assert len(padding) == 4 + int.from_bytes(padding[2:4], "little")
-
-
 def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):
     contents = {"root.usdc": b"r" * 1000, "folder/a.usdc": b"", "folder/long name.usdc": b"z" * 65}
     lying = tmp_path / "lying"

@@ -103,17 +103,3 @@ def test_workers_of_another_version_are_refused(words, cluster, tmp_path):
     done = python(OTHER, *words(tmp_path / "made", "--scheduler", cluster.address))
     assert done.returncode == 2
     assert re.search(r"posefield: tcp://\S+: posefield \S+, expected 0; finished", done.stderr)
-
-
-@pytest.mark.parametrize(
-    "address",
-    [
-        "tcp://127.0.0.1:1",
-    ],
-)
-def test_a_scheduler_that_does_not_answer_is_named(words, tmp_path, address):
-    done = python(MAIN, *words(tmp_path / "made", "--scheduler", address))
-    assert done.returncode == 2
-    said = "no Dask scheduler answers within 10 s, expected tcp://HOST:PORT; "
-    assert done.stderr.startswith(f"posefield: {address}: {said}")
-    assert not (tmp_path / "made").exists()

@@ -153,14 +153,3 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
     outcome = run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, watch)
     assert watch.begun[1] >= 8
     assert (outcome.facts["clips"], outcome.facts["skipped"]) == (ROWS - 2, 1)
-
-
-@pytest.mark.system
-def test_a_model_replaced_meanwhile_changes_nothing(undisturbed, source, model_path, tmp_path):
-    model = shutil.copy(model_path, tmp_path / "reaching.onnx")
-    work = exporting.work(model, source, tmp_path / "target")
-    watch = exporting.Recorder()
-    watch.advance = lambda part: model.write_bytes(b"another")
-    assert run.run(work, source, watch, process_pool.runner(2)).facts is not None
-    assert model.read_bytes() == b"another"
-    assert exporting.content(tmp_path / "target") == exporting.content(undisturbed)

@@ -1,7 +1,5 @@
 """Tests of exports to an S3 object store in a separate process."""
 
-import os
-
 import exporting
 import pytest
 import stores
@@ -107,11 +105,3 @@ def test_a_large_file_goes_in_pieces_and_what_breaks_off_is_not_there(bucket):
     with pytest.raises(KeyError):
         store.stream("broken", broken())
     assert store.read("broken") is None
-
-
-def test_credentials_come_from_the_environment(bucket, monkeypatch):
-    """Negative control: with another address in it the server is not found."""
-    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setitem(os.environ, "AWS_MAX_RETRIES", "0")
-    with pytest.raises(FileError, match="cannot be written or read"):
-        StoreTarget(bucket).read("a")

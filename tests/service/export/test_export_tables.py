@@ -2,8 +2,6 @@
 
 import codecs
 import json
-import subprocess
-import sys
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -17,19 +15,6 @@ from posefield.registry import model_registry
 HEADING = "stature,hip_height,turn,target_height"
 ROW = "1.7,0.9,10,1.0"
 OK = json.dumps(POINT)
-HIDDEN = """
-import sys
-sys.modules["pyarrow"] = None
-from pathlib import Path
-from posefield.batch.rows import Defaults, SourceOptions, open_source
-from posefield.common.errors import FileError
-from posefield.registry import model_registry
-model = model_registry.load([Path(sys.argv[1])]).models["labelled"]
-try:
-    open_source(SourceOptions(Path(sys.argv[2])), Defaults("usdc"), model)
-except FileError as fault:
-    print(fault)
-"""
 
 
 @pytest.fixture(scope="module")
@@ -143,13 +128,6 @@ def test_a_row_that_is_no_query_is_named_by_its_line(model, tmp_path, more, line
     assert message.startswith(said)
 
 
-def test_a_row_of_several_lines_is_named_by_its_first(model, tmp_path):
-    path = text(tmp_path / "q.csv", "turn,name", '10,"a\nb"', "10,", "x,", '10,"a', "10,")
-    *found, (place, message) = faults(model, path)
-    assert [place for place, _ in found] == ["q.csv:2", "q.csv:5"]
-    assert (place, message) == ("q.csv:6", "not CSV: unexpected end of data")
-
-
 @pytest.mark.parametrize(
     ("line", "said"),
     [
@@ -195,14 +173,3 @@ def test_a_file_that_is_no_parquet_is_refused(model, tmp_path, cut):
     path.write_bytes(path.read_bytes()[:cut])
     with pytest.raises(FileError, match=r"q.parquet: cannot be read as Parquet: "):
         source(model, path)
-
-
-def test_without_pyarrow_the_extra_is_named(labelled_path, tmp_path):
-    path = write_parquet(tmp_path / "q.parquet", [POINT])
-    done = subprocess.run(
-        [sys.executable, "-c", HIDDEN, labelled_path, path],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout == f'{path}: needs pyarrow to be read: pip install "posefield[parquet]"\n'

@@ -1,9 +1,7 @@
 """Tests of archives of many clips: generation in batches, and the manifest."""
 
 import dataclasses
-import hashlib
 
-import orjson
 import pytest
 
 from posefield.batch import clip_archive
@@ -62,17 +60,3 @@ def test_a_batch_is_made_when_its_first_file_is_taken(order):
     assert len(made) == 1
     next(members)
     assert len(made) == 2
-
-
-def test_the_manifest_lists_the_files_in_order(order):
-    ordered, _ = order
-    *files, (name, content) = clip_archive.archive_members(ordered([10, 20]))
-    assert name == clip_archive.MANIFEST
-    lines = [orjson.loads(line) for line in content.splitlines()]
-    assert [(line["name"], line["file"]) for line in lines] == [
-        ("c0", "c0.json"),
-        ("c1", "c1.json"),
-    ]
-    assert [(line["file"], line["sha256"]) for line in lines] == [
-        (file, hashlib.sha256(data).hexdigest()) for file, data in files
-    ]

@@ -116,21 +116,6 @@ def test_processes_give_the_same_bytes(batch, scripts, tmp_path, models):
     assert contents(tmp_path / "several") == contents(tmp_path / "out")
 
 
-def test_the_command_performs_many(posefield, scripts, models, tmp_path):
-    words = ("perform", scripts, "--model", models, "-o", tmp_path / "out", "--workers", 1)
-    code, said, _ = posefield(*words, "--format", "glb")
-    assert code == 0 and said.startswith(f"{tmp_path}/out: 3 performances, 0.")
-    code, said, _ = posefield(*words, "--format", "glb", "--json")
-    assert json.loads(said) | {"bytes": 0} == {
-        "target": str(tmp_path / "out"),
-        "performances": 3,
-        "bytes": 0,
-        "warned": 0,
-        "before": 3,
-    }
-    assert (tmp_path / "out/performances/slow.glb").read_bytes().startswith(b"glTF")
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
