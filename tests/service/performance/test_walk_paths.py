@@ -57,9 +57,8 @@ def test_the_way_around_a_disc_is_nearly_the_shortest():
     corners = walk_request.way_around(0j, 10.0 + 0j, [Disc(0.0, 5.0, 1.0)], 0.0)
     way = np.array([0j, *corners, 10.0 + 0j])
     # A smaller disc with a clearance leads as far around.
-    assert walk_request.way_around(0j, 10.0 + 0j, [Disc(0.0, 5.0, 0.7)], 0.3) == pytest.approx(
-        corners
-    )
+    spared = walk_request.way_around(0j, 10.0 + 0j, [Disc(0.0, 5.0, 0.7)], 0.3)
+    assert spared == pytest.approx(corners)
     # Two tangents and an arc.
     tangent, arc = np.sqrt(24.0), np.arcsin(0.2)
     assert np.abs(np.diff(way)).sum() == pytest.approx(2.0 * (tangent + arc), rel=0.01)

@@ -234,6 +234,11 @@ def test_hands_stay_at_goals_that_last(walk, figure, onto):
     ends = tuple(HandGoal("leftHand", time, goal) for time in (0.45, 0.55))
     other = place(onto(tall, RetargetSettings(hands=ends)).clip, "LeftHand")
     assert np.linalg.norm(other - goal, axis=-1)[27:34].max() > 3e-3
+    far = HandGoal("leftHand", 0.45, goal + np.array([0.0, 0.0, 5.0]), 0.55)
+    missing = onto(tall, RetargetSettings(hands=(far,)))
+    away = np.linalg.norm(place(missing.clip, "LeftHand") - far.position, axis=-1)[27:34]
+    assert missing.report.hands_missed[0] == pytest.approx(away.max(), abs=1e-4)
+    assert np.ptp(away) > 1e-3
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from model_files import numbered
 from posefield.common.errors import ModelError, UnknownModel
 from posefield.inference.trial_process import TrialLimits
 from posefield.model_file import checked_file
+from posefield.registry import model_registry
 from posefield.registry.model_registry import ReloadingRegistry, VersionLimits
 
 ROOM = VersionLimits()
@@ -151,6 +152,7 @@ def test_what_is_held_no_longer_is_freed(put, tmp_path):
 def test_a_folder_of_versions_answers_with_the_highest_and_holds_the_next(put, tmp_path):
     digests = {n: put(f"walk/{n}.onnx", n) for n in (2, 10, 9, 1)}
     shelf = ReloadingRegistry([tmp_path], ROOM)
+    assert model_registry.load([tmp_path]).find("walk").session.digest == digests[10]
     assert [m.session.digest for m in shelf.registry.versions("walk")] == [
         digests[n] for n in (10, 9, 2)
     ]
