@@ -7,6 +7,7 @@ import pytest
 import rig_files
 
 from posefield.common.errors import InvalidField
+from posefield.feet.stances import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
@@ -101,6 +102,14 @@ def test_feet_stand_on_other_proportions(figure, onto, kind):
     knee = place(made.clip, "LeftLeg")
     assert np.abs(np.diff(knee, 2, axis=0)).max() < 0.03
     assert np.abs(np.diff(made.clip.root_path, 2, axis=0)).max() < 0.01
+
+
+def test_a_foot_stands_where_copied_orientations_put_it_on_average():
+    copied, still = np.zeros((20, 1, 3)), np.zeros((20, 1, 3))
+    copied[:, 0, 2] = np.linspace(0.0, 0.2, 20)
+    feet = planted_legs.SourceFeet(("leftFoot",), still, ((Interval(8, 18),),), np.zeros(1))
+    found = planted_legs.plan_paths(feet, copied, np.zeros(1), 60.0)
+    assert found[8:18, 0, 2] == pytest.approx(copied[8:18, 0, 2].mean())
 
 
 def test_told_stances_are_kept(walk, figure, onto):
