@@ -11,7 +11,7 @@ from family import Family
 from rows import Row
 from timing import in_turn
 
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 

@@ -9,9 +9,9 @@ import numpy as np
 from rows import Row
 
 from posefield.locomotion import walking_crowd
-from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
-from posefield.motion.crowd_clip import Motions
+from posefield.locomotion.walking_crowd import CrowdOrder
+from posefield.motion.clip import Motions
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 

@@ -9,7 +9,7 @@ from crowd_scene import AUTO, SEEN, Scene
 from rows import Row
 from timing import in_turn
 
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 

@@ -22,7 +22,7 @@ from scipy.interpolate import RBFInterpolator
 from timing import in_turn
 
 from posefield.common.units import Indices, Singles
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield.inference.level_selection import Camera, LevelCriteria
-from posefield.motion.crowd_clip import CrowdPoses, Placement
+from posefield.motion.clip import CrowdPoses, Placement
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.crowd_validation import CrowdQuestion

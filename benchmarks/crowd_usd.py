@@ -18,7 +18,7 @@ from posefield.common.units import Indices
 from posefield.encode.character import character
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.motion import quat
-from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.clip import CrowdClip, Motions, Placement
 from posefield.motion.skeleton import Skeleton
 
 CHARACTERS, FRAMES, JOINTS, SHARED, BATCH = 500, 100, 31, 20, 50

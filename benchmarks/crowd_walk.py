@@ -15,8 +15,8 @@ from timing import in_turn
 
 from posefield.common.units import Floats, Indices, Singles
 from posefield.inference import level_selection
-from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.level_selection import Camera
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.locomotion import floor_plane, stride, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan

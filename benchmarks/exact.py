@@ -13,7 +13,7 @@ from posefield.constraints import constrained_motion
 from posefield.constraints.constrained_motion import LevelCorrector
 from posefield.constraints.constraint import PositionConstraint
 from posefield.inference import session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import PredictionState, Session
 from posefield.motion.measures import Measure
 

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 from rows import Row, record, table
 
-from posefield.feet import body_plans, contact_estimates, foot_placement, limb_choice
+from posefield.feet import body_plans, foot_placement, footsteps, stance_rows
 from posefield.feet.footsteps import Character, SampledMotion
 from posefield.feet.stances import FootPath
+from posefield.motion import contact_detection
 from posefield.motion.clip import Clip
-from posefield.motion.contacts import contact_detection
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield.performance import join_quality, joins
 from posefield.performance.join_quality import JoinFacts, UsualMotion
 from posefield.performance.joins import Blend, Cut
@@ -112,12 +112,12 @@ def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
     )[::every]
     bones = clip.translations[0].copy()
     bones[0] = 0.0
-    chosen = limb_choice.choose_limbs(clip.skeleton.parents, bones, joints, ()).character
+    chosen = footsteps.choose_limbs(clip.skeleton.parents, bones, joints, ()).character
     known = []
     for foot, joint in enumerate(joints):
         path = FootPath(paths[::every, foot], RATE)
-        down = contact_estimates.from_probabilities([path], contacts[:, [foot]].astype(float))[0]
-        known.append(contact_estimates.statistics(joint, path, down))
+        down = stance_rows.from_probabilities([path], contacts[:, [foot]].astype(float))[0]
+        known.append(stance_rows.statistics(joint, path, down))
     passage = Passage(
         clip.rotations[::every],
         clip.root_path[::every],

@@ -14,7 +14,7 @@ from posefield.http.api.settings import Settings
 from posefield.question import text_decoding
 from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
-from posefield.synthesis.frame_times import MAX_POSES
+from posefield.synthesis.poses import MAX_POSES
 from posefield.synthesis.synthesizer import Synthesizer
 
 SETTINGS = Settings()

@@ -9,13 +9,8 @@ import pytest
 
 from posefield.common.units import UP
 from posefield.inference import session
-from posefield.locomotion import (
-    gait,
-    level_transitions,
-    locomotion_plan,
-    walking_crowd,
-)
-from posefield.motion import foot_skate, quat
+from posefield.locomotion import gait, locomotion_plan, walking_crowd
+from posefield.motion import contact_detection, quat
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -260,7 +255,7 @@ def test_a_walk_closes_its_loop(made, model):
 
 def finest(opened, plan):
     """Motions of all characters of a plan, at the finest level."""
-    shown = level_transitions.constant_schedule(0, plan.phases.shape)
+    shown = locomotion_plan.constant_schedule(0, plan.phases.shape)
     return walking_crowd.motions(opened, plan, np.arange(len(plan.who)), shown)
 
 
@@ -273,7 +268,7 @@ def source_skate(clips, feet, rate):
         even = time_alignment.interpolate(joints, np.linspace(0.0, 1.0, frames)).reshape(
             frames, -1, 3
         )
-        speeds.append(foot_skate.mean_skate_speed(even, (frames - 1) / clip.duration))
+        speeds.append(contact_detection.mean_skate_speed(even, (frames - 1) / clip.duration))
     return np.array(speeds)
 
 

@@ -14,7 +14,7 @@ import random_scripts
 
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
-from posefield.motion import foot_skate
+from posefield.motion import contact_detection
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question.json_decoding import decode_question
@@ -173,7 +173,7 @@ def test_a_kicking_foot_meets_its_target_and_stands_before_and_after_it(library,
     assert path[:, 1].min() > standing - 0.005
     for begins, ends in ((0.0, act.begins), (last.begins, last.ends)):
         rows = slice(round(60 * begins), round(60 * ends) + 1)
-        assert foot_skate.mean_skate_speed(path[rows, None], 60.0) < 0.02
+        assert contact_detection.mean_skate_speed(path[rows, None], 60.0) < 0.02
     held = path[round(60 * act.event) : round(60 * last.begins) + 1]
     assert np.ptp(held, axis=0).max() < 1e-5
 

@@ -7,7 +7,7 @@ import pytest
 
 from posefield.inference import session
 from posefield.kriging import kriging_model, random_field
-from posefield.motion import foot_skate, skeleton
+from posefield.motion import contact_detection, skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
@@ -64,7 +64,9 @@ def acceleration(motions):
 
 def skate(model, motions):
     feet = list(model.session.card.feet)
-    return np.mean([foot_skate.mean_skate_speed(motion[:, feet], RATE) for motion in motions])
+    return np.mean(
+        [contact_detection.mean_skate_speed(motion[:, feet], RATE) for motion in motions]
+    )
 
 
 def test_fields_have_variogram_and_variances_of_the_kriging(made):

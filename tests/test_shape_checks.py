@@ -12,7 +12,7 @@ from beartype.roar import BeartypeCallHintViolation, BeartypeDoorHintViolation
 
 from posefield.kriging import support
 from posefield.motion import quat, skeleton
-from posefield.motion.crowd_clip import Placement
+from posefield.motion.clip import Placement
 from posefield_train.tensor.pose_vectors import PoseChart
 
 ROOT = Path(__file__).parents[1]

@@ -16,7 +16,7 @@ from posefield.constraints import constrained_motion
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.constraint import PositionConstraint
 from posefield.inference import session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import PredictionState, Session
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import UP, Floats
-from posefield.motion import foot_skate
+from posefield.motion import contact_detection
 from posefield.motion.clip import Clip
 from posefield_train.align import time_alignment
 
@@ -20,8 +20,8 @@ SLIDING_HEIGHT, GROUND_PERCENTILE = 0.025, 2.0
 class FootQuality:
     """Measures of one motion.
 
-    skate: mean speed of planted feet (`foot_skate`), m/s. weighted_skate: mean speed of low feet,
-    weighted by height (MANN), m/s. acceleration: mean over joints relative to the root, m/s².
+    skate: mean speed of planted feet (`mean_skate_speed`), m/s. weighted_skate: mean speed of low
+    feet, weighted by height (MANN), m/s. acceleration: mean over joints relative to the root, m/s².
     knee_peak, knee_mean: 99th percentile and mean of the knees' acceleration relative to the root,
     m/s². lowest: height of the lowest foot in any frame, m.
     """
@@ -45,7 +45,7 @@ def measure(clip: Clip, rate: float, feet: tuple[int, ...], knees: tuple[int, ..
     down = positions[:, list(feet)]
     of_knees = bends[:, list(knees)]
     return FootQuality(
-        float(foot_skate.mean_skate_speed(down, rate)),
+        float(contact_detection.mean_skate_speed(down, rate)),
         weighted_skate_speed(down, rate),
         float(bends[:, 1:].mean()),
         float(np.percentile(of_knees, 99.0)),

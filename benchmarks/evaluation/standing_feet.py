@@ -8,7 +8,7 @@ import numpy as np
 
 from evaluation import foot_quality
 from evaluation.foot_quality import FootQuality
-from posefield.feet import limb_choice
+from posefield.feet import footsteps
 from posefield.inference import session
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.clip import Clip
@@ -83,7 +83,7 @@ def measured_joints(card: ModelCard) -> MeasuredJoints | None:
     Feet stand in motions that travel, at the ends of legs.
     """
     own = card.skeleton
-    legs = limb_choice.choose_limbs(own.parents, own.offsets, card.feet, ()).character.legs
+    legs = footsteps.choose_limbs(own.parents, own.offsets, card.feet, ()).character.legs
     if not legs or card.root != "travelling":
         return None
     return MeasuredJoints(tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs))

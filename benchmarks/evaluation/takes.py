@@ -11,9 +11,8 @@ from evaluation import field_statistics, standing_feet
 from evaluation.field_statistics import FieldStatistics
 from evaluation.foot_quality import FootQuality
 from evaluation.standing_feet import MeasuredJoints
-from posefield.constraints.take_variation import TakeVariation
+from posefield.constraints.take_variation import TakeSettings, TakeVariation
 from posefield.inference import session
-from posefield.inference.takes import TakeSettings
 from posefield.kriging import random_field
 from posefield.motion.clip import Clip, assemble
 from posefield.question.motion_question import ClipQuestion

@@ -10,7 +10,7 @@ from math import exp, sqrt
 import numba
 
 from posefield.common.units import Floats
-from posefield.kriging.covariance import RATE52
+from posefield.kriging.kriging_model import RATE52
 
 compiled = numba.njit(fastmath=True)
 

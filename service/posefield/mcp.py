@@ -35,7 +35,7 @@ from posefield.performance.script import Script, errors_under, resolve_script
 from posefield.question import json_decoding
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.registry.model_registry import ModelRegistry
-from posefield.synthesis.frame_times import MAX_POSES
+from posefield.synthesis.poses import MAX_POSES
 from posefield.synthesis.synthesizer import Synthesizer
 
 INSTRUCTIONS = (

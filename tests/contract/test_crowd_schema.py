@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from posefield.common.errors import FormError, InvalidField
 from posefield.encode.formats import CROWD_ENCODERS
 from posefield.http import crowd_operations
-from posefield.motion.crowd_clip import CrowdPoses
+from posefield.motion.clip import CrowdPoses
 from posefield.motion.skeleton import Skeleton
 
 

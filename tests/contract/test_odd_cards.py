@@ -20,7 +20,7 @@ from posefield.common.errors import ModelError
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.readiness import Readiness
-from posefield.inference import graph_ports, onnx_runtime
+from posefield.inference import onnx_runtime
 from posefield.inference import session as sessions
 from posefield.inference.session import Session
 from posefield.model_file import card_check, checked_file, onnx_file
@@ -96,7 +96,7 @@ class Tried:
         entries = {**self.onnx.metadata, f"posefield.{name}": text.encode()}
         card = checked_file.decode_card(entries)
         card_check.check_graph(card, self.onnx.shapes, self.onnx.values)
-        graph_ports.check(self.runtime, card, "odd.onnx")
+        onnx_runtime.check(self.runtime, card, "odd.onnx")
         return replace(self.session, card=card)
 
     def get(self, path: str = "", **query: Any) -> Any:

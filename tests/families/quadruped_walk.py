@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from posefield.common.units import UP, Floats
-from posefield.motion import blend, bvh_writer, quat, skeleton
+from posefield.motion import bvh_writer, quat, skeleton
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
 from posefield_train.sample import two_bone_ik
@@ -190,7 +190,7 @@ def _paw_path(
     # A paw stands at the path's position in the middle of its stance.
     at = steps + leg.landing + 0.5 * STANCE + before
     # It lifts before it moves ahead, and stops before it lands.
-    gone = blend.smoothstep(np.clip((swing - 0.2) / 0.6, 0.0, 1.0))
+    gone = quat.smoothstep(np.clip((swing - 0.2) / 0.6, 0.0, 1.0))
     left = size * leg.side * WIDTH
     here, there = (_arc(at + more, length, turn, left) for more in (0.0, 1.0))
     ankle = here + gone[:, None] * (there - here)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from posefield.common.units import UP, Floats
-from posefield.motion import blend, bvh_writer, quat
+from posefield.motion import bvh_writer, quat
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
 from posefield_train.sample import two_bone_ik
@@ -138,7 +138,7 @@ def _leg(
     # A foot stands at the path's position in the middle of its stance.
     at = steps + down + 0.5 * STANCE
     # The foot lifts before it moves ahead, and stops before it lands.
-    gone = blend.smoothstep(np.clip((swing - 0.2) / 0.6, 0.0, 1.0))
+    gone = quat.smoothstep(np.clip((swing - 0.2) / 0.6, 0.0, 1.0))
     here, there = (_along(at + more, length, turn, off * WIDTH) for more in (0.0, 1.0))
     ankle = here + gone[:, None] * (there - here)
     ankle[:, 1] = ANKLE + lift * np.sin(np.pi * swing) ** 2

@@ -12,7 +12,7 @@ from posefield.encode import usd_crowd
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.motion import clip as clips
 from posefield.motion import quat
-from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.clip import CrowdClip, Motions, Placement
 
 MOTION = np.array([0, 1, 2, 3, 4, 2, 0, 1])
 FRAMES = 20

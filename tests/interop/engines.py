@@ -20,7 +20,7 @@ import numpy as np
 import running
 import trained
 
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import Session
 
 HERE = Path(__file__).parent

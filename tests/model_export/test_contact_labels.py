@@ -10,7 +10,7 @@ from joblib import parallel_config
 
 from posefield.common.errors import RecipeError
 from posefield.inference import session
-from posefield.inference.graph_ports import CONTACTS
+from posefield.inference.onnx_runtime import CONTACTS
 from posefield.motion import bvh_writer
 from posefield_train import train
 from posefield_train.contacts import contact_labels, held_out_contacts

@@ -7,8 +7,8 @@ import pytest
 from families import sample_walk
 
 from posefield.common.errors import ExportRefused, ModelError
-from posefield.inference import graph_ports, session
-from posefield.inference.graph_ports import CONTACTS
+from posefield.inference import onnx_runtime, session
+from posefield.inference.onnx_runtime import CONTACTS
 from posefield.model_file import model_card
 from posefield_train.contacts import contact_labels, contact_model
 from posefield_train.graph import onnx_export
@@ -150,7 +150,7 @@ def test_a_card_with_contacts_needs_a_graph_with_them(walk_exported, opened):
     card = replace(walk_exported.card, contacts=())
     old = session.open_bytes(bare.onnx(model_card.dump(card), {}), "old.onnx")
     points, times, weights = questions(card)
-    names = graph_ports.outputs(card)
+    names = onnx_runtime.outputs(card)
     answers = (one.run(points, times, *names, labels=weights, level=2) for one in (opened, old))
     for own, other in zip(*answers, strict=True):
         assert np.array_equal(own, other)

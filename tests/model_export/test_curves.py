@@ -8,7 +8,7 @@ from families import face_motion
 
 from posefield.common.errors import ModelError
 from posefield.constraints import constrained_motion
-from posefield.inference import graph_ports, session
+from posefield.inference import onnx_runtime, session
 from posefield.model_file import model_card
 from posefield.motion import quat
 from posefield.question.motion_question import ClipQuestion
@@ -64,7 +64,7 @@ def test_the_graph_computes_the_curves_of_the_reference(models_trained, opened):
     points, times = np.array([[0.3, 0.4], [0.8, 0.7]]), np.array([[0.2, 0.7], [0.4, 0.9]])
     for level in range(len(opened.session.card.levels)):
         expected = model.evaluate(points, times, level=level).curves
-        (found,) = opened.session.run(points, times, graph_ports.CURVES, level=level)
+        (found,) = opened.session.run(points, times, onnx_runtime.CURVES, level=level)
         assert np.abs(found - expected).max() < SINGLE
         assert np.abs(found[::-1] - expected).max() > 0.05
 
@@ -74,7 +74,7 @@ def test_the_solver_predicts_the_curves_of_the_graph(opened):
     for level in range(len(own.card.levels)):
         state = own.state(np.array([[0.7, 0.5]]), times, level=level)
         predicted = constrained_motion.build_corrector(own, level).predict(state)
-        (expected,) = own.run(np.array([[0.7, 0.5]]), times[None], graph_ports.CURVES, level=level)
+        (expected,) = own.run(np.array([[0.7, 0.5]]), times[None], onnx_runtime.CURVES, level=level)
         assert np.abs(predicted.curve_values(state.frames) - expected[0]).max() < SINGLE
 
 

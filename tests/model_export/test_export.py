@@ -15,7 +15,7 @@ import pytest
 
 from posefield.common.errors import ExportRefused
 from posefield.inference import session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.motion import quat
 from posefield_train import train
 from posefield_train.graph import onnx_export

@@ -12,7 +12,7 @@ from running import bank_values, outputs
 
 from posefield.common.errors import ExportRefused
 from posefield.inference import session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield_train.graph import onnx_export
 from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.kriging import universal_kriging

@@ -8,7 +8,7 @@ import pytest
 
 from posefield.common.errors import TrainingError
 from posefield.inference import session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.motion import skeleton
 from posefield_train.graph import levels
 from posefield_train.source.recipe_sections import Detail

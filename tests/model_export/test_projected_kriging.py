@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from posefield.kriging import kriging_model, leave_one_out
+from posefield.kriging import kriging_model
 from posefield_train.graph import trained_card
 from posefield_train.kriging import (
     coefficient_models,
@@ -74,7 +74,7 @@ def test_residuals_of_left_out_groups_are_those_of_a_model_without_them(hyper, s
     assert np.abs(process.residuals(values, uneven) - expected_rows).max() < SAME
     assert np.abs(process.residuals(values, np.arange(60)) - expected_rows).max() > 1e-3
     whole = ProjectedProcess(hyper, samples, samples, NONE).leave_out(groups)
-    assert np.abs(whole - leave_one_out.leave_out(hyper, samples, groups)).max() < SAME
+    assert np.abs(whole - kriging_model.leave_out(hyper, samples, groups)).max() < SAME
     # Negative control: residuals of the fit itself are smaller.
     assert np.abs(residuals[own] - expected).max() < 0.1 * np.abs(residuals[own]).max()
 

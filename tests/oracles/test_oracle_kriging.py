@@ -6,7 +6,7 @@ import pytest
 from gstools.krige import Universal
 from scipy.interpolate import RBFInterpolator
 
-from posefield.kriging.covariance import RATE52
+from posefield.kriging.kriging_model import RATE52
 from posefield_train.kriging import covariance_graph, universal_kriging
 from posefield_train.kriging.universal_kriging import Hyper
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield_train.adapt import canonical_clips, extended_models, tensor_extension
 from posefield_train.adapt.canonical_clips import AdaptableModel, CanonicalClips
 from posefield_train.adapt.extended_models import ExtendedSamples

@@ -10,7 +10,7 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
-from posefield.inference import residual_covariance
+from posefield.inference import reduced_motion
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, Level, ModelCard, rounded
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
@@ -213,7 +213,7 @@ def _takes(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
     """Return the number (N,) of each clip's take, new ones last; empty where each file is one."""
     if not old.making.takes:
         return ()
-    before = residual_covariance.take_numbers(old)
+    before = reduced_motion.take_numbers(old)
     after = 1 + before.max() + sample_points.take_numbers(clips)
     return (*before.tolist(), *after.tolist())
 

@@ -9,8 +9,8 @@ import numpy as np
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices
 from posefield.motion.clip import assemble
+from posefield.motion.contact_detection import FootContact
 from posefield.motion.curves import CurveValues
-from posefield.motion.foot_contacts import FootContact
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment
 from posefield_train.align import travel as travels

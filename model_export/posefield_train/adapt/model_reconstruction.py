@@ -14,7 +14,7 @@ import numpy as np
 
 from posefield.common.errors import ModelError
 from posefield.common.units import Floats, Indices
-from posefield.inference import reduced_motion, residual_covariance
+from posefield.inference import reduced_motion
 from posefield.kriging import kriging_model
 from posefield.model_file import checked_file, onnx_file
 from posefield.model_file.model_card import ModelCard, TrainingParameters
@@ -113,7 +113,7 @@ def _adaptable(file: _ModelFile) -> AdaptableModel:
         making.in_phase,
         card.root == "in_place",
         float(card.diagnostics["truncation_rms_m"]),
-        residual_covariance.leave_out_groups(card, bank.pose.samples),
+        reduced_motion.leave_out_groups(card, bank.pose.samples),
         np.array(card.left_out),
         card.feet,
         card.contacts,
@@ -183,7 +183,7 @@ def _power_law(file: _ModelFile) -> PowerLaw | None:
 def _order(file: _ModelFile, points: Floats) -> Indices:
     """Return the index (n,) on the card of each sample of the graph."""
     order, held = (
-        residual_covariance.importance_order(file.card, file.numbers, points),
+        reduced_motion.importance_order(file.card, file.numbers, points),
         file["samples"].T,
     )
     if np.abs(points[order, : len(file.card.controls)] - held).max() > SAMPLE_TOLERANCE:

@@ -24,7 +24,7 @@ from posefield.common.array_shapes import (
     Traces,
 )
 from posefield.common.units import UP, Floats
-from posefield.motion import blend, curves, quat, skeleton
+from posefield.motion import curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
@@ -218,7 +218,7 @@ def interpolate(
 
     Returns (S, features).
     """
-    return blend.interpolate_rows(values, u * (len(values) - 1))
+    return quat.interpolate_rows(values, u * (len(values) - 1))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from posefield.common.array_shapes import ClipFrames, ClipPaths, ClipRotations, ClipTravel, PerClip
 from posefield.common.units import UP, Floats
 from posefield.model_file.model_card import ROW_VALUES
-from posefield.motion import quat, root_travel
+from posefield.motion import quat, skeleton
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.source import measured_controls
@@ -45,7 +45,7 @@ def put_back(
 
     share: (..., S), share of the travel completed at each frame.
     """
-    return root_travel.add_travel(rotations, root_path, share[..., None] * travel[:, None])
+    return skeleton.add_travel(rotations, root_path, share[..., None] * travel[:, None])
 
 
 def mean_squared_distance(residuals: ClipTravel) -> PerClip:

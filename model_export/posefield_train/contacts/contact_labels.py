@@ -7,8 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Booleans, Floats
-from posefield.motion import skeleton
-from posefield.motion.contacts import contact_detection
+from posefield.motion import contact_detection, skeleton
 from posefield_train.align import time_alignment
 from posefield_train.align.warp import WarpBasis
 from posefield_train.source.ingest import Example

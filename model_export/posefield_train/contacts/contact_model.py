@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield_train.align.warp import CanonicalTiming
 from posefield_train.contacts import contact_labels, contact_statistics, contact_table
 from posefield_train.contacts.contact_labels import ClipContacts

@@ -7,8 +7,8 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.model_file.model_card import rounded
-from posefield.motion.contacts import contact_detection
-from posefield.motion.foot_contacts import CLEARANCE, LONG_SWING, FootContact
+from posefield.motion import contact_detection
+from posefield.motion.contact_detection import CLEARANCE, LONG_SWING, FootContact
 from posefield_train.contacts.contact_labels import ClipContacts
 
 USUAL_SWING, USUAL_CLEARANCE = 0.4, 0.05

@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.array_shapes import ClipFrames
 from posefield.common.units import Floats
-from posefield.motion import blend
+from posefield.motion import quat
 from posefield_train.kriging import coefficient_models
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
@@ -35,7 +35,7 @@ class ContactTable:
 
         coefficients: (B, r). As for poses, the functions are interpolated linearly between frames.
         """
-        rows = blend.interpolate_rows(self._rows, place).reshape(*place.shape, *self._shape)
+        rows = quat.interpolate_rows(self._rows, place).reshape(*place.shape, *self._shape)
         return np.clip(np.einsum("bskr,br->bsk", rows, coefficients), 0.0, 1.0)
 
     def labels(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.motion import curves, foot_skate
+from posefield.motion import contact_detection, curves
 from posefield_train.align import dtw, time_alignment
 from posefield_train.evaluate.compared_motion import ComparedMotion
 from posefield_train.tensor.motion_tensor import FRAMES
@@ -197,7 +197,9 @@ def acceleration(points: Floats) -> Floats:
 def skate(motion: ComparedMotion, feet: tuple[int, ...]) -> float:
     """Return the mean horizontal speed of feet on the ground, m/s; 0 without feet."""
     return float(
-        foot_skate.mean_skate_speed(motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration)
+        contact_detection.mean_skate_speed(
+            motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration
+        )
     )
 
 

@@ -9,7 +9,7 @@ from posefield import __version__
 from posefield.common.array_shapes import ClipPositions, PerClip
 from posefield.common.errors import ExportRefused
 from posefield.common.units import Floats
-from posefield.inference import graph_ports, reduced_motion, session
+from posefield.inference import onnx_runtime, reduced_motion, session
 from posefield.inference.reduced_motion import Deviations
 from posefield.inference.session import Session
 from posefield.model_file import model_card
@@ -97,7 +97,7 @@ def _draw_inputs(
 def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -> Floats:
     """Return distances (B, 1, J + C), m, between joints and curves of graph and reference."""
     question, card = (asked.points, asked.times), opened.card
-    parents, names = card.skeleton.parents, graph_ports.outputs(card)
+    parents, names = card.skeleton.parents, onnx_runtime.outputs(card)
     expected = model.evaluate(*question, asked.labels, asked.level).points(parents, card.curves)
     answers = opened.run(*question, *names, labels=asked.labels, level=asked.level)
     found = ModelOutputs(*answers).points(parents, card.curves)
@@ -110,7 +110,7 @@ def _check_contacts(model: FloatModel, opened: Session, asked: _ParityInputs) ->
     expected = model.evaluate(*question, asked.labels, level).contacts
     if expected is None:
         return
-    (found,) = opened.run(*question, graph_ports.CONTACTS, labels=asked.labels, level=level)
+    (found,) = opened.run(*question, onnx_runtime.CONTACTS, labels=asked.labels, level=level)
     gaps = np.abs(found - expected)
     if gaps.max() > CONTACT_LIMIT:
         row = int(np.unravel_index(int(np.argmax(gaps)), gaps.shape)[0])

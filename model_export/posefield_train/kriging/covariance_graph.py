@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.kriging.covariance import COVARIANCE_MODELS, KERNEL_GAINS, RATE32, RATE52
+from posefield.kriging.kriging_model import COVARIANCE_MODELS, KERNEL_GAINS, RATE32, RATE52
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 

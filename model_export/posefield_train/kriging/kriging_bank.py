@@ -25,7 +25,7 @@ from posefield.common.array_shapes import (
     Values,
 )
 from posefield.common.units import Floats
-from posefield.kriging import kriging_model, leave_one_out
+from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
@@ -102,7 +102,7 @@ def fit_power_law(
         inverse: Floats = np.asarray(
             np.linalg.inv(kriging_model.noisy(hyper, samples.points)), dtype=np.float64
         )
-        left_out = leave_one_out.residual_matrix(inverse, functions, samples.groups) @ logs
+        left_out = kriging_model.residual_matrix(inverse, functions, samples.groups) @ logs
         weighed = inverse @ functions
         slopes = np.linalg.solve(functions.T @ weighed, weighed.T @ logs)[1:, 0]
         fits.append((float(np.sum(np.square(left_out))), hyper, slopes, left_out))

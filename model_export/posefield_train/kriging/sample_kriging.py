@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.array_shapes import SampleMatrix, Samples, SampleValues
 from posefield.common.units import Floats, Indices
-from posefield.kriging import kriging_model, leave_one_out
+from posefield.kriging import kriging_model
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
@@ -54,7 +54,7 @@ class ProjectedProcess:
         """
         left = self._factors[0]
         apart = np.eye(len(left)) - left @ left.T
-        return leave_one_out.divide_groups(apart, apart, leave_one_out.equal_sized_groups(groups))
+        return kriging_model.divide_groups(apart, apart, kriging_model.equal_sized_groups(groups))
 
     def residuals(
         self, values: SampleValues, groups: Annotated[Indices, "samples"]
@@ -62,7 +62,7 @@ class ProjectedProcess:
         """Return `leave_out` times values (n, v), without a matrix (n, n)."""
         left = self._factors[0]
         found: Floats = values - left @ (left.T @ values)
-        several = leave_one_out.equal_sized_groups(groups)
+        several = kriging_model.equal_sized_groups(groups)
         grouped = [
             np.linalg.solve(np.eye(own.shape[1]) - left[own] @ left[own].swapaxes(1, 2), found[own])
             for own in several

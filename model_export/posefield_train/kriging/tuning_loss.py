@@ -15,7 +15,7 @@ from scipy.special import expit
 
 from posefield.common.array_shapes import SampleMatrix, SampleValues
 from posefield.common.units import Booleans, Floats, Indices
-from posefield.kriging import kriging_model, leave_one_out
+from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -188,13 +188,13 @@ class LeaveOneOutLoss:
         """Return the weighted squared residuals, and their derivative (n, n) by the covariances.
 
         With the inverse B of the kriging system's sample block and U = B values, the residuals of a
-        group g are R_g = B_gg⁻¹ U_g; see the closed form of `leave_one_out`.
+        group g are R_g = B_gg⁻¹ U_g; see the closed form of `leave_out`.
         """
         block = self.inverse(hyper)
         product = block @ self.values
-        residuals = leave_one_out.divide_groups(block, product, self.takes)
+        residuals = kriging_model.divide_groups(block, product, self.takes)
         weighted = self._weighted(residuals)
-        backward = leave_one_out.divide_groups(block, weighted, self.takes)
+        backward = kriging_model.divide_groups(block, weighted, self.takes)
         paired = np.where(self.together, backward @ residuals.T, 0.0)
         slope = block @ (paired @ block - backward @ product.T)
         return max(float(np.sum(weighted * residuals)), TINY), slope + slope.T
@@ -206,7 +206,7 @@ class LeaveOneOutLoss:
             np.linalg.inv(universal_kriging.noisy(hyper, points)), dtype=np.float64
         )
         functions = universal_kriging.drift(points, len(hyper.scales), degree)
-        return leave_one_out.sample_block(inverse, functions)
+        return kriging_model.sample_block(inverse, functions)
 
     def _weighted(self, residuals: Floats) -> Floats:
         """Return the residuals (n, m) with the weight of the event's joint added."""
@@ -228,7 +228,7 @@ class LeaveOneOutLoss:
     @cached_property
     def takes(self) -> list[Annotated[Indices, "_ _"]]:
         """Sample indices (groups, size) of the groups of each size above one."""
-        return leave_one_out.equal_sized_groups(self.problem.samples.groups)
+        return kriging_model.equal_sized_groups(self.problem.samples.groups)
 
     @cached_property
     def together(self) -> Annotated[Booleans, "samples samples"]:
@@ -316,7 +316,7 @@ class PredictiveDensityLoss(LeaveOneOutLoss):
         """
         block = self.inverse(hyper)
         product = block @ self.values
-        residuals = leave_one_out.divide_groups(block, product, self.takes)
+        residuals = kriging_model.divide_groups(block, product, self.takes)
         own = np.where(self.together, block, 0.0)
         squares, count = max(float(np.sum(residuals * product)), TINY), len(block)
         loss = 0.5 * count * float(np.log(squares)) - 0.5 * float(np.linalg.slogdet(own)[1])

@@ -26,11 +26,11 @@ from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import Hyper as Hyper
 from posefield.kriging.kriging_model import covariances as covariances
 from posefield.kriging.kriging_model import drift as drift
-from posefield.kriging.kriging_model import noisy as noisy
 
 # Shared with the service; training imports them from here.
-from posefield.kriging.leave_one_out import leave_out as leave_out
-from posefield.kriging.leave_one_out import left_out_variances as left_out_variances
+from posefield.kriging.kriging_model import leave_out as leave_out
+from posefield.kriging.kriging_model import left_out_variances as left_out_variances
+from posefield.kriging.kriging_model import noisy as noisy
 
 
 @dataclass(frozen=True)

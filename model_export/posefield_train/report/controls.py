@@ -15,7 +15,7 @@ from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion import measures
 from posefield.question.model_question import SuggestQuestion
 from posefield.question.results import Suggestion
-from posefield.synthesis import capture_suggestions
+from posefield.synthesis import trust
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
@@ -148,7 +148,7 @@ def trust_chapter(exported: ExportedModel) -> Chapter:
     card = exported.card
     opened = session.open_bytes(exported.content, card.name)
     question = SuggestQuestion(count=POINTS)
-    suggested = capture_suggestions.suggest(Synthesizer(card.name, opened), question)
+    suggested = trust.suggest(Synthesizer(card.name, opened), question)
     limit = support.fit_support(np.array(card.examples)).limit
     return limits_chapter(card, limit, suggested.suggestions)
 

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from posefield.inference import cost_model, session
+from posefield.inference import level_selection, session
 from posefield.inference.level_selection import Camera
 from posefield.inference.session import Session
 from posefield.model_file import model_card
@@ -39,9 +39,9 @@ _EXPLANATION = (
     "performers and times; they include the effect of clips that a level leaves out. A pixel is "
     f"one of an image of {CAMERA.height:.0f} lines with a vertical field of view of "
     f"{math.degrees(CAMERA.fov):.0f} degrees. Times are for one pose in batches of "
-    f"{cost_model.ROWS_PER_CALL}, measured on one thread of the machine that trained, with the "
-    "service's own code. A coarser level is never listed as slower than a finer one. Times are not "
-    "stored in the model file."
+    f"{level_selection.ROWS_PER_CALL}, measured on one thread of the machine that trained, with "
+    "the service's own code. A coarser level is never listed as slower than a finer one. Times are "
+    "not stored in the model file."
 )
 
 
@@ -93,7 +93,7 @@ class LevelCosts:
         for level, times in zip(others, self.times, strict=True):
             level["times_budget"] = times
         facts = {
-            "poses_a_call": cost_model.ROWS_PER_CALL,
+            "poses_a_call": level_selection.ROWS_PER_CALL,
             "image_lines": CAMERA.height,
             "field_of_view_rad": CAMERA.fov,
             "levels": chosen,
@@ -244,9 +244,9 @@ def time_levels(exported: ExportedModel, others: AlternativeLevels) -> LevelCost
     chosen = exported.card.levels
     asked = [(own, number) for number in range(len(chosen))]
     asked += [(others.opened, 1 + number) for number in range(len(others.levels))]
-    seconds = cost_model.benchmark_levels(asked, TIMING_ROUNDS)
+    seconds = level_selection.benchmark_levels(asked, TIMING_ROUNDS)
     return LevelCosts(
-        TimedLevels(chosen, cost_model.monotone_costs(seconds[: len(chosen)])),
-        TimedLevels(others.levels, cost_model.monotone_costs(seconds[len(chosen) :])),
+        TimedLevels(chosen, level_selection.monotone_costs(seconds[: len(chosen)])),
+        TimedLevels(others.levels, level_selection.monotone_costs(seconds[len(chosen) :])),
         others.times,
     )

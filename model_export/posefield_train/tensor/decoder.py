@@ -16,7 +16,7 @@ from posefield.common.array_shapes import (
     JointRotations,
 )
 from posefield.common.units import Floats
-from posefield.motion import blend
+from posefield.motion import quat
 from posefield.motion.curves import Curve, clamp
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.tensor.event_blend import EventBlend
@@ -152,7 +152,7 @@ class Decoder:
         """Return coefficients (B, S, r1) of the first mode."""
         whole, table = self.blended
         r1, r2, r3 = whole.shape
-        time = blend.interpolate_rows(table, place)
+        time = quat.interpolate_rows(table, place)
         # Contracting the core first as a matrix product is 17 times as fast as one einsum.
         core = whole.transpose(2, 0, 1).reshape(r3, -1)
         poses = np.empty((*place.shape, r1))

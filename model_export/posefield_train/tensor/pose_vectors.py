@@ -20,7 +20,7 @@ from posefield.common.array_shapes import (
 )
 from posefield.common.errors import TrainingError
 from posefield.common.units import Booleans, Floats
-from posefield.motion import quat, quat_planes
+from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield.motion.skeleton import POSES_PER_BLOCK
 from posefield_train.source import canonical
@@ -91,7 +91,7 @@ class PoseChart:
         planes = vectors.reshape(len(self.means), 3, *vectors.shape[1:]).swapaxes(0, 1)
         rotations = np.empty((len(self.means), 4, *vectors.shape[1:]))
         means = self.means.T.reshape(4, -1, *(1 for _ in vectors.shape[1:]))
-        quat_planes.product(means, CHARTS[self.chart].planes(planes), out=rotations.swapaxes(0, 1))
+        quat.product_planes(means, CHARTS[self.chart].planes(planes), out=rotations.swapaxes(0, 1))
         return rotations
 
     def far_joints(self, rotations: ClipRotations) -> list[Finding]:

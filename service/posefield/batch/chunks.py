@@ -19,7 +19,7 @@ from posefield.common.errors import InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.model_file.model_card import ModelCard
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips, frame_times
+from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
 if TYPE_CHECKING:
@@ -94,13 +94,13 @@ def _batches(
 ) -> Iterator[list[ClipFile]]:
     """Yield batches of files of the valid rows, in order; append the other rows to `faults`."""
     batch: list[_Clip] = []
-    poses = 0
+    total = 0
     for clip in _synthesized_clips(work, task, faults):
         batch.append(clip)
-        poses += len(clip[2].clip)
-        if len(batch) == CLIPS or poses >= POSES:
+        total += len(clip[2].clip)
+        if len(batch) == CLIPS or total >= POSES:
             yield _files(work, layout, batch)
-            batch, poses = [], 0
+            batch, total = [], 0
             if stopped():
                 raise ChunkAbandoned
     yield _files(work, layout, batch)
@@ -154,18 +154,18 @@ def _blocks(
     model: Synthesizer, task: ChunkTask
 ) -> Iterator[list[tuple[int, ClipQuery | RowFault]]]:
     """Yield the rows with their indices, in blocks that are synthesised together."""
-    longest, (slowest, fastest) = model.session.bounds.duration_limits[1], frame_times.FPS_RANGE
+    longest, (slowest, fastest) = model.session.bounds.duration_limits[1], poses.FPS_RANGE
     block: list[tuple[int, ClipQuery | RowFault]] = []
-    poses = 0.0
+    total = 0.0
     for number, row in enumerate(task.rows, task.first):
         # A rate that is refused has no frames.
         rate = row.question.fps if isinstance(row, ClipQuery) else 0.0
         frames = rate * longest if slowest <= rate <= fastest else 0.0
-        if block and (len(block) == CLIPS or poses + frames > POSES):
+        if block and (len(block) == CLIPS or total + frames > POSES):
             yield block
-            block, poses = [], 0.0
+            block, total = [], 0.0
         block.append((number, row))
-        poses += frames
+        total += frames
     yield block
 
 

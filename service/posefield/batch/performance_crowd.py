@@ -27,10 +27,9 @@ from posefield.common.units import UP, Floats, Singles
 from posefield.encode.usd_crowd import FILES
 from posefield.inference import level_selection
 from posefield.inference.level_selection import Camera
-from posefield.locomotion import crowd_order, floor_plane
+from posefield.locomotion import floor_plane, walking_crowd
 from posefield.motion import joint_roles, quat
-from posefield.motion.clip import Clip
-from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.clip import Clip, CrowdClip, Motions, Placement
 from posefield.motion.skeleton import Skeleton
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
@@ -71,7 +70,7 @@ def from_question(
     models: tuple[Path, ...], path: Path, stage: CrowdStageQuestion
 ) -> PerformanceCrowd:
     """Return a crowd with the stage of a question; InvalidField as for walking crowds."""
-    order = crowd_order.from_question(WalkQuestion(**structs.asdict(stage)))
+    order = walking_crowd.from_question(WalkQuestion(**structs.asdict(stage)))
     view = None if order.camera is None else View(order.camera, order.pixels)
     return PerformanceCrowd(models, path, view, stage.instancing, stage.body or DEFAULT_BODY)
 

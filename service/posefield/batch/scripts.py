@@ -49,7 +49,7 @@ from posefield.question.performance_question import NamedScript, PerformanceLayo
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
-from posefield.synthesis.frame_times import MAX_POSES
+from posefield.synthesis.poses import MAX_POSES
 
 Entry = dict[str, Any]
 LINES = ".jsonl"

@@ -100,11 +100,11 @@ def crowd(
     Each character walks on its own path at its own varying speed.
     """
     from posefield.cli import crowd_files
-    from posefield.locomotion import crowd_order
+    from posefield.locomotion import walking_crowd
 
     if paths and count is not None:
         raise InvalidField("count", f"{count}, expected none: every path has one character")
     question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
-    asked = crowd_order.from_question(question, crowd_files.routes(paths) if paths else ())
+    asked = walking_crowd.from_question(question, crowd_files.routes(paths) if paths else ())
     facts = crowd_files.write_crowd(open_model(model), asked, question, output)
     typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

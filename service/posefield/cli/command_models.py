@@ -12,7 +12,7 @@ from posefield.common.errors import ModelError
 from posefield.console.options import Json, ModelPath, open_model, with_question_options
 from posefield.console.output import LateProgress, as_json, print_warnings
 from posefield.encode.tables import model_tables
-from posefield.inference import cost_model, session
+from posefield.inference import level_selection, session
 from posefield.model_file import checked_file
 from posefield.model_file import model_card as cards
 from posefield.model_file.model_card import ModelCard
@@ -20,8 +20,8 @@ from posefield.motion import measures
 from posefield.question.model_question import SuggestQuestion, WhyQuestion
 from posefield.registry import model_registry, model_sources
 from posefield.registry.listed_models import ModelFile
-from posefield.synthesis.capture_suggestions import suggest as find_suggestions
-from posefield.synthesis.explanation import explain_result as find_reasons
+from posefield.synthesis.trust import explain_result as find_reasons
+from posefield.synthesis.trust import suggest as find_suggestions
 
 HEADING = ("name", "controls", "clips", "performers", "size", "file", "licence")
 
@@ -132,7 +132,7 @@ def inspect(model: ModelPath, json: Json = False) -> None:
     """
     opened = session.load(model)
     with LateProgress("rounds of timing") as bar:
-        seconds = cost_model.seconds_per_pose(opened, bar.update)
+        seconds = level_selection.seconds_per_pose(opened, bar.update)
     plain = {
         "identity": f"{model.stem}@{opened.digest}",
         **cards.plain_values(opened.card),
@@ -153,7 +153,7 @@ def _summary(plain: dict[str, Any]) -> str:
         f"ranks {plain['levels'][0]['ranks']} of {diagnostics['tensor']}: truncation costs "
         f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
         f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
-        f"levels of detail, times in batches of {cost_model.ROWS_PER_CALL}:",
+        f"levels of detail, times in batches of {level_selection.ROWS_PER_CALL}:",
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
         *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),

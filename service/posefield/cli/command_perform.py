@@ -26,7 +26,7 @@ from posefield.question.performance_question import (
 )
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.registry import model_registry
-from posefield.synthesis.frame_times import MAX_POSES
+from posefield.synthesis.poses import MAX_POSES
 
 if TYPE_CHECKING:
     from posefield.characters.user_character import UserCharacter

@@ -15,11 +15,11 @@ from posefield.encode import usd_crowd
 from posefield.encode.tables import motion_tables
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.locomotion import gait, walking_crowd
-from posefield.locomotion import routes as given
-from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.locomotion import paths as given
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.routes import Route
-from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
+from posefield.locomotion.paths import Route
+from posefield.locomotion.walking_crowd import CrowdOrder
+from posefield.motion.clip import CrowdClip, Motions, StandingFeet
 from posefield.question.motion_question import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet

@@ -10,18 +10,16 @@ from posefield.common import frame_groups
 from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
 from posefield.common.units import Floats
 from posefield.constraints import constraint, gauss_newton
-from posefield.constraints.constraint import Constraint
-from posefield.constraints.correction_task import CorrectionTask
+from posefield.constraints.constraint import Constraint, CorrectionTask
 from posefield.constraints.motion_variables import MotionVariables
-from posefield.inference import reduced_motion, residual_covariance
-from posefield.inference.reduced_motion import ReducedTensor
-from posefield.inference.residual_covariance import ResidualCovariance
+from posefield.inference import reduced_motion
+from posefield.inference.reduced_motion import ReducedTensor, ResidualCovariance
 from posefield.inference.session import PredictionState, Session
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import measures, root_travel
+from posefield.motion import measures, skeleton
 from posefield.motion.measures import MeasuredMotion
 from posefield.question.results import ConstraintResult
 
@@ -45,12 +43,9 @@ class ConstrainedMotion:
     @property
     def duration(self) -> float:
         """Duration of the clip, s."""
-        return float(np.exp(self.scene.duration_and_travel(self.numbers)[0])) * self._fixed_duration
-
-    @property
-    def _fixed_duration(self) -> float:
         # Motions without cycles keep the predicted duration.
-        return 1.0 if self.scene.cyclic else self.state.duration
+        fixed = 1.0 if self.scene.cyclic else self.state.duration
+        return float(np.exp(self.scene.duration_and_travel(self.numbers)[0])) * fixed
 
     @property
     def travel(self) -> Vector:
@@ -68,7 +63,7 @@ class ConstrainedMotion:
         if not scene.cyclic:
             return roots
         share = frames / (scene.reduced.frames - 1)
-        return root_travel.moved_roots(roots, share[:, None] * self.travel)
+        return skeleton.moved_roots(roots, share[:, None] * self.travel)
 
     def curve_values(self, frames: Frames) -> Annotated[Floats, "frames curves"]:
         """Return the values (S, C) of the curves at canonical frames (S,)."""
@@ -95,7 +90,7 @@ def evaluate_poses(
     if first.cyclic:
         travel = np.array([own.travel for own in motions])[groups.group]
         share = np.concatenate(frames) / (first.reduced.frames - 1)
-        rotations, roots = root_travel.add_travel(rotations, roots, share[:, None] * travel)
+        rotations, roots = skeleton.add_travel(rotations, roots, share[:, None] * travel)
     return list(zip(groups.split(rotations), groups.split(roots), strict=True))
 
 
@@ -143,7 +138,8 @@ class LevelCorrector:
         for aim in constraint.from_controls(moving, self.reduced.frames):
             values, _ = aim.evaluate(held.scene, held.numbers)
             found |= dict(zip(aim.names, map(float, values), strict=True))
-        seen = _measured_body(held.scene)
+        still = np.zeros((1, len(held.scene.parents), 3))
+        seen = MeasuredMotion(still, 0.0, np.zeros(3), held.scene.parents, held.scene.bones)
         found |= {
             name: measures.evaluate(own, seen) for name, own, _ in asked if own.is_body_measure
         }
@@ -165,13 +161,8 @@ def build_corrector(session: Session, level: int) -> LevelCorrector:
     return LevelCorrector(
         session.card,
         own,
-        residual_covariance.estimate(session.card, weights, session.kriging_weights.samples, own),
+        reduced_motion.estimate(session.card, weights, session.kriging_weights.samples, own),
     )
-
-
-def _measured_body(scene: MotionVariables) -> MeasuredMotion:
-    still = np.zeros((1, len(scene.parents), 3))
-    return MeasuredMotion(still, 0.0, np.zeros(3), scene.parents, scene.bones)
 
 
 def to_strides(held: ConstrainedMotion) -> Strides:

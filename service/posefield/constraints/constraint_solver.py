@@ -13,12 +13,12 @@ from posefield.common.array_shapes import Frames
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import Floats
 from posefield.common.value_cache import ValueCache
-from posefield.constraints import constrained_motion, constraint, overshoot
+from posefield.constraints import constrained_motion, constraint
 from posefield.constraints import targets as goals
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.constraint import Constraint, PositionConstraint
 from posefield.constraints.take_variation import TakeVariation
-from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTarget
+from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTarget, bring_back
 from posefield.inference.session import PredictionState, Session
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
@@ -123,7 +123,7 @@ class ConstraintSolver:
         motions; a closer fit would attribute chance to the controls.
         """
         seen = np.hstack([self._positions_cached(goal.moment, goal.time) for goal in targets])
-        wanted = asked = target_values(targets)
+        wanted = asked = np.array([value for goal in targets for value in goal.position])
         tried: list[tuple[float, dict[str, float]]] = []
         local = chooser.near_measures(given, question.labels, seen, wanted)
         found = local.captured()
@@ -277,7 +277,6 @@ class ConstraintSolver:
         return [replace(own, held=found[place]) for place, own in enumerate(every)]
 
     def _aims(self, own: _OpenMotion) -> list[Constraint]:
-        """Return the constraints of a motion."""
         goals, frames = own.key.constraints, own.begun.scene.reduced.frames
         aims = constraint.from_controls(goals.controls, frames)
         aimed = self._target_constraints(own.key.question, goals.targets, own.held)
@@ -288,7 +287,7 @@ class ConstraintSolver:
         question, goals = key.question, key.constraints
         bench, bounds = self._corrector(key.level), self._session.bounds
         if not bounds.is_inside(question.point):
-            held = overshoot.bring_back(bench, held, goals, question.controls, bounds)
+            held = bring_back(bench, held, goals, question.controls, bounds)
         try:
             self._check_times(goals.targets, held)
             aimed = self._target_constraints(question, goals.targets, held)
@@ -387,8 +386,3 @@ def controls_from_targets(
                 # extrapolation.
                 found[control.name] = min(max(value, control.minimum), control.maximum)
     return found
-
-
-def target_values(goals: tuple[JointTarget, ...]) -> Annotated[Floats, "3*{len(goals)}"]:
-    """Return the target positions (3 G,) of the goals, concatenated."""
-    return np.array([value for goal in goals for value in goal.position])

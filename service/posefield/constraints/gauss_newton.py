@@ -18,14 +18,14 @@ from posefield.common.units import Booleans, Floats, Indices
 from posefield.constraints import constraint, reachability
 from posefield.constraints.constraint import (
     Constraint,
+    CorrectionTask,
     StackedGradients,
     StackedValues,
     StackedVariables,
 )
-from posefield.constraints.correction_task import CorrectionTask
 from posefield.constraints.motion_variables import MotionVariables
 from posefield.constraints.reachability import stacked_dot, stacked_solve
-from posefield.inference.residual_covariance import ResidualCovariance
+from posefield.inference.reduced_motion import ResidualCovariance
 from posefield.question.results import ConstraintResult
 
 MAX_STEPS, MAX_HALVINGS = 25, 6
@@ -132,7 +132,6 @@ def correct(spread: ResidualCovariance, tasks: Sequence[CorrectionTask]) -> list
 
 
 def _correct_alike(spread: ResidualCovariance, tasks: Sequence[CorrectionTask]) -> list[Correction]:
-    """Return the corrections of tasks of one kind."""
     scenes, aims = [own.scene for own in tasks], tasks[0].aims
     begun = np.stack([own.begun for own in tasks])
     looked = constraint.evaluate_many(aims, scenes, begun)
@@ -179,7 +178,8 @@ def _next_iterates(
     The others have no step that reduces the error.
     """
     left = problems.goals - now.values
-    far = np.maximum(_largest_distances(problems.aims, left), 1e-12)
+    metres = np.array([aim.unit == "m" for aim in problems.aims for _ in aim.target])
+    far = np.maximum(np.abs(left[:, metres]).max(axis=1, initial=0.0), 1e-12)
     share = np.minimum(1.0, TRUST_RADIUS / far)
     base = np.where(now.whole[:, None], problems.begun, now.numbers)
     along = (now.gradients @ (now.numbers - base)[..., None])[..., 0]
@@ -213,14 +213,6 @@ def _solve(
     """
     eye = np.eye(matrices.shape[-1])
     return stacked_solve(matrices + 1e-9 * matrices * eye + 1e-300 * eye, right)
-
-
-def _largest_distances(
-    aims: Sequence[Constraint], left: StackedValues
-) -> Annotated[Floats, "motions"]:
-    """Return the largest distances (M,), m, among the values (M, k) in metres."""
-    metres = np.array([aim.unit == "m" for aim in aims for _ in aim.target])
-    return np.abs(left[:, metres]).max(axis=1, initial=0.0)
 
 
 def distance(spread: ResidualCovariance, task: CorrectionTask) -> float:

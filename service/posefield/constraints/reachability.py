@@ -14,9 +14,13 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices
-from posefield.constraints.constraint import StackedGradients, StackedValues, StackedVariables
-from posefield.constraints.correction_task import CorrectionTask
-from posefield.inference.residual_covariance import ResidualCovariance
+from posefield.constraints.constraint import (
+    CorrectionTask,
+    StackedGradients,
+    StackedValues,
+    StackedVariables,
+)
+from posefield.inference.reduced_motion import ResidualCovariance
 
 # Weight in the covariance of an equal share for all values of a constraint, so that none has zero
 # variance.

@@ -1,24 +1,146 @@
-"""Variation of a predicted motion: another take of it, and details that no control predicts."""
+"""Takes: other motions for the same question, drawn about the prediction as captured clips vary.
 
-from dataclasses import asdict, replace
-from functools import lru_cache
+A take is a conditional simulation of the kriged coefficients: a seed stands for one smooth function
+of the controls and labels, which is zero at captured clips up to the nugget.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import groupby
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PointControls, PointLabels
+from posefield.common import cancellation
+from posefield.common.array_shapes import PointControls, PointLabels, PointValues, Values
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
+from posefield.common.value_cache import ValueCache
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import reduced_motion
 from posefield.inference.session import Session
-from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
-from posefield.kriging import random_field
+from posefield.kriging import kriging_model, random_field
+from posefield.kriging.random_field import ConditionalField
+from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
 from posefield.question.motion_question import MotionQuestion
 from posefield.question.value_validation import check_take
 from posefield.validation.question_validation import ValidatedQuestion
+
+FIELD_CACHE, DEVIATION_CACHE = 64, 4096
+"""Numbers of cached fields, of about 200 kB each, and of deviations at one point, of 300 bytes. A
+crowd asks for the same points in every frame.
+"""
+POINTS_TOGETHER = 512
+"""Number of points at which a field is evaluated at once."""
+FIELDS_TOGETHER = 8
+"""Number of fields that are drawn at once: more of them outgrow a core's cache."""
+EVENTFUL_TIMES = 3
+"""Time functions of a motion without cycle that a take varies, the first ones. Residuals of further
+ones are differences in footing and timing, which are no independent Gaussian numbers.
+"""
+
+
+@dataclass(frozen=True)
+class TakeSettings:
+    """Deviation of a motion from its prediction.
+
+    seed: of the take; 0 for none. variety: its size; 1 for that of captured clips. detail: whether
+    details that no control predicts are added.
+    """
+
+    seed: int
+    variety: float
+    detail: bool
+
+
+_SeedPoint = tuple[int, bytes]
+
+
+def _seed(asked: _SeedPoint) -> int:
+    return asked[0]
+
+
+class TakeSampler:
+    """Deviations of the takes of one model."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._field_cached = lru_cache(FIELD_CACHE)(self._field)
+        self._deviations_kept: ValueCache[_SeedPoint, Values] = ValueCache(DEVIATION_CACHE)
+
+    def deviations(
+        self, controls: PointControls, labels: PointLabels, seeds: Annotated[Indices, "points"]
+    ) -> PointValues:
+        """Return the deviations (B, m) of takes at controls (B, d) and labels (B, p).
+
+        They are uncorrelated, each with the variance of sigma, m²: of the coefficients of the
+        finest level, and of a cycle's duration and travel. Zero for seeds (B,) of zero.
+        """
+        limited = np.asarray(self._session.bounds.limit(controls), np.float64)
+        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        rows = np.hstack([points, labels])
+        found = np.zeros((len(rows), self._count))
+        varied = np.flatnonzero(seeds).tolist()
+        # As bytes, whose hash is computed once.
+        keys = [(int(seeds[place]), rows[place].tobytes()) for place in varied]
+        if keys:
+            found[varied] = self._deviations_kept.find_all(keys, self._deviations)
+        return found
+
+    def along(
+        self,
+        controls: Annotated[Floats, "paths points controls"],
+        labels: Annotated[Floats, "paths labels"],
+        seeds: Annotated[Indices, "paths"],
+    ) -> Annotated[Floats, "paths points values"]:
+        """Return the deviations (N, B, m) of takes along paths of controls (N, B, d).
+
+        labels (N, p) and seeds (N,): one of each path. As `deviations`, for many points of a seed.
+        """
+        limited = np.asarray(self._session.bounds.limit(controls), np.float64)
+        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        names = np.broadcast_to(labels[:, None], (*points.shape[:2], labels.shape[1]))
+        points = np.concatenate([points, names], axis=-1)
+        found = np.zeros((*points.shape[:2], self._count))
+        varied = np.flatnonzero(seeds)
+        for first in range(0, len(varied), FIELDS_TOGETHER):
+            cancellation.check()
+            some = varied[first : first + FIELDS_TOGETHER]
+            own = random_field.simulate(self._session.kriging_weights, seeds[some], self._count)
+            found[some] = self._root_of_sill * own.evaluate(points[some])
+        return found
+
+    def _deviations(self, asked: Sequence[_SeedPoint]) -> list[Values]:
+        """Return the deviations (m,) at points of seeds, each as it is alone."""
+        found: dict[_SeedPoint, Values] = {}
+        # Takes of one seed come one after another, while its field is in the cache.
+        for seed, some in groupby(sorted(asked, key=_seed), key=_seed):
+            every = list(some)
+            for first in range(0, len(every), POINTS_TOGETHER):
+                cancellation.check()
+                part = every[first : first + POINTS_TOGETHER]
+                points = np.array([np.frombuffer(point) for _, point in part])
+                values = self._root_of_sill * self._field_cached(seed).evaluate_each(points)
+                # Copied: a part of an array would keep the whole in memory.
+                found.update(zip(part, map(np.copy, values), strict=True))
+        return [found[each] for each in asked]
+
+    @property
+    def _count(self) -> int:
+        card = self._session.card
+        return card.levels[0].ranks[2] + len(card.beside)
+
+    def _field(self, seed: int) -> ConditionalField:
+        return random_field.simulate(self._session.kriging_weights, seed, self._count)
+
+    @cached_property
+    def _root_of_sill(self) -> float:
+        sill = onnx_file.initializers(self._session.content)["sill"]
+        return float(np.sqrt(sill.item()))
+
 
 DETAIL_CACHE = 512
 """Number of cached details, of 12 kB each: a crowd asks for the same ones in every frame."""

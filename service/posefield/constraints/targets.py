@@ -1,17 +1,30 @@
-"""Constraints of a question, validated."""
+"""Constraints of a question, validated, and bounds of motions that are corrected for them.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+A correction moves duration and travel as far as captured motions reach, from a prediction that may
+itself lie beyond the requested value of a control outside the sampled ranges.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import Floats
 from posefield.constraints import take_variation
-from posefield.inference.takes import TakeSettings
+from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints.constraint import TravelConstraint
+from posefield.constraints.gauss_newton import MISS_TOLERANCE
+from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
+from posefield.constraints.take_variation import TakeSettings
 from posefield.model_file import answer_bounds
+from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
 from posefield.question.motion_question import MotionQuestion, Target
+from posefield.question.results import ConstraintResult, split_results
 from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
 
@@ -184,3 +197,72 @@ def _check_duplicates(targets: Sequence[Target], goals: Sequence[JointTarget]) -
                 f"{goal.name} has a target already (targets/{seen[key]}), expected one",
             )
         seen[key] = index
+
+
+# Speed depends on the travel, so it is last.
+ORDER = ("turn", "stride_length", "speed")
+
+
+def bring_back(
+    bench: LevelCorrector,
+    held: ConstrainedMotion,
+    goals: ConstraintSet,
+    asked: Mapping[str, float],
+    bounds: AnswerBounds,
+) -> ConstrainedMotion:
+    """Return the corrected motion within the bounds, with errors relative to the asked controls.
+
+    goals: of the correction, in which controls are limited. asked: controls as requested.
+    """
+    numbers = held.numbers
+    if held.scene.cyclic:
+        numbers = _limit_duration(held, bounds)
+        for quantity in ORDER:
+            for name, own, goal in goals.controls:
+                if own.quantity == quantity:
+                    aim = TravelConstraint((name,), quantity, np.array([goal]), own.unit)
+                    control = bench.card.control(name)
+                    assert control is not None
+                    numbers = _without_overshoot(held.scene, numbers, aim, control)
+    found = replace(held, numbers=numbers)
+    measured = bench.measured(found)
+    controls, targets = split_results(held.results, len(goals.targets))
+    judged = [_result(met, asked, measured) for met in controls]
+    return replace(found, results=(*judged, *targets))
+
+
+def _limit_duration(held: ConstrainedMotion, bounds: AnswerBounds) -> Floats:
+    """Return the numbers of a cycle, no shorter or longer than its prediction or the bounds."""
+    predicted = held.state.duration
+    least, most = bounds.duration_limits
+    numbers = held.numbers.copy()
+    numbers[-CYCLE_VARIABLES] = np.clip(
+        numbers[-CYCLE_VARIABLES], np.log(min(least, predicted)), np.log(max(most, predicted))
+    )
+    return numbers
+
+
+def _without_overshoot(
+    scene: MotionVariables, numbers: Floats, aim: TravelConstraint, control: Control
+) -> Floats:
+    """Return the numbers with the goal's value where the motion passed it, else unchanged."""
+    value, goal = float(aim.evaluate(scene, numbers)[0][0]), float(aim.target[0])
+    above = goal > control.maximum and value > goal
+    below = goal < control.minimum and value < goal
+    if not (above or below):
+        return numbers
+    found = numbers.copy()
+    if aim.quantity == "turn":
+        found[-1] = np.radians(goal)
+    elif aim.quantity == "stride_length":
+        found[-CYCLE_VARIABLES + 1 : -1] *= goal / value
+    else:
+        found[-CYCLE_VARIABLES] += np.log(value / goal)
+    return found
+
+
+def _result(
+    met: ConstraintResult, asked: Mapping[str, float], measured: Mapping[str, float]
+) -> ConstraintResult:
+    miss = abs(asked[met.what] - measured[met.what])
+    return replace(met, miss=miss, reached=miss <= MISS_TOLERANCE)

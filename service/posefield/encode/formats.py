@@ -28,7 +28,7 @@ from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Table, arrow_stream, npz_table
 from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
-from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
+from posefield.motion.clip import CrowdClip, CrowdPoses
 from posefield.question.motion_question import BodyKind
 from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, SigmaGrid
 

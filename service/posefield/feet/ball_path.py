@@ -11,7 +11,7 @@ import numpy as np
 
 from posefield.common.array_shapes import RootPath
 from posefield.common.frame_groups import FrameGroups
-from posefield.common.units import UP, Booleans, Floats, Indices
+from posefield.common.units import UP, Floats, Indices
 from posefield.feet import stance_rows
 from posefield.feet.smooth_change import smooth_change
 from posefield.feet.stance_rows import FootRows, Mask, PerRun, Runs
@@ -93,14 +93,18 @@ def lifts(
     lowest = _led_heights(feet, found, led)
     ended = found.mask(rows) | ~np.isnan(led)
     swings = stance_rows.runs(~ended, rows)
-    swings = swings.select(_between_stances(swings, feet))
+    # Those with a stance before or after them.
+    swings = swings.select(swings.lengths < rows.counts[swings.rows])
     if not len(swings.rows):
         return added, lowest
     run, frames = swings.frames()
     flat, own = rows.flat(swings.rows[run], frames), FrameGroups(swings.lengths)
     ends = _ends(swings, feet)
     first, last = (lowest[rows.flat(swings.rows, end)] for end in ends)
-    least = _least_lifts(swings, feet, floor, ends)
+    begin, end = (stance_rows.places(feet, floor, swings.rows, edge) for edge in ends)
+    least = feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
+    highest = highest_lift(swings.lengths / rows.rates[swings.rows])
+    least = np.where(swings.inner(rows), np.minimum(least, highest), least)
     least = np.where(np.minimum(first, last) < -UNEVEN, 0.0, least)
     share, whole = _shares(swings, feet)
     rise = lift_shares(share, whole[run] / rows.rates[swings.rows[run]])
@@ -123,25 +127,6 @@ def _led_heights(
         flat = feet.rows.flat(found.rows[run], frames)
         lowest[flat] = FrameGroups(found.lengths).smallest(lowest[flat])[run]
     return lowest
-
-
-def _between_stances(swings: Runs, feet: FootRows) -> Annotated[Booleans, "runs"]:
-    """Return which swings have a stance before or after them."""
-    found: Booleans = swings.lengths < feet.rows.counts[swings.rows]
-    return found
-
-
-def _least_lifts(
-    swings: Runs,
-    feet: FootRows,
-    floor: Annotated[FloorVectors, "frames"],
-    ends: tuple[PerRun, PerRun],
-) -> Annotated[Floats, "runs"]:
-    """Return how high feet are lifted in swings at least, m."""
-    begin, end = (stance_rows.places(feet, floor, swings.rows, own) for own in ends)
-    least = feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
-    highest = highest_lift(swings.lengths / feet.rows.rates[swings.rows])
-    return np.where(swings.inner(feet.rows), np.minimum(least, highest), least)
 
 
 def _shares(swings: Runs, feet: FootRows) -> tuple[Annotated[Floats, "frames"], PerRun]:

@@ -12,18 +12,17 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation, frame_groups
-from posefield.common.array_shapes import Frames, RootPath
+from posefield.common.array_shapes import Frames
 from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Booleans, Floats
-from posefield.feet import ball_path, contact_estimates, leads, limbs, pelvis, stance_rows
+from posefield.feet import ball_path, footsteps, limbs, stance_rows, two_bone
 from posefield.feet.ball_path import Footsteps
-from posefield.feet.footsteps import Character, FeetPlan, PlanRequest, SampledMotion
-from posefield.feet.leads import Led
+from posefield.feet.footsteps import Character, FeetPlan, Led, PlanRequest, SampledMotion
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import FootRows, Runs
 from posefield.feet.stances import UNEVEN, Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor, Floors
 
 # Rounds in which stances are shortened whose leg does not reach.
@@ -98,7 +97,7 @@ class _Bodies:
             np.array([getattr(own.character, name) for own in requests])
             for name in ("fixed", "raised")
         )
-        room = leads.joined([own.leads for own in requests]).room(poses, character.limbs)
+        room = footsteps.joined([own.leads for own in requests]).room(poses, character.limbs)
         return cls(requests, poses, roots, rows, fixed, raised, room)
 
     @property
@@ -109,9 +108,13 @@ class _Bodies:
     def plans(self) -> list[FeetPlan]:
         """Return the plans of all motions."""
         feet, down = self._feet()
-        above = contact_estimates.heights_above(feet.heights, down, feet.height, feet.rows)
+        above = stance_rows.heights_above(feet.heights, down, feet.height, feet.rows)
         grounded = self._grounded(above.reshape(len(self.legs), -1))
-        feet = _on_the_ground(feet, above, grounded)
+        # Characters stand as high as their feet do: the ground first.
+        lowered = np.tile(grounded, len(self.legs))
+        height = feet.height + np.clip(above - lowered, -UNEVEN, UNEVEN)
+        heights = feet.heights - lowered[feet.rows.groups.group]
+        feet = replace(feet, heights=heights, height=height)
         found = self._led_stances(stance_rows.discipline(down, feet), feet)
         body = _GroundedBodies(self, feet, grounded, self._follow(grounded))
         return body.plans(found)
@@ -154,21 +157,19 @@ class _Bodies:
     def _contacts(
         self, places: Sequence[Annotated[Floats, "frames 3"]], rows: FrameRows
     ) -> tuple[Runs, list[FootContact]]:
-        """Return the contacts of the feet of all rows, and their statistics."""
         likely = [own.likely for own in self.requests if own.likely is not None]
         if likely:
             every = np.concatenate(likely).T.ravel()
             known = [own.contacts[leg] for leg in range(len(places)) for own in self.requests]
-            return contact_estimates.from_probabilities(every, rows), known
+            return stance_rows.from_probabilities(every, rows), known
         paths = [
             FootPath(path, own.motion.rate, own.motion.cycle, own.motion.walking)
             for leg in places
             for path, own in zip(self.rows.groups.split(leg), self.requests, strict=True)
         ]
-        down = contact_estimates.from_motion(paths)
+        down = stance_rows.from_motion(paths)
         known = [
-            contact_estimates.statistics(0, path, own)
-            for path, own in zip(paths, down, strict=True)
+            stance_rows.statistics(0, path, own) for path, own in zip(paths, down, strict=True)
         ]
         return stance_rows.from_intervals(down), known
 
@@ -195,8 +196,8 @@ class _Bodies:
         intervals: list[Sequence[Interval]] = list(found.by_row(len(paths)))
         for row, path in enumerate(paths):
             motion, leg = row % len(led), row // len(led)
-            goal = leads.goals(path, led[motion][leg])
-            intervals[row] = leads.lead_stances(intervals[row], path, feet.contact(row), goal)
+            goal = footsteps.goals(path, led[motion][leg])
+            intervals[row] = footsteps.lead_stances(intervals[row], path, feet.contact(row), goal)
         return stance_rows.from_intervals(intervals)
 
     def _follow(self, grounded: PerMotion) -> Frames:
@@ -206,8 +207,8 @@ class _Bodies:
         """
         wanted = grounded[self.rows.groups.group] - self.floors.heights(self.roots)
         up, down = self.room
-        high = pelvis.cover(np.maximum(-wanted - up, 0.0), self.rows)
-        low = pelvis.cover(np.maximum(wanted - down, 0.0), self.rows)
+        high = two_bone.cover(np.maximum(-wanted - up, 0.0), self.rows)
+        low = two_bone.cover(np.maximum(wanted - down, 0.0), self.rows)
         stays = (self.fixed & ~self.raised)[self.rows.groups.group]
         return np.where(stays, 0.0, wanted + high - low)
 
@@ -215,15 +216,6 @@ class _Bodies:
     def floors(self) -> Floors:
         """Return the floors of the motions."""
         return Floors([own.floor for own in self.requests], self.rows.groups)
-
-
-def _on_the_ground(
-    feet: FootRows, above: Annotated[Floats, "rows"], grounded: PerMotion
-) -> FootRows:
-    """Return the feet of characters that stand as high as their feet do: the ground first."""
-    own = np.tile(grounded, len(above) // max(len(grounded), 1))
-    height = feet.height + np.clip(above - own, -UNEVEN, UNEVEN)
-    return replace(feet, heights=feet.heights - own[feet.rows.groups.group], height=height)
 
 
 @dataclass(frozen=True)
@@ -262,7 +254,11 @@ class _GroundedBodies:
                     own.motion.rate,
                     own.motion.cycle,
                     tuple(
-                        _footsteps(leg[motion], found)
+                        Footsteps(
+                            leg[motion],
+                            found,
+                            leg[motion][[stance.begin for stance in found]].reshape(-1, 3),
+                        )
                         for leg, found in zip(split, stances, strict=True)
                     ),
                     changes[:, begin : begin + groups.counts[motion]],
@@ -284,7 +280,7 @@ class _GroundedBodies:
         """
         bodies, feet, legs = self.bodies, self.feet, len(self.bodies.legs)
         slopes = np.array([own.floor.slope for own in bodies.requests])
-        deepest = (pelvis.MOST + STEP * slopes)[bodies.rows.groups.group]
+        deepest = (two_bone.MOST + STEP * slopes)[bodies.rows.groups.group]
         most = np.clip(bodies.room[1] - self.followed, 0.0, deepest)
         most[bodies.fixed[bodies.rows.groups.group]] = 0.0
         goal = self._goal()
@@ -293,7 +289,7 @@ class _GroundedBodies:
         for _ in range(ROUNDS):
             cancellation.check()
             shorter = stance_rows.shortened(
-                found, pelvis.beyond(needs, np.tile(most, legs)), feet.rows
+                found, two_bone.beyond(needs, np.tile(most, legs)), feet.rows
             )
             rows = stance_rows.changed_rows(found, shorter, feet.rows)
             if not len(rows):
@@ -301,12 +297,12 @@ class _GroundedBodies:
             own = np.isin(feet.rows.groups.group, rows)
             paths[own] = ball_path.plan_paths(feet.select(rows), shorter.of_rows(rows), goal[own])
             needs, found = self._needs(paths), shorter
-        lowered = pelvis.lower(list(needs.reshape(legs, len(most))), most, bodies.rows)
+        lowered = two_bone.lower(list(needs.reshape(legs, len(most))), most, bodies.rows)
         return found, self._on_floors(paths), lowered
 
     def _goal(self) -> FootPaths:
-        """Return where feet are led (K N, 3), m, as of `leads.goals`."""
-        led = leads.joined([own.leads for own in self.bodies.requests]).feet.ravel()
+        """Return where feet are led (K N, 3), m, as of `footsteps.goals`."""
+        led = footsteps.joined([own.leads for own in self.bodies.requests]).feet.ravel()
         return np.where(led[:, None], self.feet.positions, np.nan)
 
     def _on_floors(self, paths: FootPaths) -> FootPaths:
@@ -326,14 +322,9 @@ class _GroundedBodies:
             target = poses.position(leg.lower) - sunk + change
             arm = poses.position(leg.tip) - poses.position(leg.lower)
             needs.append(
-                pelvis.need(poses, leg, target + (arm - bodies.floors.tilted(arm)), self.followed)
+                two_bone.need(poses, leg, target + (arm - bodies.floors.tilted(arm)), self.followed)
             )
         return np.concatenate(needs)
-
-
-def _footsteps(path: RootPath, stances: tuple[Interval, ...]) -> Footsteps:
-    """Return the steps of a foot with a path (F, 3), m, that stands in intervals."""
-    return Footsteps(path, stances, path[[own.begin for own in stances]].reshape(-1, 3))
 
 
 def _unreached(

@@ -118,7 +118,6 @@ def _by_kind(
 
 
 def _place_alike(requests: Sequence[PlacementRequest]) -> list[PlacedFrames]:
-    """Return the frames of motions with the same limbs."""
     plans, body = [own.plan for own in requests], requests[0].plan.character
     groups = frame_groups.of_lengths([own.times for own in requests])
     turned, roots = (
@@ -130,7 +129,11 @@ def _place_alike(requests: Sequence[PlacementRequest]) -> list[PlacedFrames]:
         plans, poses, np.concatenate([own.times * own.plan.rate for own in requests])
     )
     joints = requests[0].joints
-    above = None if joints is None else _joints_above(body.parents, joints)
+    above = (
+        None
+        if joints is None
+        else {upper for joint in joints for upper in skeleton.joint_chain(body.parents, joint)[:-1]}
+    )
     for index, (limb, target) in enumerate(placing.targets()):
         if above is not None and limb.upper not in above:
             continue
@@ -140,11 +143,6 @@ def _place_alike(requests: Sequence[PlacementRequest]) -> list[PlacedFrames]:
             turned[:, limb.lower] = placing.tilted(limb, found.lower)
     parts = zip(groups.split(turned), groups.split(roots + placing.shift), strict=True)
     return [PlacedFrames(*own) for own in parts]
-
-
-def _joints_above(parents: tuple[int, ...], joints: Collection[int]) -> set[int]:
-    """Return the joints whose rotations move some joints."""
-    return {above for joint in joints for above in skeleton.joint_chain(parents, joint)[:-1]}
 
 
 def _paths_alike(plans: Sequence[FeetPlan]) -> list[FootPaths]:

@@ -20,7 +20,7 @@ from posefield.common import banded_systems
 from posefield.common.banded_systems import Bands, Sides
 from posefield.common.frame_groups import FrameGroups
 from posefield.common.units import Booleans, Floats, Indices
-from posefield.feet.stance_rows import FootRows, Mask, Runs, places
+from posefield.feet.stance_rows import FootRows, Runs, places
 
 # Time over which a change of the path is spread, s.
 SPREAD = 0.1
@@ -100,7 +100,11 @@ def smooth_change(
     system = _System.of(feet, chains, path, level=not np.iscomplexobj(path))
     known, given = _known(chains, system.goal.shape, stances, values)
     if fixed is not None:
-        _fix(chains, known, given, fixed, through)
+        # No path with fixed frames is a cycle.
+        single = chains.unknowns[through], chains.groups.group[through]
+        known[single] = True
+        for column, numbers in zip(given, _parts(fixed[through]), strict=True):
+            column[single] = numbers
     return system.path(known, given, values is None and bool(chains.closed.any()))
 
 
@@ -146,20 +150,6 @@ def _known(
             column[chains.unknowns[begins], row] = part
             column[last, chain] = column[0, chain]
     return known, given
-
-
-def _fix(
-    chains: _Chains,
-    known: Annotated[Booleans, "size chains"],
-    given: Sides,
-    fixed: Paths,
-    through: Mask,
-) -> None:
-    """Write the values of fixed frames (N,) into the known unknowns; no path is a cycle."""
-    own = chains.unknowns[through], chains.groups.group[through]
-    known[own] = True
-    for column, part in zip(given, _parts(fixed[through]), strict=True):
-        column[own] = part
 
 
 @dataclass(frozen=True)
@@ -253,23 +243,15 @@ def _right(
     target: Annotated[Floats, "chain_frames"],
 ) -> Annotated[Floats, "chain_frames"]:
     """Return the right sides (N,) of the equations of frames."""
-    bent = _bent(groups, stiffness, target)
+    # Stiffness times the second differences, zero at the ends.
+    bent = np.zeros(len(target))
+    bent[1:-1] = target[:-2] - 2.0 * target[1:-1] + target[2:]
+    bent[groups.starts] = bent[groups.starts + groups.counts - 1] = 0.0
+    bent *= stiffness[groups.group]
     found: Floats = weights * target - 2.0 * bent
     found[1:] += bent[:-1]
     found[:-1] += bent[1:]
     return found
-
-
-def _bent(
-    groups: FrameGroups,
-    stiffness: Annotated[Floats, "chains"],
-    target: Annotated[Floats, "chain_frames"],
-) -> Annotated[Floats, "chain_frames"]:
-    """Return stiffness times the second differences about the frames (N,), zero at the ends."""
-    found = np.zeros(len(target))
-    found[1:-1] = target[:-2] - 2.0 * target[1:-1] + target[2:]
-    found[groups.starts] = found[groups.starts + groups.counts - 1] = 0.0
-    return found * stiffness[groups.group]
 
 
 def _bands(

@@ -15,7 +15,7 @@ from posefield.common.array_shapes import Frames, RootPath
 from posefield.common.units import UP, Booleans, Floats
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
-from posefield.motion.contacts import contact_detection
+from posefield.motion import contact_detection
 
 # Contacts that are shorter are dropped, and gaps that are shorter are closed, s.
 SHORTEST_CONTACT = contact_detection.DEFAULT.shortest

@@ -14,14 +14,13 @@ import numpy.typing as npt
 from posefield.common import cancellation
 from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import UP, Booleans, Floats
-from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stance_rows, two_bone
+from posefield.feet import ball_path, limbs, stance_rows, two_bone
 from posefield.feet.body_plans import ROUNDS
-from posefield.feet.contact_estimates import DECIMALS, STANDING
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import FootRows, Runs
+from posefield.feet.stance_rows import DECIMALS, STANDING, FootRows, Runs
 from posefield.feet.stances import UNEVEN
 from posefield.locomotion import floor_plane
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 
 Scalar = TypeVar("Scalar", np.float64, np.bool_)
 PerWalker = Annotated[Floats, "walkers"]
@@ -126,7 +125,7 @@ def _grounded_feet(
         np.tile([getattr(own, name) for own in contacts], count // len(contacts))
         for name in ("height", "swing", "longest_swing", "clearance")
     )
-    above = contact_estimates.heights_above(paths @ UP, down, captured, rows)
+    above = stance_rows.heights_above(paths @ UP, down, captured, rows)
     mean = above.reshape(-1, len(contacts)).mean(axis=1)
     sunk = np.sign(mean) * np.maximum(np.abs(mean) - UNEVEN, 0.0)
     own = np.repeat(sunk, len(contacts))
@@ -151,7 +150,7 @@ def _reachable_steps(
     needs = _needs(poses, legs, feet, paths, sunk)
     for _ in range(ROUNDS):
         cancellation.check()
-        beyond = pelvis.beyond(needs, np.full(needs.shape, pelvis.MOST))
+        beyond = two_bone.beyond(needs, np.full(needs.shape, two_bone.MOST))
         shorter = stance_rows.shortened(found, beyond, feet.rows)
         rows = stance_rows.changed_rows(found, shorter, feet.rows)
         if not len(rows):
@@ -162,8 +161,8 @@ def _reachable_steps(
     walkers, frames = poses.positions.shape[:2]
     each = needs.reshape(walkers, len(legs), frames).swapaxes(0, 1).reshape(len(legs), -1)
     grids = _frame_rows((walkers, frames, 1), float(feet.rows.rates[0]))
-    most = np.full(walkers * frames, pelvis.MOST)
-    return paths, found, pelvis.lower(list(each), most, grids).reshape(walkers, frames)
+    most = np.full(walkers * frames, two_bone.MOST)
+    return paths, found, two_bone.lower(list(each), most, grids).reshape(walkers, frames)
 
 
 def _plan_paths(feet: FootRows, found: Runs) -> Annotated[Floats, "all_frames 3"]:
@@ -185,7 +184,7 @@ def _needs(
     moved = (paths - feet.positions).reshape(-1, frames, 3)
     changes = _walkers(moved, len(legs)) - sunk[:, None, None, None] * UP
     needs = [
-        pelvis.need(poses, leg, poses.position(leg.lower) + changes[:, :, foot], sunk[:, None])
+        two_bone.need(poses, leg, poses.position(leg.lower) + changes[:, :, foot], sunk[:, None])
         for foot, leg in enumerate(legs)
     ]
     return _rows(np.stack(needs, axis=2)).ravel()

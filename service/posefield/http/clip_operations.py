@@ -30,9 +30,9 @@ from posefield.question import json_decoding as bodies
 from posefield.question.json_decoding import json_pointer
 from posefield.question.motion_question import ClipsQuestion, FileQuestion, NamedClipQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clip_drafts, clips
+from posefield.synthesis import clip_batch, clips
 from posefield.synthesis.clips import ClipPreview
-from posefield.synthesis.frame_times import MAX_POSES
+from posefield.synthesis.poses import MAX_POSES
 from posefield.synthesis.synthesizer import Synthesizer
 
 REPEATED_NAME = "expected a name of its own: an earlier clip has it, capitals count for nothing"
@@ -176,7 +176,7 @@ async def validate(context: Clips, question: FileQuestion) -> ClipTask:
         convention, joints = delivery.convention, max(joints, delivery.joints)
     sizes = joints, encoder.bytes_per_joint, len(card.curves)
     fits = max_poses(context.service.settings.output_limit, *sizes)
-    corrected = not clip_drafts.is_predicted(model, question)
+    corrected = not clip_batch.is_predicted(model, question)
     return ClipTask(question, min(fits, MAX_POSES), convention, corrected, delivery)
 
 

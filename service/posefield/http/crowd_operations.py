@@ -32,11 +32,11 @@ from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
 from posefield.http.api.settings import Settings
 from posefield.http.steps import Context, Steps, from_url
 from posefield.inference.level_selection import Camera, LevelCriteria
-from posefield.locomotion import crowd_order as orders
 from posefield.locomotion import walking_crowd
-from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.locomotion import walking_crowd as orders
+from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.model_file.model_card import ModelCard
-from posefield.motion.crowd_clip import CrowdClip, CrowdPoses, Placement
+from posefield.motion.clip import CrowdClip, CrowdPoses, Placement
 from posefield.question import json_decoding as bodies
 from posefield.question.motion_question import (
     DEFAULT_BODY,

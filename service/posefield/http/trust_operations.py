@@ -13,9 +13,8 @@ from posefield.http import responses, worker_threads
 from posefield.http.steps import Context, Steps, from_body, from_url, unchecked
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.question.results import Explanation, SigmaGrid, Suggestions
-from posefield.synthesis import sigma_grid
-from posefield.synthesis.capture_suggestions import suggest
-from posefield.synthesis.explanation import explain_result
+from posefield.synthesis import trust
+from posefield.synthesis.trust import explain_result, suggest
 
 Grids = Context[TableEncoder[SigmaGrid]]
 Model = Context[None]
@@ -45,8 +44,8 @@ def grid_places(context: Grids, question: SigmaQuestion) -> AbstractAsyncContext
 async def compute_grid(context: Grids, question: SigmaQuestion) -> SigmaGrid:
     """Return sigma and support on the grid."""
     if len(question) > context.form.inline_limit:
-        return await worker_threads.within(sigma_grid.grid, context.model, question)
-    return sigma_grid.grid(context.model, question)
+        return await worker_threads.within(trust.grid, context.model, question)
+    return trust.grid(context.model, question)
 
 
 async def encode_grid(context: Grids, question: SigmaQuestion, answer: SigmaGrid) -> bytes:

@@ -9,15 +9,25 @@ levels of the last answer, and a character becomes coarser only with a margin (H
 """
 
 import math
+import time
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
+from hashlib import blake2b
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerCharacter, Vector
+from posefield.common.array_shapes import PerCharacter, PointControls, PointLabels, Vector
+from posefield.common.cancellation import ProgressCallback, ignore_progress
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices, Singles
+from posefield.common.units import Floats, Indices
+from posefield.inference.onnx_runtime import OUTPUTS
+from posefield.inference.session import Session
+from posefield.motion import joint_roles
+from posefield.motion.joint_roles import NamingConvention
+from posefield.motion.skeleton import Skeleton
 
 HYSTERESIS = 0.2
 """A coarser level than the previous one is chosen if its error is below the limit by this share."""
@@ -213,10 +223,131 @@ def _total(reached: Annotated[Indices, "levels"], ladder: LevelTable) -> float:
     return float((reached - np.append(reached[1:], 0)) @ ladder.costs)
 
 
-def error_pixels(
-    errors: Annotated[Floats, "levels"],
-    scale: PerCharacter,
-    levels: Annotated[Indices, "characters"],
-) -> Annotated[Singles, "characters"]:
-    """Return the pixels (N,) that the errors of the chosen levels cover."""
-    return (errors[levels] * scale).astype(np.float32)
+ROUNDS = 7
+"""Rounds of the benchmark: few, as it runs whenever a model is opened."""
+ROWS_PER_CALL = 512
+"""Poses of the calls that are timed, as many as in the calls of a small crowd."""
+
+
+def seconds_per_pose(
+    session: Session, progress: ProgressCallback = ignore_progress
+) -> tuple[float, ...]:
+    """Return the seconds per pose of each level, in batches as of a crowd.
+
+    Each is the median of the rounds. The costs never increase from a level to the next coarser one,
+    since a finer level that is cheaper can be used instead.
+    """
+    levels = [(session, level) for level in range(len(session.card.levels))]
+    return monotone_costs(benchmark_levels(levels, ROUNDS, progress))
+
+
+def benchmark_levels(
+    asked: Sequence[tuple[Session, int]],
+    rounds: int,
+    progress: ProgressCallback = ignore_progress,
+) -> Annotated[Floats, "{len(asked)}"]:
+    """Return the seconds per pose (N,) of levels of sessions: the median of the rounds.
+
+    rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
+    affects all of them. progress: called after each round, and after the one that warms up.
+    """
+    calls = [(session, _sample_inputs(session), level) for session, level in asked]
+    taken = []
+    for done in range(rounds + 1):
+        taken.append([_time_call(*call) for call in calls])
+        progress(done + 1, rounds + 1)
+    # np.median imports masked arrays on first use, which takes longer than this measurement.
+    return np.sort(taken[1:], axis=0)[rounds // 2] / ROWS_PER_CALL
+
+
+def monotone_costs(costs: Annotated[Floats, "levels"]) -> tuple[float, ...]:
+    """Return the costs (L,), each lowered to the minimum of itself and those before it."""
+    return tuple(np.minimum.accumulate(costs).tolist())
+
+
+def _sample_inputs(
+    session: Session,
+) -> tuple[PointControls, Annotated[Floats, "points 1"], PointLabels]:
+    """Return controls (B, d) and times (B, 1), s, across the ranges, and zero labels (B, p)."""
+    card, rows = session.card, ROWS_PER_CALL
+    low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
+    times = np.linspace(0.0, card.durations[0], rows)[:, None]
+    return np.linspace(low, high, rows), times, np.zeros((rows, sum(card.label_counts)))
+
+
+def _time_call(session: Session, question: tuple[Floats, Floats, Floats], level: int) -> float:
+    controls, times, labels = question
+    start = time.perf_counter()
+    session.run(controls, times, *OUTPUTS, labels=labels, level=level)
+    return time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class NamedModel:
+    """An opened model file and the name under which it is asked."""
+
+    name: str
+    session: Session
+
+    @cached_property
+    def identity(self) -> str:
+        """name@contenthash; answers under this name never change."""
+        return f"{self.name}@{self.session.digest}"
+
+    @cached_property
+    def fingerprint(self) -> bytes:
+        """Digest of the model file and of this machine's rounding.
+
+        It differs between machines on which the model's answers or the correction differ in the
+        last digits.
+        """
+        parts = self.identity.encode() + self.session.golden + rounding_fingerprint()
+        return blake2b(parts, digest_size=16).digest()
+
+    @cached_property
+    def level_table(self) -> LevelTable:
+        """Errors and costs of the levels of detail, from which a view chooses.
+
+        An error is that of the worst measured pose. Costs are measured on first use.
+        """
+        errors = np.array([level.pose for level in self.session.card.levels])
+        return LevelTable(errors, np.array(seconds_per_pose(self.session)))
+
+    @property
+    def rest_position(self) -> Vector:
+        """Root position at rest (3,), m."""
+        return self.session.card.skeleton.offsets[0]
+
+    @cached_property
+    def radius(self) -> float:
+        """Radius, m, of a sphere about the root that contains the body at rest."""
+        joints = self.session.card.skeleton
+        rest = joints.at_rest(joints.offsets)
+        return float(np.linalg.norm(rest - rest[0], axis=-1).max())
+
+    @cached_property
+    def _skeletons(self) -> dict[NamingConvention, Skeleton]:
+        """Cache of skeletons by naming convention."""
+        return {"own": self.session.card.skeleton}
+
+    def skeleton(self, names: NamingConvention) -> Skeleton:
+        """Return the skeleton with these names; InvalidField if the model has no roles for them."""
+        card = self.session.card
+        if names not in self._skeletons:
+            self._skeletons[names] = joint_roles.rename_joints(card.skeleton, card.roles, names)
+        return self._skeletons[names]
+
+
+# Sizes that are no multiple of a register, so that remainders are covered.
+ROWS, COLUMNS = 29, 37
+
+
+@cache
+def rounding_fingerprint() -> bytes:
+    """Return a matrix product, a solution and sines of fixed numbers as bytes.
+
+    They differ between processors whose rounding differs.
+    """
+    numbers = np.sin(np.arange(1.0, ROWS * COLUMNS + 1.0)).reshape(ROWS, COLUMNS)
+    square = numbers @ numbers.T + np.eye(ROWS)
+    return b"".join(a.tobytes() for a in (square, np.linalg.solve(square, numbers), numbers))

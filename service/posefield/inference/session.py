@@ -11,9 +11,8 @@ import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Indices, Singles
-from posefield.inference import graph_ports, onnx_runtime
-from posefield.inference.graph_ports import CONTACTS, LABELS
-from posefield.inference.onnx_runtime import Graph, GraphParts
+from posefield.inference import onnx_runtime
+from posefield.inference.onnx_runtime import CONTACTS, LABELS, Graph, GraphParts
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
@@ -255,7 +254,7 @@ class Session:
 
     def run_trial(self) -> bytes:
         """Return the answer at the default controls; equals `golden` for a sound model."""
-        names, controls = graph_ports.outputs(self.card), graph_ports.default_controls(self.card)
+        names, controls = onnx_runtime.outputs(self.card), onnx_runtime.default_controls(self.card)
         answers = self.run(controls, np.zeros((1, 1)), *names)
         answers.append(self.durations(controls))
         return b"".join(answer.tobytes() for answer in answers)
@@ -285,7 +284,7 @@ def load_bytes(content: bytes, source: str, limits: TrialLimits = DEFAULT_LIMITS
 def open_bytes(content: bytes, source: str) -> Session:
     """Return a session on bytes that this program wrote, checked without a child process."""
     card = checked_file.load_card(content, source)
-    graph_ports.check(onnx_runtime.open_session(content, source), card, source)
+    onnx_runtime.check(onnx_runtime.open_session(content, source), card, source)
     return open_checked(content, card, source)
 
 

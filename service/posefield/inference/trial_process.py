@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from posefield.common.errors import ModelError
-from posefield.inference import graph_ports, onnx_runtime
+from posefield.inference import onnx_runtime
 from posefield.model_file import checked_file
 
 MAX_MESSAGE = 1_000
@@ -123,7 +123,7 @@ def _run_child(other: Connection, limits: TrialLimits) -> None:
     message = ""
     try:
         card = checked_file.load_card(content, "")
-        graph_ports.check(onnx_runtime.open_session(content, ""), card, "")
+        onnx_runtime.check(onnx_runtime.open_session(content, ""), card, "")
     except ModelError as fault:
         message = fault.message
     except MemoryError:

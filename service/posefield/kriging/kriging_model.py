@@ -5,7 +5,7 @@ inverse gives the weight of each sample at a point. Training stores products of 
 model file; the service computes the weights to explain a result.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -16,6 +16,7 @@ import numpy as np
 from posefield.common.array_shapes import (
     PerControl,
     PerPoint,
+    PerSample,
     Points,
     PointSamples,
     SampleMatrix,
@@ -23,7 +24,52 @@ from posefield.common.array_shapes import (
 )
 from posefield.common.bounded_types import Count, Degree, NonNegative
 from posefield.common.units import Floats, Indices
-from posefield.kriging.covariance import COVARIANCE_MODELS
+
+# Where the Matérn covariances of unit rate have fallen to 5 %.
+RATE32, RATE52 = 4.743865, 5.918277
+
+
+def exponential(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+    """Return exp(-3 h)."""
+    return np.exp(-3.0 * np.sqrt(squared))
+
+
+def gaussian(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+    """Return exp(-3 h²)."""
+    return np.exp(-3.0 * squared)
+
+
+def spherical(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+    """Return 1 - 3/2 h + 1/2 h³ up to h = 1, and zero beyond."""
+    h = np.minimum(np.sqrt(squared), 1.0)
+    return 1.0 - 1.5 * h + 0.5 * h**3
+
+
+def matern32(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+    """Return the Matérn covariance of smoothness 3/2."""
+    a = RATE32 * np.sqrt(squared)
+    return (1.0 + a) * np.exp(-a)
+
+
+def matern52(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+    """Return the Matérn covariance of smoothness 5/2."""
+    a = RATE52 * np.sqrt(squared)
+    return (1.0 + a + RATE52**2 / 3.0 * squared) * np.exp(-a)
+
+
+COVARIANCE_MODELS: dict[str, Callable[[Floats], Floats]] = {
+    formula.__name__: formula for formula in (exponential, gaussian, spherical, matern32, matern52)
+}
+"""Covariance models by the names that recipes and cards use."""
+
+KERNEL_GAINS = {
+    "exponential": 9.0,
+    "gaussian": 3.0,
+    "spherical": 1.0,
+    "matern32": RATE32**2,
+    "matern52": RATE52**2,
+}
+"""Factors of squared distances with which a kernel on a graphics card computes fewer products."""
 
 
 @dataclass(frozen=True)
@@ -263,3 +309,78 @@ def weight_matrix(hyper: Hyper, samples: Samples) -> Annotated[Floats, "system s
         own = invert_system(hyper, samples, degree)[:, :n]
         found[: len(own)] += own / len(hyper.drifts)
     return found
+
+
+def residual_matrix(
+    inverse: SampleMatrix,
+    functions: Annotated[Floats, "samples functions"],
+    groups: Annotated[Indices, "samples"],
+) -> SampleMatrix:
+    """Return the matrix (n, n) from values to residuals for one drift.
+
+    A residual is a sample's value minus its prediction from all other groups. inverse (n, n): of
+    the covariances of measured samples. functions (n, k): the drift's. groups (n,): samples of one
+    group, such as strides cut from one take, are left out together.
+    """
+    block = sample_block(inverse, functions)
+    return divide_groups(block, block, equal_sized_groups(groups))
+
+
+def sample_block(
+    inverse: SampleMatrix, functions: Annotated[Floats, "samples functions"]
+) -> SampleMatrix:
+    """Return the sample block (n, n) of the inverse of the whole system [[C, F], [Fᵀ, 0]].
+
+    inverse (n, n): of the covariances C. functions (n, k): the drift's, F.
+    """
+    weighed = inverse @ functions
+    block: Floats = inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
+    return block
+
+
+def divide_groups(
+    block: SampleMatrix,
+    rows: Annotated[Floats, "samples _"],
+    several: list[Annotated[Indices, "_ _"]],
+) -> Annotated[Floats, "samples _"]:
+    """Return rows (n, m), each group's multiplied by the inverse of its part of a block (n, n).
+
+    several: of the groups of more than one sample, as `equal_sized_groups` returns them.
+    """
+    found: Floats = rows / np.diagonal(block)[:, None]
+    for own in several:
+        among = block[own[:, :, None], own[:, None, :]]
+        found[own] = np.linalg.solve(among, rows[own])
+    return found
+
+
+def equal_sized_groups(
+    groups: Annotated[Indices, "samples"],
+) -> list[Annotated[Indices, "_ _"]]:
+    """Return sample indices (g, size) of the groups (n,) of each size above one."""
+    _, names, sizes = np.unique(groups, return_inverse=True, return_counts=True)
+    order = np.argsort(names, kind="stable")
+    several = np.unique(sizes[sizes > 1])
+    return [order[sizes[names[order]] == size].reshape(-1, size) for size in several]
+
+
+def leave_out(
+    hyper: Hyper, samples: Samples, groups: Annotated[Indices, "samples"]
+) -> SampleMatrix:
+    """Return the matrix (n, n) from values to leave-one-out residuals of one field.
+
+    samples (n, d + p): d controls in half-ranges and p weights of labels. With more than one drift,
+    a residual is from the mean of the predictions.
+    """
+    d = len(hyper.scales)
+    inverse: Floats = np.asarray(np.linalg.inv(noisy(hyper, samples)))
+    found = [residual_matrix(inverse, drift(samples, d, degree), groups) for degree in hyper.drifts]
+    return np.asarray(sum(found[1:], found[0]) / len(found))
+
+
+def left_out_variances(hyper: Hyper, samples: Samples, left_out: SampleMatrix) -> PerSample:
+    """Return the variances (n,) of residuals by a matrix (n, n) of `leave_out`.
+
+    They include the nugget and are shares of the sill.
+    """
+    return np.sum((left_out @ noisy(hyper, samples)) * left_out, axis=1)

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import Scalars
+from posefield.common.array_shapes import PerPoint, Scalars
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 
@@ -66,3 +66,64 @@ def turn_roots(
     """Return rotations (..., J, 4) with the roots turned by headings (...), rad, about +Y."""
     root = quat.mul(quat.from_axis_angle(UP, headings), rotations[..., 0, :])
     return np.concatenate([root[..., None, :], rotations[..., 1:, :]], axis=-2)
+
+
+Ends = tuple[Annotated[Floats, "2"] | None, Annotated[Floats, "2"] | None]
+"""Slopes (2,) of a spline at its first and last knot; None for no curvature there."""
+
+
+def headings(
+    waypoints: Annotated[Floats, "waypoints 2"], spacing: float, per_step: int, ends: Ends
+) -> tuple[PerPoint, PerPoint]:
+    """Return distances (K,), m, along the spline through waypoints, and its headings (K,), rad.
+
+    waypoints: (P, 2), x and z, m. The points are `per_step` to a `spacing`, m, of the straight
+    lines between the waypoints. Headings have no jumps.
+    """
+    knots = np.pad(np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)), (1, 0))
+    count = per_step * int(np.ceil(knots[-1] / spacing)) + 1
+    points, slopes = spline(knots, waypoints, np.linspace(0.0, knots[-1], count), ends)
+    gone = np.pad(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), (1, 0))
+    return gone, np.unwrap(np.angle(project(np.insert(slopes, 1, 0.0, axis=1))))
+
+
+def spline(
+    knots: Annotated[Floats, "knots"],
+    values: Annotated[Floats, "knots 2"],
+    at: PerPoint,
+    ends: Ends = (None, None),
+) -> tuple[Annotated[Floats, "points 2"], Annotated[Floats, "points 2"]]:
+    """Return the cubic spline of values (P, 2) at knots (P,): values and slopes at (S,)."""
+    gaps = np.diff(knots)
+    chords = np.diff(values, axis=0) / gaps[:, None]
+    seconds = _second_derivatives(gaps, chords, ends)
+    piece = np.minimum(np.searchsorted(knots, at, side="right") - 1, len(gaps) - 1)
+    gap = gaps[piece][:, None]
+    b = (at - knots[piece])[:, None] / gap
+    a = 1.0 - b
+    before, after = seconds[piece], seconds[piece + 1]
+    bulge = ((a**3 - a) * before + (b**3 - b) * after) * gap**2 / 6.0
+    lean = ((1.0 - 3.0 * a**2) * before + (3.0 * b**2 - 1.0) * after) * gap / 6.0
+    return a * values[piece] + b * values[piece + 1] + bulge, chords[piece] + lean
+
+
+def _second_derivatives(
+    gaps: Annotated[Floats, "pieces"], chords: Annotated[Floats, "pieces 2"], ends: Ends
+) -> Annotated[Floats, "knots 2"]:
+    """Return the second derivatives at the knots.
+
+    Slopes are continuous at the inner knots: three neighbouring second derivatives per equation. A
+    given slope at an end is one more equation.
+    """
+    system = np.diag((np.pad(gaps, (1, 0)) + np.pad(gaps, (0, 1))) / 3.0)
+    system += np.diag(gaps / 6.0, 1) + np.diag(gaps / 6.0, -1)
+    sides = np.zeros((len(gaps) + 1, 2))
+    sides[1:-1] = np.diff(chords, axis=0)
+    if ends[0] is not None:
+        sides[0] = chords[0] - ends[0]
+    if ends[1] is not None:
+        sides[-1] = ends[1] - chords[-1]
+    known = np.array([ends[0] is not None, *[True] * (len(gaps) - 1), ends[1] is not None])
+    found = np.zeros_like(sides)
+    found[known] = np.linalg.solve(system[np.ix_(known, known)], sides[known])
+    return found

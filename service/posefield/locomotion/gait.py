@@ -1,23 +1,173 @@
-"""Gait of a cyclic model: controls for speeds and rates of turning.
+"""Gait of a cyclic model: controls and labels of walkers for speeds and rates of turning.
 
-Names and units of controls are the recipe's, so their effect is measured on the model's own clips:
-speed and rate of turning.
+Names and units of controls are the recipe's, so their effect is measured on the model's own clips.
+Without a request each walker has one of the captured combinations of labels. A label set that a
+request gives has the same name or weights for all walkers; the names in the other sets, the usual
+speed and the usual controls are those of a captured combination that is drawn for each walker.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Annotated
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 
-from posefield.common.array_shapes import PerClip, PerPoint, PointControls
+from posefield.common.array_shapes import PerCharacter, PerClip, PerPoint, PointControls, Scalars
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
-from posefield.locomotion import gait_region, stride, walker_labels
-from posefield.locomotion.gait_region import GaitRegion
-from posefield.locomotion.walker_labels import WalkerLabels
+from posefield.locomotion import stride
+from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.question.motion_question import LabelValue
+from posefield.validation.question_validation import label_weights
+
+
+@dataclass(frozen=True)
+class WalkerLabels:
+    """Labels of walkers by combination, the index in `stride.label_rows`; -1 without label sets.
+
+    rows: names of each combination by label set. weights: (K + 1, p), of all labels for each
+    combination, zeros at the end. asked: name or weights by label set of the request. shares: (K,),
+    share of the walkers with each combination; None for equal shares.
+    """
+
+    rows: tuple[Mapping[str, str], ...]
+    weights: Annotated[Floats, "rows labels"]
+    asked: Mapping[str, LabelValue] = field(default_factory=dict)
+    shares: Annotated[Floats, "combinations"] | None = None
+
+    def draw(self, numbers: PerCharacter) -> Annotated[Indices, "characters"]:
+        """Return the combinations (N,) of random numbers (N,) from 0 to less than 1."""
+        if not self.rows:
+            return np.full(len(numbers), -1)
+        if self.shares is None:
+            return (numbers * len(self.rows)).astype(np.int64)
+        ends = np.cumsum(self.shares)
+        found = np.searchsorted(ends, numbers * ends[-1], side="right")
+        # The product may round up to the last end.
+        return np.minimum(found, np.flatnonzero(self.shares)[-1])
+
+    def facts(self, who: Annotated[Indices, "characters"]) -> dict[str, Any]:
+        """Return the performer of each walker, None for none, and its labels in further sets.
+
+        A mixture of performers is among the labels.
+        """
+        sets = [*self.rows[0]] if self.rows else []
+        found = {name: [self._label(name, int(each)) for each in who] for name in sets}
+        performers: list[Any] = [None] * len(who)
+        if isinstance(self.asked.get(PERFORMER, ""), str):
+            performers = found.pop(PERFORMER, performers)
+        return {"performers": performers} | ({"labels": found} if found else {})
+
+    def _label(self, name: str, who: int) -> LabelValue:
+        return self.asked.get(name, self.rows[who][name])
+
+
+def captured_labels(card: ModelCard) -> WalkerLabels:
+    """Return the captured combinations of labels, in equal shares."""
+    rows = stride.label_rows(card)
+    return WalkerLabels(tuple(rows), stride.label_table(card))
+
+
+def requested_labels(card: ModelCard, asked: Mapping[str, LabelValue]) -> WalkerLabels:
+    """Return the captured combinations with the labels of a request in their sets.
+
+    The share of a combination is the product of the requested weights of its names, or their sum
+    where no captured combination has names of all requested sets. Raises InvalidField for a label
+    that the model does not have, and for invalid weights.
+    """
+    given = label_weights(card, None, asked)[0]
+    own = captured_labels(card)
+    if not asked:
+        return own
+    weights, parts, first = own.weights.copy(), [], 0
+    for each in card.labels:
+        columns = slice(first, first + len(each.names))
+        if each.name in asked:
+            weights[:-1, columns] = given[columns]
+            shares = dict(zip(each.names, given[columns].tolist(), strict=True))
+            parts.append(np.array([shares[row[each.name]] for row in own.rows]))
+        first = columns.stop
+    return WalkerLabels(own.rows, weights, asked, combination_shares(np.array(parts)))
+
+
+def combination_shares(
+    parts: Annotated[Floats, "sets combinations"],
+) -> Annotated[Floats, "combinations"]:
+    """Return the shares (K,) of combinations.
+
+    parts: (S, K), requested weight of each combination's name in each requested set. Shares are the
+    products over the sets, or the sums where all products are zero.
+    """
+    together = parts.prod(axis=0)
+    return together if together.any() else parts.sum(axis=0)
+
+
+# Tolerance for the rounding of points on an edge, m/s and rad/s.
+SLACK = 1e-6
+
+
+@dataclass(frozen=True)
+class GaitRegion:
+    """Convex region of speeds, m/s, and rates of turning, rad/s.
+
+    normals: (E, 2) and limits: (E,); a pair is inside where normals times it are at most the
+    limits. speeds: the smallest and the largest.
+    """
+
+    normals: Annotated[Floats, "edges 2"]
+    limits: Annotated[Floats, "edges"]
+    speeds: tuple[float, float]
+
+    def contains(
+        self, speeds: Scalars, turning: Scalars
+    ) -> Annotated[npt.NDArray[np.bool_], "*batch"]:
+        """Return whether pairs (...) are inside the region."""
+        pairs = np.stack(np.broadcast_arrays(speeds, turning), axis=-1)
+        return np.all(pairs @ self.normals.T <= self.limits + SLACK, axis=-1)
+
+    def turning(
+        self, speeds: Annotated[Floats, "*batch"]
+    ) -> tuple[Annotated[Floats, "*batch"], Annotated[Floats, "*batch"]]:
+        """Return the smallest and the largest rate of turning (...), rad/s, at speeds (...)."""
+        right, left = self.normals[:, 1] < 0.0, self.normals[:, 1] > 0.0
+        return self._edge_rates(speeds, right).max(axis=-1), self._edge_rates(speeds, left).min(
+            axis=-1
+        )
+
+    def _edge_rates(
+        self, speeds: Annotated[Floats, "*batch"], edges: npt.NDArray[np.bool_]
+    ) -> Annotated[Floats, "*batch some"]:
+        """Return the rates of turning (..., E) at which the edges lie at speeds (...)."""
+        along, across = self.normals[edges].T
+        return (self.limits[edges] - speeds[..., None] * along) / across
+
+
+def convex_hull(pairs: Annotated[Floats, "pairs 2"]) -> GaitRegion:
+    """Return the convex hull of pairs (N, 2) of speed and rate of turning."""
+    ordered = np.unique(pairs, axis=0)
+    # Counter-clockwise (Andrew's monotone chain).
+    corners = np.array([*_chain(ordered)[:-1], *_chain(ordered[::-1])[:-1]])
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    limits = np.sum(normals * corners, axis=1)
+    return GaitRegion(normals, limits, (float(pairs[:, 0].min()), float(pairs[:, 0].max())))
+
+
+def _chain(ordered: Annotated[Floats, "pairs 2"]) -> list[Annotated[Floats, "2"]]:
+    chain: list[Floats] = []
+    for point in ordered:
+        while len(chain) > 1 and _area(chain[-2], chain[-1], point) <= 0.0:
+            chain.pop()
+        chain.append(point)
+    return chain
+
+
+def _area(a: Annotated[Floats, "2"], b: Annotated[Floats, "2"], c: Annotated[Floats, "2"]) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
 
 # A lower speed does not count as travel, and speeds closer than this count as equal, m/s.
 MIN_SPEED = 0.05
@@ -47,7 +197,7 @@ class Gait:
 
         Raises InvalidField for a label that the model does not have, and for invalid weights.
         """
-        return replace(self, labels=walker_labels.requested_labels(self.session.card, asked))
+        return replace(self, labels=requested_labels(self.session.card, asked))
 
     def mean_controls(
         self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
@@ -91,8 +241,11 @@ def fit_gait(session: Session) -> Gait:
     manners = mean_residuals(
         controls - _design_matrix(*rates.T) @ slopes, who, len(stride.label_rows(card))
     )
-    region = gait_region.convex_hull(_add_straight_rates(rates))
-    return Gait(session, rates, slopes, manners, region, walker_labels.captured_labels(card))
+    # With straight walking at the slowest and the fastest speed: a stride cut from a straight walk
+    # turns by a few degrees, which is no lower bound of the turning.
+    ends = np.array([rates[:, 0].min(), rates[:, 0].max()])
+    region = convex_hull(np.vstack([rates, np.column_stack([ends, np.zeros(2)])]))
+    return Gait(session, rates, slopes, manners, region, captured_labels(card))
 
 
 def _check_speeds(name: str, speeds: PerClip) -> None:
@@ -102,16 +255,6 @@ def _check_speeds(name: str, speeds: PerClip) -> None:
             "model",
             f"{name} goes {low:.3f} to {high:.3f} m/s, expected one that travels at several speeds",
         )
-
-
-def _add_straight_rates(rates: Annotated[Floats, "clips 2"]) -> Annotated[Floats, "clips+2 2"]:
-    """Return the rates with straight walking added at the slowest and the fastest speed.
-
-    A stride cut from a straight walk turns by a few degrees, which is no lower bound of the
-    turning.
-    """
-    ends = np.array([rates[:, 0].min(), rates[:, 0].max()])
-    return np.vstack([rates, np.column_stack([ends, np.zeros(2)])])
 
 
 def _design_matrix(speeds: PerPoint, turning: PerPoint) -> Annotated[Floats, "points 3"]:

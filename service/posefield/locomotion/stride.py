@@ -14,7 +14,7 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.array_shapes import PerPoint, PointControls, PointLabels
 from posefield.common.units import Floats, Indices, Singles
-from posefield.inference import graph_ports
+from posefield.inference import onnx_runtime
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
@@ -144,7 +144,7 @@ def poses_of_strides(
     """
     controls, labels = who
     times = (phases * own.durations)[:, None]
-    asked = ["rotations", "root_position"] + [graph_ports.CURVES] * bool(session.card.curves)
+    asked = ["rotations", "root_position"] + [onnx_runtime.CURVES] * bool(session.card.curves)
     rotations, roots, *curves = _run_batches(session, controls, times, labels, level, *asked)
     posed = relative_poses(own, phases, rotations[:, 0], roots[:, 0])
     return replace(posed, curves=curves[0][:, 0]) if curves else posed
@@ -194,7 +194,7 @@ def contact_probabilities(
         else:
             times = phases[rows] * durations[rows]
         (likely,) = session.run(
-            own, times[:, None], graph_ports.CONTACTS, labels=names, level=level
+            own, times[:, None], onnx_runtime.CONTACTS, labels=names, level=level
         )
         found[rows] = likely[:, 0]
     return found

@@ -1,8 +1,8 @@
 """Crowds of walking characters: validation, plans, and motions computed on demand."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -10,23 +10,24 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
+from posefield.inference.level_selection import Camera, NamedModel
 from posefield.inference.session import Session
-from posefield.locomotion import (
-    floor_plane,
-    level_transitions,
-    locomotion_plan,
-    random_paths,
-    stride,
-)
-from posefield.locomotion import routes as given
+from posefield.locomotion import floor_plane, locomotion_plan, paths, stride
+from posefield.locomotion import paths as given
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.level_transitions import LevelSchedule
-from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.locomotion.routes import Route
+from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
+from posefield.locomotion.paths import Route
 from posefield.locomotion.stride import RelativePoses
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import blend, curves, foot_skate, skeleton
-from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion import contact_detection, curves, quat, skeleton
+from posefield.motion.clip import CrowdClip, Motions, Placement
+from posefield.question.motion_question import DEFAULT_VARIETY, FeetMode, LabelValue
+from posefield.question.walk_question import (
+    DEFAULT_FOV,
+    DEFAULT_HEIGHT,
+    WalkerTake,
+    WalkQuestion,
+)
 
 # Poses of one batch of motions: 8 MB at 31 joints, or one longer motion.
 POSES_PER_BATCH = 8_000
@@ -55,8 +56,8 @@ def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) 
     Raises InvalidField for numbers out of range.
     """
     frames = _frames(count, seconds, rate, seed)
-    characters = random_paths.draw_characters(gait, count, seed)
-    ways = random_paths.draw_paths(gait, characters, seconds)
+    characters = paths.draw_characters(gait, count, seed)
+    ways = paths.draw_paths(gait, characters, seconds)
     return locomotion_plan.plan_along_paths(
         gait, ways, characters.who, characters.phases, frames, rate
     )
@@ -71,7 +72,7 @@ def plan_routes(
     short.
     """
     frames = _frames(len(routes), seconds, rate, seed)
-    characters = random_paths.draw_characters(gait, len(routes), seed)
+    characters = paths.draw_characters(gait, len(routes), seed)
     ways = given.paths_through(gait, routes)
     return locomotion_plan.plan_along_paths(
         gait, ways, characters.who, characters.phases, frames, rate
@@ -104,7 +105,7 @@ def poses(count: int, seconds: float, rate: float) -> float:
     return count * (seconds * max(rate, 1.0 / MAX_PLAN_STEP) + 1.0)
 
 
-def build_crowd(
+def crowd_of_plan(
     session: Session, plan: LocomotionPlan, shown: LevelSchedule, make: MotionMaker | None = None
 ) -> CrowdClip:
     """Return the crowd of a plan, each character with its own motion in the frame of its start.
@@ -124,37 +125,20 @@ def build_crowd(
     )
 
 
-def share_motions(
-    session: Session,
-    plan: LocomotionPlan,
-    shown: LevelSchedule,
-    stands: Placement,
-    make: MotionMaker | None = None,
-) -> CrowdClip:
-    """Return a crowd at given placements, whose characters reuse the plan's motions in turn."""
-    one_each = build_crowd(session, plan, shown, make)
-    return replace(one_each, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
-
-
 def _facts(session: Session, plan: LocomotionPlan) -> dict[str, Any]:
     card = session.card
+    low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
+    outside = np.any((plan.controls < low) | (plan.controls > high), axis=-1)
     return {
         "model": f"{card.name}@{session.digest}",
         **plan.labels.facts(plan.who),
-        "outside_share": _outside_share(card, plan),
+        "outside_share": float(np.mean(outside)),
     }
 
 
 def _level_shares(session: Session, shown: LevelSchedule) -> list[float]:
-    """Return the share of the poses that has each level."""
     counts = np.bincount(shown.levels.ravel(), minlength=len(session.card.levels))
     return [float(f"{share:.4g}") for share in counts / shown.levels.size]
-
-
-def _outside_share(card: ModelCard, plan: LocomotionPlan) -> float:
-    """Return the share of the poses with some control outside its sampled range."""
-    low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
-    return float(np.mean(np.any((plan.controls < low) | (plan.controls > high), axis=-1)))
 
 
 def _batches(
@@ -212,7 +196,7 @@ def _blended_poses(
         some = pairs[0][between], pairs[1][between]
         before = _at_levels(card, pose, some, shown.previous[between])
         for name, whole in after.arrays.items():
-            mix = blend.nlerp if name == "rotations" else blend.lerp
+            mix = quat.nlerp if name == "rotations" else quat.lerp
             whole[between] = mix(getattr(before, name), whole[between], shares[between])
     return after
 
@@ -257,7 +241,9 @@ def measure_skate_of_feet(
     frames = feet.shape[1]
     length = min(round(float(np.mean(card.durations)) * rate) + 1, frames)
     feet = feet[:, : frames // length * length]
-    return foot_skate.mean_skate_speed(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
+    return contact_detection.mean_skate_speed(
+        feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate
+    )
 
 
 def foot_skate_per_clip(gait: Gait, rate: float) -> Annotated[Floats, "clips 1"]:
@@ -270,7 +256,7 @@ def foot_skate_per_clip(gait: Gait, rate: float) -> Annotated[Floats, "clips 1"]
     origin = floor_plane.project(np.zeros((len(controls), 3)))
     held = np.repeat(controls[:, None], length, axis=1)
     plan = locomotion_plan.plan_from_controls(gait, held, who, nowhere, (origin, nowhere), rate)
-    finest = level_transitions.constant_schedule(0, plan.phases.shape)
+    finest = locomotion_plan.constant_schedule(0, plan.phases.shape)
     return measure_foot_skate(
         card, motions(gait.session, plan, np.arange(len(controls)), finest), rate
     )
@@ -281,3 +267,115 @@ def mean_foot_skate(gait: Gait, rate: float) -> float:
     speeds = foot_skate_per_clip(gait, rate)[:, 0]
     moved_by = stride.clip_performers(gait.session.card)
     return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))
+
+
+MAX_CHARACTERS = 1_000_000
+"""Largest number of characters of one crowd, which may share motions."""
+DEFAULT_FPS, DEFAULT_PIXELS = 30.0, 1.0
+
+
+@dataclass(frozen=True)
+class CrowdOrder:
+    """Parameters of a walking crowd.
+
+    count: characters, each on its own path; with routes, their number. routes: given routes.
+    motions: number of distinct motions that the characters share, None for one each. seconds:
+    duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
+    if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
+    labels: name or weights of all characters by label set. feet: whether they stand; None where the
+    model decides. take: seed of all characters, 0 for the prediction, or "index" for a seed of its
+    own for each distinct motion. variety: size of the takes' deviations. detail: whether details
+    that no control predicts are added.
+    """
+
+    count: int
+    routes: Sequence[Route] = ()
+    motions: int | None = None
+    seconds: float = 10.0
+    fps: float = DEFAULT_FPS
+    seed: int = 0
+    level: int | None = None
+    camera: Camera | None = None
+    pixels: float = DEFAULT_PIXELS
+    labels: Mapping[str, LabelValue] = field(default_factory=dict)
+    feet: FeetMode | None = None
+    take: WalkerTake = 0
+    variety: float = DEFAULT_VARIETY
+    detail: bool = False
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.count <= MAX_CHARACTERS:
+            raise InvalidField("count", f"{self.count}, expected 1 to {MAX_CHARACTERS} characters")
+        if self.level is not None and self.camera is not None:
+            raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
+        if self.motions is not None and not 1 <= self.motions <= self.count:
+            raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
+        if self.motions is not None and self.routes:
+            raise InvalidField("motions", f"{self.motions}, expected none: every route has its own")
+        if self.motions is not None and self.camera is not None:
+            raise InvalidField(
+                "motions", "shared by characters near and far, expected a level and no camera"
+            )
+        if not self.pixels >= 0.0:
+            raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
+
+
+def from_question(asked: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrder:
+    """Return the order of a question; its characters follow the routes if there are any."""
+    camera = None
+    if asked.camera is not None:
+        fov = DEFAULT_FOV if asked.fov is None else asked.fov
+        height = DEFAULT_HEIGHT if asked.height is None else asked.height
+        camera = Camera(np.array(asked.camera), fov, height)
+    return CrowdOrder(
+        count=asked.count,
+        routes=routes,
+        motions=asked.motions,
+        seconds=asked.seconds,
+        fps=asked.fps,
+        seed=asked.seed,
+        level=asked.level,
+        camera=camera,
+        pixels=DEFAULT_PIXELS if asked.pixels is None else asked.pixels,
+        labels=asked.labels,
+        feet=asked.feet,
+        take=asked.take,
+        variety=asked.variety,
+        detail=asked.detail,
+    )
+
+
+def build_crowd(
+    model: NamedModel, gait: Gait, order: CrowdOrder, make: MotionMaker | None = None
+) -> CrowdClip:
+    """Return the crowd of an order, whose motions are computed on demand.
+
+    make: computes the motions, which are as predicted by default. Raises InvalidField for
+    parameters that the model or the limits do not permit.
+    """
+    gait = gait.with_labels(order.labels)
+    plan = _build_plan(gait, order)
+    shown = _build_schedule(model, plan, order)
+    crowd = crowd_of_plan(gait.session, plan, shown, make)
+    if order.motions is None:
+        return crowd
+    # The characters reuse the motions in turn.
+    stands = paths.initial_placement(order.count, order.seed)
+    return replace(crowd, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
+
+
+def _build_plan(gait: Gait, order: CrowdOrder) -> LocomotionPlan:
+    span = order.seconds, order.fps, order.seed
+    if order.routes:
+        return plan_routes(gait, order.routes, *span)
+    return plan_random(gait, order.motions or order.count, *span)
+
+
+def _build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:
+    level, coarsest = order.level or 0, len(model.session.card.levels) - 1
+    if not 0 <= level <= coarsest:
+        raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
+    if order.camera is None:
+        return locomotion_plan.constant_schedule(level, plan.phases.shape)
+    scale = locomotion_plan.scale(order.camera, plan.roots + model.rest_position, model.radius)
+    return locomotion_plan.schedule_levels(model.level_table, scale, order.pixels, order.fps)

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sized
 from itertools import pairwise
 
-from posefield.kriging.covariance import COVARIANCE_MODELS
+from posefield.kriging.kriging_model import COVARIANCE_MODELS
 from posefield.model_file.model_card import ROW_VALUES, ModelCard
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure

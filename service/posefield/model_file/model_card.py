@@ -29,8 +29,8 @@ from posefield.common.bounded_types import (
 from posefield.common.units import Floats, Singles
 from posefield.kriging.kriging_model import Hyper
 from posefield.motion import measures
+from posefield.motion.contact_detection import FootContact
 from posefield.motion.curves import Curve
-from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import Measure
 from posefield.motion.rotation_charts import ChartName
 from posefield.motion.skeleton import Skeleton

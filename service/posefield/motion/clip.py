@@ -1,13 +1,14 @@
-"""Clip: one motion of one skeleton, sampled at a constant rate."""
+"""Clips and crowds: motions of one skeleton, sampled at a constant rate."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Positions, RootPath, Rotations
-from posefield.common.units import Floats
-from posefield.motion import skeleton
+from posefield.common.array_shapes import Bones, PerCharacter, Positions, RootPath, Rotations
+from posefield.common.units import UP, Booleans, Floats, Indices, Singles
+from posefield.motion import quat, skeleton
 from posefield.motion.curves import CurveValues
 from posefield.motion.skeleton import Skeleton
 
@@ -69,3 +70,117 @@ def assemble(
 ) -> Clip:
     """Return a clip with constant bone offsets (J, 3), m, whose root follows a path (F, 3), m."""
     return Clip(joints, rotations, skeleton.translations(bone_offsets, root_path), rate)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Positions and headings of the characters' own frames in the world.
+
+    positions: (N, 3), m. headings: (N,), rad. A heading turns the frame about +Y: a character that
+    faces +Z in its own frame faces +X at a heading of a quarter turn.
+    """
+
+    positions: Annotated[Floats, "characters 3"]
+    headings: PerCharacter
+
+    def __len__(self) -> int:
+        return len(self.headings)
+
+    def select(self, some: Annotated[Indices, "chosen"]) -> "Placement":
+        """Return the placement of the characters of some indices (M,)."""
+        return Placement(self.positions[some], self.headings[some])
+
+    @property
+    def turns(self) -> Annotated[Floats, "characters 4"]:
+        """Return the quaternions (N, 4) of the headings."""
+        return quat.from_axis_angle(UP, self.headings)
+
+
+@dataclass(frozen=True)
+class StandingFeet:
+    """Facts about the feet of M motions that were made to stand: a number (M,) for each motion.
+
+    skate_before, skate: mean foot skate of the prediction and of the motion, m/s. drift: largest
+    distance of a standing foot from its place, m. lowered: largest distance by which the pelvis was
+    lowered so that the legs reach, m.
+    """
+
+    skate_before: Annotated[Floats, "motions"]
+    skate: Annotated[Floats, "motions"]
+    drift: Annotated[Floats, "motions"]
+    lowered: Annotated[Floats, "motions"]
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Motions of equal length, each in its character's own frame.
+
+    rotations: (M, F, J, 4). root_position: (M, F, 3), m. bone_offsets: (M, J, 3), m. levels (M, F):
+    level of detail at which each pose was computed. curves: values (M, F, C) of the crowd's curves;
+    None without them. feet: None where they are as predicted.
+    """
+
+    rotations: Annotated[Singles, "motions frames joints 4"]
+    root_position: Annotated[Singles, "motions frames 3"]
+    bone_offsets: Annotated[Singles, "motions joints 3"]
+    levels: Annotated[Indices, "motions frames"]
+    curves: Annotated[Singles, "motions frames curves"] | None = None
+    feet: StandingFeet | None = None
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+
+@dataclass(frozen=True)
+class CrowdPoses:
+    """One pose of each of N characters, placed in the world.
+
+    model: name@contenthash. rotations (N, J, 4): local to the parent, the root's in the world.
+    root_position (N, 3): in the world, m. bone_offsets: (N, J, 3), m. levels (N,): level of detail
+    of each character. error_px (N,): projected error of the level, pixels; None without a camera.
+    duration (N,): of each character's clip, s. sigma (N,), m, and supported (N,): as in Trust.
+    warnings: sentences about the crowd as a whole. curves: values (N, C) of the curves with names
+    curve_names; None for a model without them.
+    """
+
+    model: str
+    skeleton: Skeleton
+    rotations: Annotated[Singles, "characters joints 4"]
+    root_position: Annotated[Singles, "characters 3"]
+    bone_offsets: Annotated[Singles, "characters joints 3"]
+    levels: Annotated[Indices, "characters"]
+    error_px: Annotated[Singles, "characters"] | None
+    duration: Annotated[Singles, "characters"]
+    sigma: Annotated[Singles, "characters"]
+    supported: Annotated[Booleans, "characters"]
+    warnings: tuple[str, ...]
+    curve_names: tuple[str, ...] = ()
+    curves: Annotated[Singles, "characters curves"] | None = None
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+
+@dataclass(frozen=True)
+class CrowdClip:
+    """Moving crowd: N characters that play M motions of equal length.
+
+    frames: of each motion. rate: frames a second. motion (N,): index of the motion that each
+    character plays. batches: the motions in order, several at a time, computed lazily to bound
+    memory; they can be iterated once. facts: provenance as plain values. curves: names of the
+    motions' curves; empty where they have none.
+    """
+
+    skeleton: Skeleton
+    rate: float
+    frames: int
+    placement: Placement
+    motion: Annotated[Indices, "characters"]
+    batches: Iterable[Motions]
+    facts: Mapping[str, Any]
+    curves: tuple[str, ...] = ()
+
+    @property
+    def shared(self) -> bool:
+        """Return whether any motion is played by more than one character."""
+        return len(np.unique(self.motion)) < len(self.motion)

@@ -14,7 +14,7 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames, Positions, RootPath, Vector
 from posefield.common.bounded_types import Index, Share
 from posefield.common.units import Floats
-from posefield.motion import blend, skeleton
+from posefield.motion import quat, skeleton
 
 Quantity = Literal[
     "left",
@@ -88,7 +88,8 @@ def evaluate(measure: Measure, seen: MeasuredMotion) -> float:
     """Return the value of a quantity, in its unit."""
     match measure.quantity:
         case "stride_length" | "speed" | "turn":
-            return travel_value(measure.quantity, seen.travel, seen.duration)
+            way, taken = seen.travel[None], np.array([seen.duration])
+            return float(travel_values(measure.quantity, way, taken)[0])
         case "leg_length":
             return float(np.linalg.norm(seen.offsets[list(measure.joints)], axis=-1).sum())
         case "stature":
@@ -97,13 +98,8 @@ def evaluate(measure: Measure, seen: MeasuredMotion) -> float:
             return float(np.abs(_foot_separation(measure, seen.positions)).max())
         case _:
             at = moment_frame(measure, seen.positions, seen.landmark)
-            place = blend.interpolate_rows(_mean_positions(measure, seen.positions), np.array(at))
+            place = quat.interpolate_rows(_mean_positions(measure, seen.positions), np.array(at))
             return float(place[POSITION_AXES[measure.quantity]])
-
-
-def travel_value(quantity: str, travel: Vector, duration: float) -> float:
-    """Return the value of `travel_values` for a travel (3,) and a duration, s."""
-    return float(travel_values(quantity, travel[None], np.array([duration]))[0])
 
 
 def travel_values(

@@ -1,8 +1,9 @@
 """Unit quaternions w x y z over arrays (..., 4); all functions broadcast over leading axes."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from posefield.common.array_shapes import JointRotations, Quaternions, Scalars, Vector, Vectors
 from posefield.common.units import Floats
@@ -173,3 +174,83 @@ def right_jacobian(v: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batc
     first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
     second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
     return np.eye(3) - first * across + second * across @ across
+
+
+# Quaternions as planes (4, ...), one contiguous array per component, take a third of the time of
+# (..., 4) for many poses. Order of operations as above, so that results are bitwise equal.
+def product_planes(
+    a: Annotated[Floats, "4 *#batch"],
+    b: Annotated[Floats, "4 *#batch"],
+    out: Annotated[Floats, "4 *batch"],
+) -> None:
+    """Write the products a b (4, ...), rotations b followed by a, to `out`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    np.subtract(aw * bw - ax * bx - ay * by, az * bz, out=out[0, ...])
+    np.subtract(aw * bx + ax * bw + ay * bz, az * by, out=out[1, ...])
+    np.add(aw * by - ax * bz + ay * bw, az * bx, out=out[2, ...])
+    np.add(aw * bz + ax * by - ay * bx, az * bw, out=out[3, ...])
+
+
+def rotate_planes(
+    q: Annotated[Floats, "4 *#batch"],
+    v: Annotated[Floats, "3 *#batch"],
+    out: Annotated[Floats, "3 *batch"],
+) -> None:
+    """Write vectors v (3, ...) turned by q (4, ...) to `out`."""
+    w, ux, uy, uz = q
+    vx, vy, vz = v
+    tx = 2.0 * (uy * vz - uz * vy)
+    ty = 2.0 * (uz * vx - ux * vz)
+    tz = 2.0 * (ux * vy - uy * vx)
+    np.add(vx + w * tx, uy * tz - uz * ty, out=out[0, ...])
+    np.add(vy + w * ty, uz * tx - ux * tz, out=out[1, ...])
+    np.add(vz + w * tz, ux * ty - uy * tx, out=out[2, ...])
+
+
+Numbers = npt.NDArray[Any]
+"""Array of any precision; results have the precision of the arguments."""
+
+
+def interpolate_rows(
+    rows: Annotated[Floats, "frames values"], places: Annotated[Floats, "*places"]
+) -> Annotated[Floats, "*places values"]:
+    """Return rows (F, k) interpolated linearly at fractional indices (...) from 0 to F - 1.
+
+    Shape of the result: (..., k).
+    """
+    before = np.minimum(places.astype(np.int64), len(rows) - 2)
+    share = (places - before)[..., None]
+    return (1.0 - share) * rows[before] + share * rows[before + 1]
+
+
+def lerp(
+    before: Annotated[Numbers, "rows *values"],
+    after: Annotated[Numbers, "rows *values"],
+    shares: Annotated[Numbers, "rows"],
+) -> Annotated[Numbers, "rows *values"]:
+    """Return linear interpolations (N, ...) from `before` to `after` by shares (N,), 0 to 1."""
+    way = shares.reshape(-1, *(1 for _ in before.shape[1:]))
+    return before + way * (after - before)
+
+
+def nlerp(
+    before: Annotated[Numbers, "rows *values 4"],
+    after: Annotated[Numbers, "rows *values 4"],
+    shares: Annotated[Numbers, "rows"],
+) -> Annotated[Numbers, "rows *values 4"]:
+    """Return unit quaternions (N, ..., 4) interpolated by shares (N,) along the shorter arc.
+
+    Normalised linear interpolation: for rotations a few degrees apart it differs from slerp by a
+    share of 1e-4.
+    """
+    same = np.sum(before * after, axis=-1, keepdims=True) >= 0.0
+    mixed = lerp(before, np.where(same, after, -after), shares)
+    turns: Numbers = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
+    return turns
+
+
+def smoothstep(shares: Annotated[Numbers, "*batch"]) -> Annotated[Numbers, "*batch"]:
+    """Return shares mapped by the smoothstep 3 s² - 2 s³, whose slope is zero at 0 and 1."""
+    gentle: Numbers = shares * shares * (3.0 - 2.0 * shares)
+    return gentle

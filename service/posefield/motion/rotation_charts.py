@@ -40,7 +40,7 @@ class RotationChart:
         return np.concatenate([real, factor * own], axis=-1)
 
     def planes(self, numbers: Annotated[Floats, "3 *batch"]) -> Annotated[Floats, "4 *batch"]:
-        """Return the quaternions as planes (4, ...) of numbers (3, ...), as `quat_planes` has them.
+        """Return the quaternions as planes (4, ...) of numbers (3, ...).
 
         For many poses they take a third of the time of `quaternions`.
         """

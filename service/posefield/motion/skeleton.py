@@ -11,8 +11,8 @@ import numpy as np
 
 from posefield.common.array_shapes import Bones
 from posefield.common.bounded_types import Index, Name, Parent
-from posefield.common.units import Floats, Indices
-from posefield.motion import quat_planes
+from posefield.common.units import UP, Floats, Indices
+from posefield.motion import quat
 
 # Poses that are computed at once: their planes take 7 MB for 31 joints.
 POSES_PER_BLOCK = 2000
@@ -191,10 +191,10 @@ def _accumulate(
     places, turns = np.empty((len(parents), 3, *lead)), np.empty((len(parents), 4, *lead))
     places[0], turns[0] = translations[0], rotations[0]
     for joint, parent in enumerate(parents[1:], start=1):
-        quat_planes.rotate(turns[parent], translations[joint], out=places[joint])
+        quat.rotate_planes(turns[parent], translations[joint], out=places[joint])
         places[joint] += places[parent]
         if joint in turning:
-            quat_planes.product(turns[parent], rotations[joint], out=turns[joint])
+            quat.product_planes(turns[parent], rotations[joint], out=turns[joint])
     return places, turns
 
 
@@ -238,7 +238,7 @@ def _accumulate_levels(
 ) -> tuple[Annotated[Floats, "poses joints 3"], Annotated[Floats, "poses joints 4"]]:
     """Return joint positions (P, J, 3) and orientations (P, J, 4) of few poses.
 
-    The same operations in the same order as in `quat_planes`, so that results are bitwise equal; a
+    The same operations in the same order as in `quat`, so that results are bitwise equal; a
     quaternion has x and y once more at its end, so that its cyclic permutations are slices.
     """
     tree, count = tree_levels(parents), len(rotations)
@@ -290,3 +290,26 @@ def descendant_matrix(parents: tuple[int, ...]) -> Annotated[Floats, "joints joi
     for joint in range(len(parents) - 1, 0, -1):
         below[parents[joint]] += below[joint]
     return below
+
+
+def add_travel(
+    rotations: Annotated[Floats, "*poses joints 4"],
+    roots: Annotated[Floats, "*poses 3"],
+    gone: Annotated[Floats, "*poses 3"],
+) -> tuple[Annotated[Floats, "*poses joints 4"], Annotated[Floats, "*poses 3"]]:
+    """Return rotations (..., J, 4) and root positions (..., 3), m, moved by a travel (..., 3).
+
+    gone: travel to the left and ahead, m, and change of heading, rad.
+    """
+    turned = rotations.copy()
+    turned[..., 0, :] = quat.mul(quat.from_axis_angle(UP, gone[..., 2]), rotations[..., 0, :])
+    return turned, moved_roots(roots, gone)
+
+
+def moved_roots(
+    roots: Annotated[Floats, "*poses 3"], gone: Annotated[Floats, "*poses 3"]
+) -> Annotated[Floats, "*poses 3"]:
+    """Return root positions (..., 3), m, moved by the travel over the floor in (..., 3)."""
+    moved = roots.copy()
+    moved[..., [0, 2]] += gone[..., :2]
+    return moved

@@ -9,9 +9,9 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
-from posefield.feet import contact_estimates, limbs
+from posefield.feet import limbs, stance_rows
 from posefield.feet.stances import FootPath
-from posefield.inference.graph_ports import CONTACTS
+from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.motion import measures, quat, skeleton
 from posefield.motion.measures import Measure
@@ -147,7 +147,7 @@ def _contacts(
             found[:, foot] = likely[0][:, known[joint]]
         elif placed is not None:
             path = FootPath(placed.position(joint), RATE)
-            found[:, foot] = contact_estimates.detect(path)
+            found[:, foot] = stance_rows.detect(path)
     return found
 
 

@@ -18,9 +18,9 @@ from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.feet import limbs, two_bone
-from posefield.feet.contact_estimates import STANDING
 from posefield.feet.limbs import Limb
-from posefield.kriging import philox
+from posefield.feet.stance_rows import STANDING
+from posefield.kriging import random_field
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
 from posefield.performance.gaze import HeldBody
@@ -85,7 +85,7 @@ def waves(
     """
     angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * np.array(FREQUENCIES)
     basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.sqrt(len(FREQUENCIES))
-    found: Floats = basis @ philox.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
+    found: Floats = basis @ random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
     return found
 
 

@@ -14,13 +14,13 @@ import numpy as np
 from posefield.common.array_shapes import Frames
 from posefield.common.units import UP, Floats
 from posefield.feet import limbs
-from posefield.feet.contact_estimates import DECIMALS, STANDING
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import Character
+from posefield.feet.stance_rows import DECIMALS, STANDING
 from posefield.locomotion import floor_plane
 from posefield.model_file.model_card import USUAL_PERCENTILE, mean_accelerations
-from posefield.motion.contacts import contact_detection
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion import contact_detection
+from posefield.motion.contact_detection import FootContact
 from posefield.performance.joins import Blend, Cut, positions
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.question.performance_report import Reference

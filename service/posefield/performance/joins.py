@@ -18,12 +18,12 @@ import numpy.typing as npt
 
 from posefield.common.array_shapes import Frames
 from posefield.common.units import UP, Floats
-from posefield.feet.contact_estimates import DECIMALS, STANDING
 from posefield.feet.footsteps import Character
+from posefield.feet.stance_rows import DECIMALS, STANDING
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton
-from posefield.motion.blend import smoothstep
+from posefield.motion.quat import smoothstep
 from posefield.performance.passage import RATE, FloorMotion, Passage, concatenate
 
 VELOCITY_TIME = 0.15

@@ -14,12 +14,11 @@ import numpy as np
 from posefield.common.array_shapes import Frames, RootPath, Vector
 from posefield.common.units import Floats, Indices
 from posefield.feet import limbs, two_bone
-from posefield.feet.footsteps import Character
-from posefield.feet.leads import Led
+from posefield.feet.footsteps import Character, Led
 from posefield.feet.limbs import Limb, LimbPoses, Turns
 from posefield.feet.two_bone import LimbTurns
 from posefield.motion import quat, skeleton
-from posefield.motion.blend import smoothstep
+from posefield.motion.quat import smoothstep
 from posefield.performance.passage import RATE, Passage
 
 EASING, LONGEST_EASING = 0.5, 1.2

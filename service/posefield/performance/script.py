@@ -11,13 +11,13 @@ import numpy as np
 from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.value_cache import ValueCache
-from posefield.feet import limb_choice
+from posefield.feet import footsteps
 from posefield.feet.footsteps import Character
 from posefield.locomotion import stride
 from posefield.locomotion.gait import Gait
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import joint_roles
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield.motion.skeleton import Skeleton
 from posefield.performance import join_quality
 from posefield.performance.passage import (
@@ -321,9 +321,7 @@ def _script_character(
     card = model.session.card
     bones = _bones(model, MotionQuestion(controls=controls, performer=performer, labels=labels))
     known = [own for own in card.contacts if own.joint in card.feet]
-    choice = limb_choice.choose_limbs(
-        card.skeleton.parents, bones, [own.joint for own in known], ()
-    )
+    choice = footsteps.choose_limbs(card.skeleton.parents, bones, [own.joint for own in known], ())
     contacts = tuple(known[place] for place in choice.feet)
     feet = tuple(own.joint for own in contacts)
     facing = math.radians(card.making.facing or 0.0)

@@ -20,8 +20,8 @@ from posefield.feet.limbs import Limb, LimbPoses
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.stride import RelativePoses
-from posefield.motion import blend, quat, skeleton
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion import quat, skeleton
+from posefield.motion.contact_detection import FootContact
 from posefield.performance.passage import FloorMotion
 from posefield.performance.walker import Walker, WalkerKey
 from posefield.synthesis import walking_feet
@@ -204,7 +204,7 @@ def _standing_leg(
     rows = np.array([int(at), int(at) + 1]) % PHASES
     share = np.array([at - int(at)])
     before, after = cycle.posed.rotations[rows][:, None]
-    rotations = blend.nlerp(before, after, share)
+    rotations = quat.nlerp(before, after, share)
     roots = (1.0 - share) * cycle.roots[rows[:1]] + share * cycle.roots[rows[1:]]
     poses, limb = cycle.evaluate(rotations, roots), cycle.legs[leg]
     chords = cycle.poses.position(limb.lower) - cycle.poses.position(limb.upper)

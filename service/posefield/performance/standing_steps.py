@@ -13,11 +13,11 @@ import numpy as np
 from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.units import Floats
 from posefield.feet import limbs, two_bone
-from posefield.feet.contact_estimates import STANDING
 from posefield.feet.limbs import LimbPoses
+from posefield.feet.stance_rows import STANDING
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
-from posefield.motion import blend
+from posefield.motion import quat
 from posefield.performance.passage import RATE, Passage
 from posefield.performance.standing_pose import StandingPose
 
@@ -138,12 +138,12 @@ def _close(pose: StandingPose, walked: Passage, travel: Travel) -> Passage:
     standing = floor_plane.turn_roots(turned, travel.headings)
     places = travel.places + np.exp(1j * travel.headings) * (pose.place + shift)
     ends = floor_plane.at_height(places, np.full(count, pose.height))
-    rotations = blend.nlerp(walked.rotations, standing, course.pose)
-    roots = blend.lerp(walked.roots, ends, course.pose)
+    rotations = quat.nlerp(walked.rotations, standing, course.pose)
+    roots = quat.lerp(walked.roots, ends, course.pose)
     poses = _poses(pose, rotations, roots)
     for place, leg in enumerate(pose.legs):
         share = course.swing if place == course.swinging else course.pose
-        ball = blend.lerp(balls[:, place], np.broadcast_to(stood[place], roots.shape), share)
+        ball = quat.lerp(balls[:, place], np.broadcast_to(stood[place], roots.shape), share)
         ankle = ball - (poses.position(leg.tip) - poses.position(leg.lower))
         end = two_bone.reach(poses, leg, np.zeros_like(ankle), ankle)
         turns = two_bone.solve(poses, leg, end)

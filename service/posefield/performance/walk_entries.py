@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.array_shapes import PerPoint, PointControls
 from posefield.common.units import Floats
 from posefield.common.value_cache import ValueCache
-from posefield.inference.takes import TakeSettings
+from posefield.constraints.take_variation import TakeSettings
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.model_file.model_card import PERFORMER
@@ -23,7 +23,7 @@ from posefield.performance.walk_plan import WalkPlan
 from posefield.performance.walk_request import Disc, WalkRequest
 from posefield.performance.walker import Walker, WalkerKey
 from posefield.question.performance_question import PerformanceQuestion, Walk
-from posefield.synthesis import crowd_takes, walking_feet
+from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.crowd_validation import CharacterTakes
 
@@ -122,7 +122,7 @@ def _poses(
         np.full(count, take.seed), np.full(count, take.variety), np.full(count, take.detail)
     )
     times = (phases * own.durations)[:, None]
-    turned, path, _ = crowd_takes.pose_takes(model, takes, controls, times, labels, level)
+    turned, path, _ = crowd_synthesis.pose_takes(model, takes, controls, times, labels, level)
     return stride.relative_poses(own, phases, turned, path)
 
 

@@ -17,10 +17,9 @@ from posefield.common.array_shapes import PerPoint
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.inference.level_selection import MAX_COORDINATE
-from posefield.locomotion import floor_plane, floor_splines
-from posefield.locomotion.floor_plane import FloorVectors
-from posefield.locomotion.floor_splines import Ends
-from posefield.locomotion.routes import MAX_LENGTH, MAX_WAYPOINTS
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import Ends, FloorVectors
+from posefield.locomotion.paths import MAX_LENGTH, MAX_WAYPOINTS
 from posefield.performance.passage import FloorMotion
 
 SPACING = 0.02
@@ -271,7 +270,7 @@ def through(waypoints: Floats, start: FloorMotion | None, end: FloorMotion | Non
 
 
 def _spline_path(points: Annotated[Floats, "waypoints 2"], slopes: Ends) -> FloorPath:
-    gone, headings = floor_splines.headings(points, SPACING, POINTS_PER_SPACING, slopes)
+    gone, headings = floor_plane.headings(points, SPACING, POINTS_PER_SPACING, slopes)
     count = point_count(gone[-1])
     even = np.interp(np.linspace(0.0, gone[-1], count), gone, headings)
     return FloorPath(complex(*points[0, ::-1]), even, float(gone[-1]) / (count - 1))

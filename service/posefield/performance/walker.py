@@ -11,9 +11,9 @@ from posefield.common.array_shapes import PerPoint, PointControls, PointLabels
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats, Indices
-from posefield.locomotion import floor_plane, stride, walker_labels
+from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
-from posefield.locomotion.gait import ITERATIONS, Gait
+from posefield.locomotion.gait import ITERATIONS, Gait, requested_labels
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import skeleton
@@ -186,7 +186,7 @@ def find_walker(
         given[names.index(name)] = number
     # The mean residual of the controls for the labels; zeros for none.
     offset = np.zeros(gait.performer_offsets.shape[1])
-    shares = walker_labels.requested_labels(card, labels).shares if labels else None
+    shares = requested_labels(card, labels).shares if labels else None
     if shares is not None and shares.any():
         offset = np.asarray(shares @ gait.performer_offsets[:-1] / max(1.0, shares.sum()))
     return Walker(gait, weights, offset, given)

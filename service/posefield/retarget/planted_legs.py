@@ -15,7 +15,7 @@ import numpy as np
 from posefield.common import frame_groups
 from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.units import UP, Booleans, Floats, Indices
-from posefield.feet import contact_estimates, pelvis, stances, two_bone
+from posefield.feet import stance_rows, stances, two_bone
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import UNEVEN, FootPath, Interval
 from posefield.motion import quat, skeleton
@@ -90,11 +90,11 @@ def feet_of(
     own = [FootPath(paths[:, foot], rate) for foot in range(2)]
     if told is None:
         # A single pose has no speeds.
-        found = contact_estimates.from_motion(own) if len(paths) > 1 else [[], []]
+        found = stance_rows.from_motion(own) if len(paths) > 1 else [[], []]
     else:
         found = [_stances(told, name, rate, len(paths)) for name in names]
     heights = [
-        contact_estimates.statistics(foot, path, down).height
+        stance_rows.statistics(foot, path, down).height
         for foot, (path, down) in enumerate(zip(own, found, strict=True))
     ]
     return SourceFeet(roles, paths, tuple(map(tuple, found)), np.array(heights))
@@ -288,11 +288,11 @@ def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> Plan
         for foot, (leg, poses) in enumerate(legs)
     ]
     needs = [
-        pelvis.need(poses, leg, target, np.zeros(len(target)))
+        two_bone.need(poses, leg, target, np.zeros(len(target)))
         for (leg, poses), target in zip(legs, targets, strict=True)
     ]
     most = np.full(len(paths), DEEPEST * rig.body.leg_length)
-    lowered = pelvis.lower(needs, most, frame_groups.one_row(len(most), rate))
+    lowered = two_bone.lower(needs, most, frame_groups.one_row(len(most), rate))
     rotations = rig.rotations.copy()
     shift = -lowered[:, None] * UP
     for (leg, poses), target in zip(legs, targets, strict=True):

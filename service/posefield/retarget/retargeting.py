@@ -10,8 +10,8 @@ from posefield.common.array_shapes import Frames, RootPath, Vector
 from posefield.common.errors import InvalidField
 from posefield.common.units import UP, Booleans, Floats, round_micrometres
 from posefield.feet.two_bone import shortest_turn
-from posefield.motion import blend, quat, skeleton
 from posefield.motion import clip as clips
+from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
 from posefield.retarget import copied_pose, planted_legs, role_map
@@ -191,7 +191,7 @@ def _at(path: RootPath, places: Annotated[Floats, "places"]) -> Annotated[Floats
     """Return the points (N, 3) of a path (F, 3) at fractional frames (N,)."""
     if len(path) < 2:
         return path[[0] * len(places)]
-    return blend.interpolate_rows(path, np.clip(places, 0, len(path) - 1))
+    return quat.interpolate_rows(path, np.clip(places, 0, len(path) - 1))
 
 
 def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
@@ -201,7 +201,7 @@ def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
     """
     before = min([FADE, *(gap for own in goals if (gap := goal.time - own.end) > 0.0)])
     after = min([FADE, *(gap for own in goals if (gap := own.time - goal.end) > 0.0)])
-    found: Frames = blend.smoothstep(
+    found: Frames = quat.smoothstep(
         np.clip(1.0 - np.where(away < 0.0, -away / before, away / after), 0.0, 1.0)
     )
     return found

@@ -15,8 +15,8 @@ from posefield.motion.clip import assemble
 from posefield.motion.curves import CurveValues
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
-from posefield.synthesis import clip_batch, clip_drafts, frame_times, standing_feet
-from posefield.synthesis.clip_drafts import ClipDraft, ClipRequest
+from posefield.synthesis import clip_batch, poses, standing_feet
+from posefield.synthesis.clip_batch import ClipDraft, ClipRequest
 from posefield.synthesis.standing_feet import StandRequest
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import question_validation
@@ -41,7 +41,7 @@ class ClipPreview:
 
 
 def synthesize_clip(
-    model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MAX_POSES
+    model: Synthesizer, asked: ClipQuestion, most: int = poses.MAX_POSES
 ) -> ClipAnswer:
     """Return the clip of a question; frame i is the pose at start + i / fps.
 
@@ -56,14 +56,14 @@ def synthesize_clip(
 
 
 def synthesize_clips(
-    model: Synthesizer, every: Sequence[ClipQuestion], most: int = frame_times.MAX_POSES
+    model: Synthesizer, every: Sequence[ClipQuestion], most: int = poses.MAX_POSES
 ) -> list[ClipAnswer | QueryError]:
     """Return the clips of questions, each with the bytes that it has alone.
 
     Clips share the calls of NumPy, which take most of the time of one clip. A question that cannot
     be answered has the error that `synthesize_clip` raises.
     """
-    asked = _each(partial(clip_drafts.validate, model, most), every)
+    asked = _each(partial(clip_batch.validate, model, most), every)
     drafts = _drafts(model, _solved(model, asked))
     answers = iter(_clips(model, [own for own in drafts if isinstance(own, ClipDraft)]))
     return [next(answers) if isinstance(own, ClipDraft) else own for own in drafts]
@@ -93,7 +93,7 @@ def _drafts(
     }
     shared = clip_batch.draft_predictions(model, predicted)
     rest = [own for place, own in enumerate(every) if place not in shared]
-    alone = iter(_each(partial(clip_drafts.draft, model), rest))
+    alone = iter(_each(partial(clip_batch.draft, model), rest))
     return [shared[place] if place in shared else next(alone) for place in range(len(every))]
 
 
@@ -112,25 +112,25 @@ def _each(
 
 
 def _clips(model: Synthesizer, drafts: Sequence[ClipDraft]) -> list[ClipAnswer]:
-    """Return the clips of motions."""
-    poses = _poses(model, drafts)
+    computed = _poses(model, drafts)
     answers = [
-        frame_times.part(own, slice(len(draft.when)))
-        for own, draft in zip(poses, drafts, strict=True)
+        poses.part(own, slice(len(draft.when))) for own, draft in zip(computed, drafts, strict=True)
     ]
     standing = [place for place, draft in enumerate(drafts) if draft.whole is not None]
-    requests = [_stand_request(drafts[place], answers[place], poses[place]) for place in standing]
+    requests = [
+        _stand_request(drafts[place], answers[place], computed[place]) for place in standing
+    ]
     for place, answer in zip(standing, standing_feet.stand(model, requests), strict=True):
         answers[place] = answer
     return [_clip(model, *own) for own in zip(drafts, answers, strict=True)]
 
 
 def _stand_request(
-    draft: ClipDraft, answer: PoseAnswer[np.float64], poses: PoseAnswer[np.float64]
+    draft: ClipDraft, answer: PoseAnswer[np.float64], computed: PoseAnswer[np.float64]
 ) -> StandRequest:
-    """Return the request for standing feet. poses: at the frames, then at the plan's times."""
+    """Return the request for standing feet. computed: at the frames, then at the plan's times."""
     assert draft.whole is not None
-    own, whole = draft.request, frame_times.part(poses, slice(len(draft.when), None))
+    own, whole = draft.request, poses.part(computed, slice(len(draft.when), None))
     return StandRequest(own.question, own.goals, answer, draft.whole, whole, own.asked.ground)
 
 
@@ -161,12 +161,12 @@ def check(model: Synthesizer, asked: ClipQuestion) -> None:
     """Raise the errors of `synthesize_clip` that are known before the duration of the clip is."""
     model.solver.constraints(model.question(asked), asked)
     standing_feet.wants_standing_feet(model.session.card, asked)
-    clip_drafts.named_skeleton(model, asked)
-    frame_times.time_window(asked, model.durations[1])
+    clip_batch.named_skeleton(model, asked)
+    poses.time_window(asked, model.durations[1])
 
 
 def preview_clip(
-    model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MAX_POSES
+    model: Synthesizer, asked: ClipQuestion, most: int = poses.MAX_POSES
 ) -> ClipPreview:
     """Return frame count, warnings and misses of a clip, without synthesising its frames.
 
@@ -176,9 +176,9 @@ def preview_clip(
     """
     question = model.question(asked)
     standing_feet.wants_standing_feet(model.session.card, asked)
-    clip_drafts.named_skeleton(model, asked)
+    clip_batch.named_skeleton(model, asked)
     duration, misses = _duration_and_misses(model, question, asked)
-    times = frame_times.sample_times(asked, duration, most)
+    times = poses.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
     warnings = question_validation.merge_warnings(
         question.warnings, question.deviations, asked.extrapolate
@@ -196,7 +196,7 @@ def _duration_and_misses(
     goals = model.solver.constraints(question, asked)
     strict = asked.extrapolate == "refuse" or model.session.card.cyclic
     if not (goals.targets or (goals and strict)):
-        return clip_drafts.duration(model, question), False
+        return clip_batch.duration(model, question), False
     held = model.solve_constraints(question, goals, asked.extrapolate)
     _, targets = split_results(held.results, len(goals.targets))
     misses = asked.extrapolate != "ok" and not all(met.reached for met in targets)
@@ -208,5 +208,5 @@ def _apply_root_options(
 ) -> PoseAnswer[np.float64]:
     """Return the answer in place, or closed to a loop, as the question requests."""
     stays = asked.root == "in_place" and model.session.card.root == "travelling"
-    answer = frame_times.remove_travel(answer, way) if stays else answer
-    return frame_times.close_loop(answer, None if stays else way) if asked.loop else answer
+    answer = poses.remove_travel(answer, way) if stays else answer
+    return poses.close_loop(answer, None if stays else way) if asked.loop else answer

@@ -7,20 +7,75 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import Frames, PointControls, PointLabels
 from posefield.common.units import Booleans, Floats, Indices, Singles
-from posefield.inference import graph_ports, level_selection
+from posefield.inference import level_selection, onnx_runtime
 from posefield.inference.level_selection import LevelCriteria, LevelTable
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import blend, curves
-from posefield.motion.crowd_clip import CrowdPoses, Placement
-from posefield.synthesis import crowd_takes
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.motion import curves, quat, skeleton
+from posefield.motion.clip import CrowdPoses, Placement
+from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 from posefield.validation import crowd_validation
 from posefield.validation.crowd_validation import Blending, CharacterTakes, CrowdQuestion
+
+
+def pose_takes(
+    model: Synthesizer,
+    takes: CharacterTakes,
+    controls: PointControls,
+    times: Annotated[Floats, "points 1"],
+    labels: PointLabels,
+    level: int,
+) -> tuple[
+    Annotated[Floats, "points joints 4"],
+    Annotated[Floats, "points 3"],
+    Annotated[Floats, "points curves"],
+]:
+    """Return rotations (N, J, 4), root positions (N, 3), m, and values (N, C) of the curves.
+
+    The characters are in their own frames.
+
+    controls (N, d), times (N, 1), s, and labels (N, p) are those of the characters.
+    """
+    bench = model.solver.corrector(level)
+    reduced, (r2, r1, _) = bench.reduced, bench.reduced.core.shape
+    coefficients, frames, travel = model.session.states(controls, times, labels, level)
+    motions = coefficients @ reduced.core.reshape(r2 * r1, -1).T
+    changes = model.solver.variation.changes(bench, controls, labels, takes.seeds)
+    motions += takes.variety[:, None] * changes[:, : r2 * r1]
+    moves = np.einsum("nt,ntd->nd", reduced.rows(frames), motions.reshape(-1, r2, r1))
+    moves += _details(model, takes, frames, level)
+    numbers = reduced.mean + moves @ reduced.directions
+    end, rotations = 3 + 3 * len(reduced.rotations), reduced.turns(numbers)
+    share = frames / (reduced.frames - 1)
+    turned, path = skeleton.add_travel(rotations, numbers[:, :3], share[:, None] * travel)
+    return turned, path, curves.clamp(model.session.card.curves, numbers[:, end:])
+
+
+def detail_warnings(model: Synthesizer, takes: CharacterTakes | None) -> tuple[str, ...]:
+    """Return a warning if characters ask for detail and the model's file has none."""
+    missing = takes is not None and takes.detail.any() and not model.session.card.making.detail
+    return (NO_DETAIL,) if missing else ()
+
+
+def _details(
+    model: Synthesizer, takes: CharacterTakes, frames: Frames, level: int
+) -> Annotated[Floats, "points freedoms"]:
+    """Return the details (N, r1) of the characters at their canonical frames (N,)."""
+    bench = model.solver.corrector(level)
+    found = np.zeros((len(frames), len(bench.reduced.directions)))
+    for seed in np.unique(takes.seeds[takes.detail]):
+        cancellation.check()
+        rows = np.flatnonzero(takes.detail & (takes.seeds == seed))
+        sampled = model.solver.variation.detail(bench, int(seed))
+        found[rows] = quat.interpolate_rows(sampled, frames[rows])
+    return found
+
 
 # Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
 SLACK = 1e-5
@@ -115,7 +170,8 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     slack = np.where(exact, SLACK, COARSE_SLACK)
     crowd_validation.check_times(question.times, block.duration, slack)
     if question.root == "in_place":
-        _remove_travel(block)
+        block.root_position[:, [0, 2]] -= block.travel[:, :2]
+        _turn_roots(block, -block.travel[:, 2])
     _place(block, question.placement)
     return CrowdPoses(
         model.identity,
@@ -128,7 +184,7 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         block.duration,
         block.sigma,
         supported,
-        (*said, *sentences, *crowd_takes.detail_warnings(model, question.takes)),
+        (*said, *sentences, *detail_warnings(model, question.takes)),
         tuple(curve.name for curve in card.curves),
         block.curves,
     )
@@ -150,7 +206,7 @@ def _levels(
         levels, said = _levels_in_transition(
             ladder, scale, asked, asked.previous, question.blending
         )
-    return levels, level_selection.error_pixels(ladder.errors, scale, levels), said
+    return levels, (ladder.errors[levels] * scale).astype(np.float32), said
 
 
 def _levels_in_transition(
@@ -201,7 +257,7 @@ def _pose_takes(
         own = asked.rows(varied)
         takes = CharacterTakes(own.seeds, own.variety, own.detail)
         given = (own.controls.astype(float), own.times.astype(float), own.labels.astype(float))
-        turned, path, values = crowd_takes.pose_takes(model, takes, *given, level)
+        turned, path, values = pose_takes(model, takes, *given, level)
         block.rotations[varied], block.root_position[varied] = turned, path
         if block.curves is not None:
             block.curves[varied] = values
@@ -227,7 +283,7 @@ def _blend(
         before = _run_graph(model, asked.rows(rows), blending.levels[rows])
         shares = blending.shares[rows].astype(np.float32)
         for name, whole in block.arrays.items():
-            mixing = blend.nlerp if name == "rotations" else blend.lerp
+            mixing = quat.nlerp if name == "rotations" else quat.lerp
             whole[rows] = mixing(getattr(before, name), whole[rows], shares)
         if block.curves is not None:
             # Rounding of the blend may leave the limits.
@@ -235,7 +291,7 @@ def _blend(
             block.curves[rows] = curves.clamp(model.session.card.curves, blended)
 
 
-_PER_TIME = ("rotations", "root_position", "travel", graph_ports.CURVES)
+_PER_TIME = ("rotations", "root_position", "travel", onnx_runtime.CURVES)
 
 
 def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
@@ -246,12 +302,6 @@ def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
         for part in np.array_split(rows, -(-len(rows) // most)):
             together = part[-1] - part[0] + 1 == len(part)
             yield level, slice(part[0], part[-1] + 1) if together else part
-
-
-def _remove_travel(block: _GraphOutputs) -> None:
-    """Subtract the travel within the cycle from the poses, in place."""
-    block.root_position[:, [0, 2]] -= block.travel[:, :2]
-    _turn_roots(block, -block.travel[:, 2])
 
 
 def _place(block: _GraphOutputs, placement: Placement) -> None:

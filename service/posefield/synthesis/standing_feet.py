@@ -9,18 +9,17 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import UP, Floats, round_micrometres
 from posefield.constraints.targets import ConstraintSet
-from posefield.feet import body_plans, foot_placement, limb_choice, limbs
+from posefield.feet import body_plans, foot_placement, footsteps, limbs
 from posefield.feet.foot_placement import PlacementRequest
-from posefield.feet.footsteps import FeetPlan, PlanRequest, SampledMotion
-from posefield.feet.limb_choice import LimbChoice
+from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest, SampledMotion
 from posefield.feet.limbs import LimbPoses
 from posefield.feet.stances import Cycle
-from posefield.inference.graph_ports import CONTACTS
+from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import foot_skate, measures
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion import contact_detection, measures
+from posefield.motion.contact_detection import FootContact
 from posefield.motion.measures import MeasuredMotion
 from posefield.question.floor import LEVEL_FLOOR, Floor
 from posefield.question.motion_question import ClipQuestion
@@ -141,7 +140,7 @@ def stand(model: Synthesizer, requests: Sequence[StandRequest]) -> list[PoseAnsw
     known = [own for own in card.contacts if own.joint in card.feet]
     feet = [own.joint for own in known] if known else list(card.feet)
     choices = [
-        limb_choice.choose_limbs(
+        footsteps.choose_limbs(
             card.skeleton.parents, own.answer.bone_offsets, feet, _held_joints(own.goals)
         )
         for own in requests
@@ -202,8 +201,8 @@ def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult
     ]
     rates = [plan.rate for plan in plans]
     skates = (
-        foot_skate.mean_skate_speeds([own.before for own in paths], rates),
-        foot_skate.mean_skate_speeds(level, rates),
+        contact_detection.mean_skate_speeds([own.before for own in paths], rates),
+        contact_detection.mean_skate_speeds(level, rates),
     )
     drifts = foot_placement.largest_drifts(plans, [own.after for own in paths])
     return [
@@ -223,7 +222,6 @@ def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult
 
 
 def _stances(plan: FeetPlan, names: Sequence[str]) -> tuple[StanceResult, ...]:
-    """Return the stances of the feet, foot after foot."""
     return tuple(
         StanceResult(
             names[leg.tip],

@@ -10,7 +10,7 @@ from posefield.constraints import take_variation
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
-from posefield.inference.named_model import NamedModel
+from posefield.inference.level_selection import NamedModel
 from posefield.locomotion.gait import Gait, fit_gait
 from posefield.model_file.model_card import PERFORMER
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion

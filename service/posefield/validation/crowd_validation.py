@@ -13,7 +13,7 @@ from posefield.kriging import random_field
 from posefield.kriging.support import Support
 from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import PERFORMER, Control, ModelCard
-from posefield.motion.crowd_clip import Placement
+from posefield.motion.clip import Placement
 from posefield.question.motion_question import MAX_TAKE, ExtrapolationPolicy, LabelValue, RootMode
 from posefield.validation import question_validation
 from posefield.validation.question_validation import label_weights

@@ -3,7 +3,7 @@
 import numpy as np
 
 from posefield.motion import quat, skeleton
-from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.clip import CrowdClip, Motions, Placement
 
 FACTS = {
     "model": "walk@0123abcd",

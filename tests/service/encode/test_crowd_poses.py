@@ -11,7 +11,7 @@ import pytest
 
 from posefield.encode.formats import CROWD_ENCODERS
 from posefield.motion import quat
-from posefield.motion.crowd_clip import CrowdPoses
+from posefield.motion.clip import CrowdPoses
 
 TENSORS = ("rotations", "root_position", "bone_offsets")
 NUMBERS = ("duration", "sigma", "supported", "levels", "error_px")

@@ -11,7 +11,7 @@ from posefield.encode.character import extent as exact
 from posefield.encode.usd_crowd import crowd_scene
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton
-from posefield.motion.crowd_clip import Placement
+from posefield.motion.clip import Placement
 from posefield.motion.skeleton import Skeleton
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS
 from posefield.inference import session
-from posefield.motion.crowd_clip import Placement
+from posefield.motion.clip import Placement
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips, crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer

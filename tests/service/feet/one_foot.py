@@ -15,7 +15,7 @@ from posefield.feet.stances import (
     mask,
     runs,
 )
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 
 
 def tidy(down: np.ndarray, rate: float, cyclic: bool) -> list[Interval]:

@@ -7,7 +7,7 @@ from few_feet import change_smoothly, foot_rows, plan_path
 from posefield.feet import ball_path, smooth_change, stance_rows
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 
 RATE = 60.0
 FOOT = FootContact(0, 0.04, 0.3, 0.5, 0.05)

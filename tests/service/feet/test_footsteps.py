@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from few_feet import frame_rows
 
-from posefield.feet import body_plans, foot_placement, leads, limb_choice, limbs, pelvis, stances
-from posefield.feet.footsteps import SampledMotion
-from posefield.feet.leads import Led
+from posefield.feet import body_plans, foot_placement, footsteps, limbs, stances, two_bone
+from posefield.feet.footsteps import Led, SampledMotion
 from posefield.feet.stances import Interval
 from posefield.motion import quat, skeleton
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import Floor, at_height
 
 RATE, FRAMES = 60.0, 90
@@ -33,7 +32,7 @@ FEET = (3, 6, 9, 12)
 
 
 def body(feet=FEET, held=()):
-    return limb_choice.choose_limbs(PARENTS, BONES, feet, held).character
+    return footsteps.choose_limbs(PARENTS, BONES, feet, held).character
 
 
 def sliding(height=0.78, speed=0.3):
@@ -144,7 +143,7 @@ def test_feet_are_tilted_as_the_floor_is():
     rotations = np.zeros((FRAMES, 18, 4))
     rotations[..., 0], rotations[:, :14] = 1.0, motion.rotations
     whole = SampledMotion(rotations, motion.roots, RATE)
-    character = limb_choice.choose_limbs(parents, bones, balls, ()).character
+    character = footsteps.choose_limbs(parents, bones, balls, ()).character
     assert [leg.lower for leg in character.legs] == list(FEET)
     height = skeleton.positions(parents, rotations, skeleton.translations(bones, motion.roots))
     known = [FootContact(ball, float(height[0, ball, 1]), 0.3, 0.5, 0.05) for ball in balls]
@@ -177,7 +176,7 @@ def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more()
     plan = body_plans.plan_feet(
         body(), motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
     )
-    assert 0.0 < (plan.lowered - plan.grounded).max() <= pelvis.MOST + 1e-12
+    assert 0.0 < (plan.lowered - plan.grounded).max() <= two_bone.MOST + 1e-12
     assert all(len(stance) < FRAMES for steps in plan.steps for stance in steps.stances)
 
 
@@ -185,10 +184,10 @@ def test_the_cover_is_smooth_and_nowhere_below(rng):
     needed = np.maximum(rng.normal(size=200), 0.0)
     for cyclic in (False, True):
         rows = frame_rows([needed[:150], needed[150:]], RATE, cyclic)
-        found = pelvis.cover(needed, rows)
+        found = two_bone.cover(needed, rows)
         assert (found >= needed - 1e-12).all()
         # Of each motion alone, the frames of the other are no neighbours.
-        alone = pelvis.cover(needed[:150], frame_rows([needed[:150]], RATE, cyclic))
+        alone = two_bone.cover(needed[:150], frame_rows([needed[:150]], RATE, cyclic))
         assert (found[:150] == alone).all()
     assert limbs.find_limb(PARENTS, BONES, 3) is not None
 
@@ -198,7 +197,7 @@ KICK = 30
 
 def led_at(frames, foot=0, limbs=0):
     """Lead one of the four feet in some frames."""
-    found = leads.always(4, limbs, FRAMES)
+    found = footsteps.always(4, limbs, FRAMES)
     found.feet[foot, frames] = True
     return found
 
@@ -250,7 +249,7 @@ def test_the_pelvis_is_lowered_no_more_than_a_led_limb_reaches():
     _, below = plan.led.room(plan.poses, plan.character.limbs)
     assert np.isinf(below).sum() == FRAMES - 1
     assert plan.lowered[KICK] <= below[KICK] + 1e-12
-    root = leads.always(4, 0, FRAMES)
+    root = footsteps.always(4, 0, FRAMES)
     root.root[KICK] = True
     still = planned(motion, root)
     assert still.lowered[KICK] == 0.0

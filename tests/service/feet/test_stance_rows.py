@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 
 from posefield.feet import stance_rows, stances
 from posefield.feet.stances import Cycle, FootPath, Interval
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 
 RATE, LENGTHS = 30.0, (60, 45, 70)
 FRAMES = sum(LENGTHS)

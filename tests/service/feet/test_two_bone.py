@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefield.feet import limb_choice, limbs, two_bone
+from posefield.feet import footsteps, limbs, two_bone
 from posefield.feet.limbs import Limb
 from posefield.motion import quat, skeleton
 
@@ -55,18 +55,18 @@ def moved(rotations, limb, found):
 
 
 def test_limbs_are_chosen_by_feet_and_exact_joints():
-    plain = limb_choice.choose_limbs(PARENTS, BONES, (5,), ())
+    plain = footsteps.choose_limbs(PARENTS, BONES, (5,), ())
     assert plain.character.legs == (LEG,) and not plain.left and not plain.character.fixed
-    hand = limb_choice.choose_limbs(PARENTS, BONES, (5,), {11})
+    hand = footsteps.choose_limbs(PARENTS, BONES, (5,), {11})
     assert hand.character.kept == (ARM,) and not hand.character.fixed
-    trunk = limb_choice.choose_limbs(PARENTS, BONES, (5,), {0})
+    trunk = footsteps.choose_limbs(PARENTS, BONES, (5,), {0})
     assert trunk.character.fixed
-    foot = limb_choice.choose_limbs(PARENTS, BONES, (5,), {5})
+    foot = footsteps.choose_limbs(PARENTS, BONES, (5,), {5})
     assert foot.character.legs == () and foot.character.kept == (LEG,)
     assert foot.left == ((5, "is as predicted: its leg meets an exact target"),)
-    none = limb_choice.choose_limbs(PARENTS, BONES, (1,), ())
+    none = footsteps.choose_limbs(PARENTS, BONES, (1,), ())
     assert none.left == ((1, "is as predicted: no two bones lead to it"),)
-    both = limb_choice.choose_limbs(PARENTS, BONES, (5, 4), ())
+    both = footsteps.choose_limbs(PARENTS, BONES, (5, 4), ())
     assert both.feet == (0,)
     assert both.left == ((4, "is as predicted: its leg moves another foot"),)
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from posefield.motion import foot_skate
-from posefield.motion.contacts import contact_detection
-from posefield.motion.contacts.contact_detection import DEFAULT
+from posefield.motion import contact_detection
+from posefield.motion.contact_detection import DEFAULT
 
 RATE = 120.0
 
@@ -106,17 +105,21 @@ def foot(height, along):
 
 
 def test_a_foot_that_slides_does_so_at_its_speed():
-    assert foot_skate.mean_skate_speed(foot(0.1, 0.4 * SECONDS), FPS) == pytest.approx(0.4)
-    assert foot_skate.mean_skate_speed(foot(0.1, 0.4 * SECONDS), 2 * FPS) == pytest.approx(0.8)
+    assert contact_detection.mean_skate_speed(foot(0.1, 0.4 * SECONDS), FPS) == pytest.approx(0.4)
+    assert contact_detection.mean_skate_speed(foot(0.1, 0.4 * SECONDS), 2 * FPS) == pytest.approx(
+        0.8
+    )
 
 
 @pytest.mark.parametrize(("height", "slowest"), [(0.0, 5.0), (0.015, 5.0), (0.3, 0.0)])
 def test_only_what_is_within_2_cm_of_the_ground_counts(height, slowest):
     late = SECONDS > 0.5
-    found = foot_skate.mean_skate_speed(foot(height * late, 9.0 * late), FPS)
+    found = contact_detection.mean_skate_speed(foot(height * late, 9.0 * late), FPS)
     assert found > slowest if slowest else found == 0.0
 
 
 def test_every_motion_of_a_crowd_has_its_own_floor():
     low, high = foot(0.0, 0.1 * SECONDS), foot(7.0, 0.2 * SECONDS)
-    assert foot_skate.mean_skate_speed(np.stack([low, high]), FPS) == pytest.approx([0.1, 0.2])
+    assert contact_detection.mean_skate_speed(np.stack([low, high]), FPS) == pytest.approx(
+        [0.1, 0.2]
+    )

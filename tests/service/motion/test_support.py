@@ -5,8 +5,9 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF
 
-from posefield.kriging import acquisition, kriging_model, support
+from posefield.kriging import kriging_model, support
 from posefield.kriging.support import NUGGET, covariances
+from posefield.synthesis import trust
 
 CLOSE = 1e-9
 WIDE = np.array([2.0, 30.0, 0.5])
@@ -125,7 +126,7 @@ def variances(candidates, samples):
 
 def test_each_is_worth_what_the_variance_falls_by_with_those_before_it(samples, candidates):
     known = samples
-    for at, found in acquisition.rank_candidates(candidates, samples, 8):
+    for at, found in trust.rank_candidates(candidates, samples, 8):
         before = variances(candidates, known)
         known = np.vstack([known, candidates[at]])
         after = variances(candidates, known)
@@ -139,5 +140,5 @@ def test_each_is_worth_what_the_variance_falls_by_with_those_before_it(samples, 
 
 
 def test_none_is_ranked_twice_and_all_there_are_at_most(samples, candidates):
-    found = acquisition.rank_candidates(candidates[:5], samples, 10)
+    found = trust.rank_candidates(candidates[:5], samples, 10)
     assert sorted(at for at, _ in found) == [0, 1, 2, 3, 4]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from posefield.feet import limb_choice
+from posefield.feet import footsteps
 from posefield.motion import quat
 from posefield.performance.passage import RATE, Passage
 
@@ -15,7 +15,7 @@ FEET = (3, 6)
 
 def character():
     """Return the character."""
-    return limb_choice.choose_limbs(PARENTS, BONES, FEET, ()).character
+    return footsteps.choose_limbs(PARENTS, BONES, FEET, ()).character
 
 
 def smooth(seed, frames=60, size=0.3, speed=1.0):

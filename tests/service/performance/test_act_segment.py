@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField, OutOfReach
-from posefield.feet import contact_estimates
+from posefield.feet import stance_rows
 from posefield.feet.stances import FootPath
 from posefield.inference import session
-from posefield.inference.graph_ports import CONTACTS
+from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.model_file.model_card import Event
 from posefield.performance import act_motion, acts
@@ -84,7 +84,7 @@ def test_contacts_are_detected_where_the_model_has_none(reach):
     found = act_motion.act_passage(reach, MotionQuestion(controls=HIGH))
     toes = acting.joint_path(reach, found, "RightToeBase")
     assert found.passage.contacts.shape == (len(found.passage), 2)
-    detected = contact_estimates.detect(FootPath(toes, RATE))
+    detected = stance_rows.detect(FootPath(toes, RATE))
     assert np.array_equal(found.passage.contacts[:, 1], detected)
 
 

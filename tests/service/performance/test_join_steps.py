@@ -9,7 +9,7 @@ from passages import FEET, PARENTS, character
 from posefield.feet import body_plans, foot_placement
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.contact_detection import FootContact
 from posefield.performance import join_quality, joins
 from posefield.performance.joins import Cut
 from posefield.performance.passage import RATE, FloorMotion, Passage

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefield.locomotion import floor_splines
+from posefield.locomotion import floor_plane
 from posefield.performance import speed_profile, walk_paths, walk_request
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.speed_profile import SpeedRamps
@@ -41,15 +41,15 @@ def test_a_spline_begins_and_ends_with_given_slopes():
     knots, values = np.array([0.0, 2.0, 5.0]), np.array([[0, 0], [1, 2], [0, 5.0]])
     first, last = np.array([1.0, 0.0]), np.array([0.0, -1.0])
     ends = np.array([0.0, 5.0])
-    found = floor_splines.spline(knots, values, ends, (first, last))[1]
+    found = floor_plane.spline(knots, values, ends, (first, last))[1]
     assert np.allclose(found, [first, last])
-    free = floor_splines.spline(knots, values, ends, (None, None))[1]
+    free = floor_plane.spline(knots, values, ends, (None, None))[1]
     assert not np.allclose(free, [first, last], atol=0.1)
     # A cubic polynomial is its own spline.
     cubic = np.column_stack([knots**3 - knots, knots**2])
     slopes = np.column_stack([3.0 * knots**2 - 1.0, 2.0 * knots])
     at = np.linspace(0.0, 5.0, 11)
-    points, _ = floor_splines.spline(knots, cubic, at, (slopes[0], slopes[-1]))
+    points, _ = floor_plane.spline(knots, cubic, at, (slopes[0], slopes[-1]))
     assert np.allclose(points, np.column_stack([at**3 - at, at**2]))
 
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posefield.common.errors import InvalidField
+from posefield.constraints.take_variation import TakeSettings
 from posefield.inference import session
-from posefield.inference.takes import TakeSettings
 from posefield.locomotion import floor_plane, gait
 from posefield.motion import quat
 from posefield.performance import reporting, walk_entries

@@ -8,8 +8,8 @@ from posefield.model_file import answer_bounds
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
-from posefield.synthesis.explanation import explain_result
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.trust import explain_result
 
 SHARES = (-40.0, -8.0, -1.0, -0.3, -0.2, -0.05, 0.0, 0.5, 1.0, 1.05, 1.2, 1.3, 2.0, 9.0, 40.0)
 """Places of asked values, from 0 at the smallest sampled one to 1 at the largest."""

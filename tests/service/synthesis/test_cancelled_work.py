@@ -12,15 +12,14 @@ from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.http import clip_operations, crowd_operations
 from posefield.http.api.settings import Settings
-from posefield.locomotion import crowd_order, gait
-from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.locomotion import gait, walking_crowd
+from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.question import json_decoding as bodies
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion
 from posefield.question.motion_question import ClipQuestion, FileQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips, crowd_synthesis, walking_feet
-from posefield.synthesis.capture_suggestions import suggest
-from posefield.synthesis.sigma_grid import grid
+from posefield.synthesis.trust import grid, suggest
 
 
 class Counted(Cancellation):
@@ -93,14 +92,14 @@ def crowded(model, walk):
 
 def planned(model, walk):
     """The plan of a crowd that walks."""
-    return crowd_order.build_crowd(
+    return walking_crowd.build_crowd(
         walk, gait.fit_gait(walk.session), CrowdOrder(count=300, seconds=10.0)
     )
 
 
 def walked(model, walk):
     """A crowd that walks, as USD."""
-    made = crowd_order.build_crowd(
+    made = walking_crowd.build_crowd(
         walk, gait.fit_gait(walk.session), CrowdOrder(count=300, seconds=1.0)
     )
     return list(crowd_writer.stream(made, "usdc"))

@@ -12,7 +12,7 @@ from posefield.common.units import UP
 from posefield.http import crowd_operations
 from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.motion import quat, skeleton
-from posefield.motion.crowd_clip import Placement
+from posefield.motion.clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import crowd_synthesis, poses

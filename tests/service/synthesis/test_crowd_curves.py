@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from posefield.inference import session
-from posefield.locomotion import gait, level_transitions, walking_crowd
-from posefield.motion.crowd_clip import Placement
+from posefield.locomotion import gait, locomotion_plan, walking_crowd
+from posefield.motion.clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import crowd_synthesis, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -89,8 +89,8 @@ def plan(treading):
 
 
 def test_soles_press_at_the_phases_of_the_plan(treading, plan):
-    shown = level_transitions.constant_schedule(0, plan.phases.shape)
-    made = walking_crowd.build_crowd(treading.session, plan, shown)
+    shown = locomotion_plan.constant_schedule(0, plan.phases.shape)
+    made = walking_crowd.crowd_of_plan(treading.session, plan, shown)
     assert made.curves == tuple(fixture_models.SOLES)
     found = np.concatenate([motions.curves for motions in made.batches])
     speeds = plan.controls[:, :, 0] / 3.6

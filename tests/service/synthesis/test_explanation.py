@@ -8,7 +8,7 @@ from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.question.model_question import WhyQuestion
 from posefield.question.results import Explanation
 from posefield.registry import model_registry
-from posefield.synthesis.explanation import explain_result
+from posefield.synthesis.trust import explain_result
 
 EVERYTHING = 10_000
 

@@ -12,8 +12,8 @@ from posefield.kriging import typical_clip
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
-from posefield.synthesis.explanation import explain_result
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.trust import explain_result
 from posefield.validation.imputation import ControlImputer, fit_gaussian
 
 NOBODY = np.zeros((1, 0))

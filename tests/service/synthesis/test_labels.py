@@ -13,7 +13,7 @@ from posefield.model_file import checked_file, model_card
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry
-from posefield.synthesis import capture_suggestions, clips, explanation, poses, sigma_grid
+from posefield.synthesis import clips, poses, trust
 
 POINT = {"haste": 4.0, "veer": 0.0}
 
@@ -101,9 +101,9 @@ def test_labels_that_cannot_be_used_are_refused(model, labels, said):
     questions = (
         lambda: posed(model, labels=labels),
         lambda: clips.synthesize_clip(model, ClipQuestion(controls=POINT, labels=labels)),
-        lambda: explanation.explain_result(model, WhyQuestion(controls=POINT, labels=labels)),
-        lambda: sigma_grid.grid(model, SigmaQuestion(across="haste", along="veer", labels=labels)),
-        lambda: capture_suggestions.suggest(model, SuggestQuestion(labels=labels)),
+        lambda: trust.explain_result(model, WhyQuestion(controls=POINT, labels=labels)),
+        lambda: trust.grid(model, SigmaQuestion(across="haste", along="veer", labels=labels)),
+        lambda: trust.suggest(model, SuggestQuestion(labels=labels)),
     )
     for asked in questions:
         with pytest.raises(InvalidField, match=re.escape(said)):

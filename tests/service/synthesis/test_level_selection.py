@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.common.errors import InvalidField
-from posefield.inference import cost_model, level_selection, session
+from posefield.inference import level_selection, session
 from posefield.inference.level_selection import HYSTERESIS, Camera, LevelCriteria, LevelTable
 
 ERRORS = np.array([0.0, 0.002, 0.01, 0.01, 0.05])
@@ -198,7 +198,7 @@ def opened(model_path):
 
 
 def test_every_level_has_a_cost(opened):
-    found = cost_model.seconds_per_pose(opened)
+    found = level_selection.seconds_per_pose(opened)
     assert len(found) == len(opened.card.levels) == 4
     assert all(seconds > 0.0 for seconds in found)
     assert sorted(found, reverse=True) == list(found)
@@ -206,6 +206,6 @@ def test_every_level_has_a_cost(opened):
 
 def test_costs_never_grow(rng):
     costs = rng.uniform(1.0, 2.0, 20)
-    found = np.array(cost_model.monotone_costs(costs))
+    found = np.array(level_selection.monotone_costs(costs))
     assert np.all(np.diff(found) <= 0.0) and np.all(found <= costs)
     assert np.any(np.diff(costs) > 0.0)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from posefield.inference.level_selection import LevelTable
-from posefield.locomotion import gait, level_transitions, walking_crowd
-from posefield.motion import skeleton
+from posefield.locomotion import gait, locomotion_plan, walking_crowd
+from posefield.motion import quat, skeleton
 from posefield.registry import model_registry
 
 RATE = 30.0
 LADDER = LevelTable(np.array([0.01, 0.03, 0.08, 0.2]), np.array([4.0, 3.0, 2.0, 1.0]))
-SWITCH = round(level_transitions.TRANSITION_SECONDS * RATE)
+SWITCH = round(locomotion_plan.TRANSITION_SECONDS * RATE)
 
 
 def passing(count=40, frames=600):
@@ -32,7 +32,7 @@ def shown_pixels(shown, scale):
 
 def test_nobody_is_shown_coarser_than_the_limit_even_while_switching():
     scale = passing()
-    shown = level_transitions.schedule_levels(LADDER, scale, 1.0, RATE)
+    shown = locomotion_plan.schedule_levels(LADDER, scale, 1.0, RATE)
     visible = shown_pixels(shown, scale) > 1.0
     unavoidable = LADDER.errors[0] * scale > 1.0
     # On its way to the finest level a character may still be at the next: never beyond its limit.
@@ -45,7 +45,7 @@ def test_nobody_is_shown_coarser_than_the_limit_even_while_switching():
 
 
 def test_a_switch_takes_its_time_and_ends_before_the_next():
-    shown = level_transitions.schedule_levels(LADDER, passing(), 1.0, RATE)
+    shown = locomotion_plan.schedule_levels(LADDER, passing(), 1.0, RATE)
     for levels, shares in zip(shown.levels, shown.shares, strict=True):
         switches = np.flatnonzero(np.diff(levels)) + 1
         assert np.all(np.diff(switches) >= SWITCH)
@@ -78,19 +78,19 @@ def joints(own, plan, shown):
 
 def switching(plan, shares):
     """From the finest level to the coarsest in the middle, by the shares of the way."""
-    shown = level_transitions.constant_schedule(0, plan.phases.shape)
+    shown = locomotion_plan.constant_schedule(0, plan.phases.shape)
     middle = plan.phases.shape[1] // 2
     shown.levels[:, middle:] = 3
     before = np.zeros_like(shown.levels)
     own_shares = np.ones(plan.phases.shape)
     own_shares[:, middle : middle + len(shares)] = shares
-    return level_transitions.LevelSchedule(shown.levels, before, own_shares)
+    return locomotion_plan.LevelSchedule(shown.levels, before, own_shares)
 
 
 def test_a_switch_does_not_pop(own):
     """Mixed, a switch moves joints hardly more than the coarse level does by itself."""
     plan = walking_crowd.plan_random(own, 20, 2.0, RATE, 1)
-    finest = joints(own, plan, level_transitions.constant_schedule(0, plan.phases.shape))
+    finest = joints(own, plan, locomotion_plan.constant_schedule(0, plan.phases.shape))
 
     middle = plan.phases.shape[1] // 2
 
@@ -99,10 +99,8 @@ def test_a_switch_does_not_pop(own):
         steps = np.linalg.norm(np.diff(away, axis=1), axis=-1)[:, middle - 1 : middle + SWITCH]
         return np.sqrt(np.mean(np.square(steps), axis=(0, 2))).max()
 
-    gentle = np.array(
-        [level_transitions.blend.smoothstep(s) for s in np.linspace(0.0, 1.0, SWITCH + 2)[1:-1]]
-    )
+    gentle = np.array([quat.smoothstep(s) for s in np.linspace(0.0, 1.0, SWITCH + 2)[1:-1]])
     sudden, mixed = pop(switching(plan, np.zeros(0))), pop(switching(plan, gentle))
-    usual = pop(level_transitions.constant_schedule(3, plan.phases.shape))
+    usual = pop(locomotion_plan.constant_schedule(3, plan.phases.shape))
     assert mixed < 1.5 * usual
     assert sudden > 1.7 * mixed

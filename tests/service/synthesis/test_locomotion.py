@@ -8,18 +8,8 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import (
-    floor_plane,
-    gait,
-    gait_region,
-    level_transitions,
-    locomotion_plan,
-    random_paths,
-    routes,
-    stride,
-    walking_crowd,
-)
-from posefield.locomotion.routes import Route
+from posefield.locomotion import floor_plane, gait, locomotion_plan, paths, stride, walking_crowd
+from posefield.locomotion.paths import Route
 from posefield.motion import quat, skeleton
 
 # float32 of places some metres away, and of phases after some strides.
@@ -30,7 +20,7 @@ ANN = np.zeros(1, dtype=np.int64)
 
 def finest(opened, plan):
     """Motions of all characters of a plan, at the finest level."""
-    shown = level_transitions.constant_schedule(0, plan.phases.shape)
+    shown = locomotion_plan.constant_schedule(0, plan.phases.shape)
     return walking_crowd.motions(opened, plan, np.arange(len(plan.who)), shown)
 
 
@@ -52,7 +42,7 @@ def joints(own, plan):
         own.session,
         plan,
         np.arange(len(plan.who)),
-        level_transitions.constant_schedule(0, plan.phases.shape),
+        locomotion_plan.constant_schedule(0, plan.phases.shape),
     )
     local = skeleton.translations(
         made.bone_offsets.astype(np.float64), made.root_position.astype(np.float64)
@@ -148,8 +138,8 @@ def wandering(own, count, seconds=6.0, seed=3):
 
 
 def test_who_walks_keeps_to_the_way(own):
-    characters = random_paths.draw_characters(own, 20, 3)
-    ways = random_paths.draw_paths(own, characters, 6.0)
+    characters = paths.draw_characters(own, 20, 3)
+    ways = paths.draw_paths(own, characters, 6.0)
     frames = 181
     plan = locomotion_plan.plan_along_paths(
         own, ways, characters.who, characters.phases, frames, RATE
@@ -184,7 +174,7 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
 
 
 def test_a_way_that_ends_too_soon_is_refused(own):
-    ways = routes.paths_through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
+    ways = paths.paths_through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
         locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
 
@@ -231,7 +221,7 @@ def test_the_model_does_what_was_wanted_whoever_walks(own, opened, rng):
 def test_the_hull_of_a_square_is_the_square(rng):
     corners = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
     inner = rng.uniform([1.0, -1.0], [2.0, 1.0], (50, 2))
-    found = gait_region.convex_hull(np.vstack([inner, corners]))
+    found = gait.convex_hull(np.vstack([inner, corners]))
     assert len(found.limits) == 4
     assert found.speeds == (1.0, 2.0)
     low, high = found.turning(np.array([1.0, 1.3, 2.0]))
@@ -254,8 +244,8 @@ def test_a_model_of_one_speed_does_not_walk(opened):
 def made(own, count, seed=3, seconds=1.0):
     """A crowd that wanders, and its motions."""
     plan = walking_crowd.plan_random(own, count, seconds, RATE, seed)
-    crowd = walking_crowd.build_crowd(
-        own.session, plan, level_transitions.constant_schedule(0, plan.phases.shape)
+    crowd = walking_crowd.crowd_of_plan(
+        own.session, plan, locomotion_plan.constant_schedule(0, plan.phases.shape)
     )
     return crowd, list(crowd.batches)
 
@@ -286,8 +276,8 @@ def test_fewer_characters_are_the_first_of_more(own):
 
 def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
     plan = walking_crowd.plan_random(own, 4, 2.0, RATE, 0)
-    crowd = walking_crowd.build_crowd(
-        own.session, plan, level_transitions.constant_schedule(0, plan.phases.shape)
+    crowd = walking_crowd.crowd_of_plan(
+        own.session, plan, locomotion_plan.constant_schedule(0, plan.phases.shape)
     )
     motions = next(iter(crowd.batches))
     at_home = motions.root_position[:, 0] * [1.0, 0.0, 1.0]

@@ -7,9 +7,8 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import floor_plane, gait, random_paths, routes
-from posefield.locomotion.paths import POINT_SPACING, Paths
-from posefield.locomotion.routes import Route
+from posefield.locomotion import floor_plane, gait, paths
+from posefield.locomotion.paths import POINT_SPACING, Paths, Route
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +36,7 @@ BEND = np.array([[1.0, -2.0], [1.0, 3.0], [2.0, 8.0], [5.0, 12.0], [9.0, 14.0]])
 
 
 def test_a_route_leads_through_its_waypoints_without_a_kink(own):
-    ways = routes.paths_through(own, [Route(BEND, 0.9)])
+    ways = paths.paths_through(own, [Route(BEND, 0.9)])
     gone = np.linspace(0.0, ways.lengths[0], 100_000)[None]
     places, tangents = ways.at(gone)
     for left, ahead in BEND:
@@ -68,7 +67,7 @@ CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]
 def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypoints, speed, said):
     fine = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
     with pytest.raises(InvalidField) as refusal:
-        routes.paths_through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
+        paths.paths_through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
     assert re.match(said, str(refusal.value)), str(refusal.value)
 
 
@@ -82,12 +81,12 @@ def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypo
 )
 def test_what_is_no_route_is_refused(plain, field):
     with pytest.raises(InvalidField) as refusal:
-        routes.parse_routes(plain)
+        paths.parse_routes(plain)
     assert refusal.value.field == field
 
 
 def test_characters_that_wander_stay_within_what_was_sampled(own):
-    ways = random_paths.draw_paths(own, random_paths.draw_characters(own, 200, 1), 10.0)
+    ways = paths.draw_paths(own, paths.draw_characters(own, 200, 1), 10.0)
     turning = ways.speeds * ways.curvatures
     assert own.region.contains(ways.speeds, turning).all()
     # They do turn, and change their speed.
@@ -97,7 +96,7 @@ def test_characters_that_wander_stay_within_what_was_sampled(own):
 
 def test_nobody_begins_within_a_metre_of_another_however_many(own):
     for count in (2, 50, 701):
-        ways = random_paths.draw_paths(own, random_paths.draw_characters(own, count, 5), 1.0)
+        ways = paths.draw_paths(own, paths.draw_characters(own, count, 5), 1.0)
         apart = np.abs(ways.starts[:, None] - ways.starts) + 9.0 * np.eye(count)
         assert apart.min() >= 1.0
     side = np.ptp(ways.starts.real)
@@ -105,17 +104,15 @@ def test_nobody_begins_within_a_metre_of_another_however_many(own):
 
 
 def test_a_character_hangs_on_its_number_and_the_seed_alone(own):
-    few, many = (random_paths.draw_characters(own, count, 7) for count in (5, 10))
+    few, many = (paths.draw_characters(own, count, 7) for count in (5, 10))
     assert np.array_equal(few.who, many.who[:5])
     assert np.array_equal(few.random_numbers, many.random_numbers[:5])
-    assert set(random_paths.draw_characters(own, 50, 7).who) == {0, 1}
-    short, long = random_paths.draw_paths(own, few, 2.0), random_paths.draw_paths(own, many, 4.0)
+    assert set(paths.draw_characters(own, 50, 7).who) == {0, 1}
+    short, long = paths.draw_paths(own, few, 2.0), paths.draw_paths(own, many, 4.0)
     known = short.headings.shape[1]
     assert np.array_equal(short.starts, long.starts[:5])
     assert np.abs(short.headings - long.headings[:5, :known]).max() < 1e-12
-    assert not np.array_equal(
-        random_paths.draw_characters(own, 5, 8).random_numbers, few.random_numbers
-    )
+    assert not np.array_equal(paths.draw_characters(own, 5, 8).random_numbers, few.random_numbers)
 
 
 ROUNDING = 1e-12

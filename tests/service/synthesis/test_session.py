@@ -11,7 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from posefield.common.errors import ModelError
 from posefield.inference import onnx_runtime, session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference.onnx_runtime import OUTPUTS
 
 
 @pytest.fixture

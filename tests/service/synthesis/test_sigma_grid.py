@@ -9,7 +9,7 @@ from posefield.question.model_question import SigmaQuestion
 from posefield.question.motion_question import PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import poses
-from posefield.synthesis.sigma_grid import BATCH, grid
+from posefield.synthesis.trust import BATCH, grid
 
 ASKED = SigmaQuestion(
     across="turn",

@@ -6,7 +6,7 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.question.model_question import SuggestQuestion
 from posefield.registry import model_registry
-from posefield.synthesis.capture_suggestions import DRAWN_CANDIDATES, suggest
+from posefield.synthesis.trust import DRAWN_CANDIDATES, suggest
 
 
 @pytest.fixture(scope="module")

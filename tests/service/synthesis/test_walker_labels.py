@@ -7,13 +7,7 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import (
-    gait,
-    level_transitions,
-    random_paths,
-    walker_labels,
-    walking_crowd,
-)
+from posefield.locomotion import gait, locomotion_plan, paths, walking_crowd
 
 RATE, COUNT = 30.0, 60
 MIXED = {"style": {"marching": 0.7, "sneaking": 0.3}}
@@ -28,8 +22,8 @@ def made(own, asked, count=COUNT, seed=3):
     """Facts and motions of a crowd with labels, one second long."""
     labelled = own.with_labels(asked)
     plan = walking_crowd.plan_random(labelled, count, 1.0, RATE, seed)
-    shown = level_transitions.constant_schedule(0, plan.phases.shape)
-    crowd = walking_crowd.build_crowd(own.session, plan, shown)
+    shown = locomotion_plan.constant_schedule(0, plan.phases.shape)
+    crowd = walking_crowd.crowd_of_plan(own.session, plan, shown)
     return crowd.facts, np.concatenate([each.rotations for each in crowd.batches])
 
 
@@ -44,12 +38,12 @@ def test_a_name_holds_for_all_and_the_other_sets_vary(own):
 
 def test_a_mixture_draws_its_names_by_their_weights(own):
     labelled = own.with_labels(MIXED)
-    drawn = random_paths.draw_characters(labelled, 4000, 5).who
+    drawn = paths.draw_characters(labelled, 4000, 5).who
     styles = np.array([labelled.labels.rows[who]["style"] for who in drawn])
     assert np.mean(styles == "marching") == pytest.approx(0.7, abs=0.03)
     assert not np.any(styles == "plain")
     # Without a request all styles are as frequent.
-    free = random_paths.draw_characters(own, 4000, 5).who
+    free = paths.draw_characters(own, 4000, 5).who
     assert np.mean([own.labels.rows[who]["style"] == "plain" for who in free]) > 0.3
     facts, _ = made(own, MIXED, count=2)
     assert facts["labels"] == {"style": [MIXED["style"]] * 2}
@@ -65,7 +59,7 @@ def test_a_combination_that_was_not_captured_has_clips_of_either_label(own):
             for name, label in (("performer", "ann"), ("style", "marching"))
         ]
     )
-    shares = walker_labels.combination_shares(parts)
+    shares = gait.combination_shares(parts)
     drawn = dataclasses.replace(fewer, shares=shares).draw(
         np.linspace(0.0, 1.0, 50, endpoint=False)
     )
@@ -76,4 +70,4 @@ def test_a_combination_that_was_not_captured_has_clips_of_either_label(own):
 def test_a_model_without_label_sets_refuses_every_label(model_file):
     reaching = session.load(model_file("reaching")).card
     with pytest.raises(InvalidField, match="this model has none"):
-        walker_labels.requested_labels(reaching, {"style": "plain"})
+        gait.requested_labels(reaching, {"style": "plain"})

@@ -11,7 +11,7 @@ from posefield.locomotion import (
     gait,
     walking_crowd,
 )
-from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer

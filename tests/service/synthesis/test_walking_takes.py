@@ -8,20 +8,13 @@ import pytest
 from posefield.inference import session
 from posefield.inference.level_selection import Camera
 from posefield.kriging import kriging_model
-from posefield.locomotion import (
-    floor_plane,
-    gait,
-    level_transitions,
-    locomotion_plan,
-    routes,
-    walking_crowd,
-)
-from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.locomotion import floor_plane, gait, locomotion_plan, paths, walking_crowd
+from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
 from posefield.registry import model_registry
-from posefield.synthesis import crowd_takes, walking_feet, walking_takes
+from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.synthesis.walking_takes import WalkerTakes
+from posefield.synthesis.walking_feet import WalkerTakes
 from posefield.validation.crowd_validation import CharacterTakes
 
 FRAMES, RATE = 40, 30.0
@@ -69,8 +62,8 @@ def taken(model, plan, seeds, variety=0.7, detail=False, who=None):
     """Motions of takes of a plan's characters, feet as predicted."""
     takes = WalkerTakes("index", np.array(seeds), variety, detail)
     who = np.arange(len(seeds)) if who is None else who
-    shown = level_transitions.constant_schedule(0, plan.phases.shape).select(who)
-    pose = walking_takes.pose_maker(model, takes, plan, who)
+    shown = locomotion_plan.constant_schedule(0, plan.phases.shape).select(who)
+    pose = walking_feet.pose_maker(model, takes, plan, who)
     return walking_feet.standing_motions(model.session, plan, who, shown, pose)
 
 
@@ -104,7 +97,7 @@ def test_no_take_is_the_prediction(model, twins):
     card = model.session.card
     none = joints(card, taken(model, twins, [1, 2, 3], variety=0.0))
     who = np.arange(3)
-    shown = level_transitions.constant_schedule(0, twins.phases.shape)
+    shown = locomotion_plan.constant_schedule(0, twins.phases.shape)
     plain = joints(card, walking_feet.standing_motions(model.session, twins, who, shown))
     # Poses of takes are computed in double precision, those of the graph in single precision.
     assert apart(none, plain) < 1e-3
@@ -125,18 +118,18 @@ def test_a_walker_has_the_poses_of_its_take_in_a_crowd(model, twins):
     seeds, rows = np.array([4, 5, 6]), np.arange(3)
     frames = np.full(3, 11)
     takes = WalkerTakes("index", seeds, 0.7, True)
-    pose = walking_takes.pose_maker(model, takes, twins, rows)
+    pose = walking_feet.pose_maker(model, takes, twins, rows)
     found = pose(model.session, twins, rows, frames, 0)
     labels = twins.labels.weights[twins.who]
     controls = twins.controls[:, 11]
     durations = model.session.durations(controls, labels)
     times = (twins.phases[:, 11] * durations)[:, None]
     own = CharacterTakes(seeds, np.full(3, 0.7), np.full(3, True))
-    posed, path, _ = crowd_takes.pose_takes(model, own, controls, times, labels, 0)
+    posed, path, _ = crowd_synthesis.pose_takes(model, own, controls, times, labels, 0)
     assert np.abs(found.rotations[:, 1:] - posed[:, 1:]).max() < 1e-6
     assert np.abs(found.heights - path[:, 1]).max() < 1e-6
     other = replace(own, seeds=seeds + 1)
-    wrong, _, _ = crowd_takes.pose_takes(model, other, controls, times, labels, 0)
+    wrong, _, _ = crowd_synthesis.pose_takes(model, other, controls, times, labels, 0)
     assert np.abs(found.rotations[:, 1:] - wrong[:, 1:]).max() > 1e-2
 
 
@@ -158,7 +151,7 @@ def test_feet_of_takes_stand(model, walk):
 def test_deviations_between_knots_are_those_of_the_field(model, walk):
     order = CrowdOrder(count=6, seconds=6.0, take="index")
     exact = _paths(model, walk, order, 0.0)
-    found = _paths(model, walk, order, walking_takes.KNOT_SECONDS)
+    found = _paths(model, walk, order, walking_feet.KNOT_SECONDS)
     coarse = _paths(model, walk, order, 3.0)
     size = np.sqrt(np.mean(np.square(exact)))
     assert np.sqrt(np.mean(np.square(found - exact))) < 0.005 * size
@@ -168,7 +161,7 @@ def test_deviations_between_knots_are_those_of_the_field(model, walk):
 def _paths(model, walk, order, apart):
     """Deviations along the paths of a crowd, computed at knots so many seconds apart."""
     plan = walking_crowd.plan_random(walk, order.count, order.seconds, order.fps, order.seed)
-    return walking_takes.deviations_along(
+    return walking_feet.deviations_along(
         model, plan, np.arange(order.count), 1 + np.arange(order.count), apart
     )
 
@@ -204,7 +197,7 @@ NEAR = Camera(np.array([-8.0, 1.7, 0.0]), 1.0472, 1080.0)
 
 CROWDS = {
     "wandering": {"count": 30, "seconds": 8.0},
-    "on routes": {"count": len(ROUTES), "routes": routes.parse_routes(ROUTES), "seconds": 15.0},
+    "on routes": {"count": len(ROUTES), "routes": paths.parse_routes(ROUTES), "seconds": 15.0},
     "while levels change": {"count": 40, "seconds": 8.0, "camera": NEAR, "pixels": 3.0},
     "at the coarsest level": {"count": 30, "seconds": 4.0, "level": 3},
 }

@@ -14,7 +14,7 @@ from posefield.http import batching
 from posefield.http.batching import ClipBatcher
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
-from posefield.synthesis import clips, frame_times
+from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
 USDC = CLIP_ENCODERS["usdc"]
@@ -99,7 +99,7 @@ def test_a_fault_reaches_everybody_and_the_next_is_written(answers):
     assert file == USDC.encode(answers[0], METRES)
 
 
-def made(model, asked, encoder=USDC, most=frame_times.MAX_POSES):
+def made(model, asked, encoder=USDC, most=poses.MAX_POSES):
     async def ask():
         batcher = ClipBatcher()
         asking = (batcher.clip(model, each, most, encoder, METRES) for each in asked)

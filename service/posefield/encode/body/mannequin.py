@@ -23,7 +23,7 @@ import numpy.typing as npt
 from posefield.common.units import Floats, Indices
 from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, Bytes, Integers, SkinnedMesh
-from posefield.motion import blend
+from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 from posefield.roles import joint_recognition
 
@@ -315,7 +315,7 @@ def _weights(
     gaps[0] += BELOW * fit.scale
     half = np.maximum(SOFTNESS * np.minimum(gaps[:-1], gaps[1:]), SHORTEST * fit.scale)
     shares = 0.5 + 0.5 * (heights[:, None] - marks[1:]) / half
-    passed = np.minimum.accumulate(blend.smoothstep(np.clip(shares, 0.0, 1.0)), axis=1)
+    passed = np.minimum.accumulate(quat.smoothstep(np.clip(shares, 0.0, 1.0)), axis=1)
     passed = np.pad(passed, ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
     np.add.at(found, (rows[:, None], np.array(fit.spine)), parts[:, :1] * -np.diff(passed, axis=1))
     chosen = np.argsort(-found, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)

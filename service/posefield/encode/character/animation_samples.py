@@ -7,8 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from posefield.common.units import Floats, Indices, Singles
-from posefield.motion.clip import Clip
-from posefield.motion.crowd_clip import Motions
+from posefield.motion.clip import Clip, Motions
 
 
 @dataclass(frozen=True)

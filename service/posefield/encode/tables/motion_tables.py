@@ -15,8 +15,7 @@ from posefield.encode.conventions import Convention
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Column, Table, as_float32
 from posefield.motion import quat
-from posefield.motion.clip import Clip
-from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
+from posefield.motion.clip import Clip, CrowdClip, CrowdPoses
 from posefield.question.results import PoseAnswer, SampledClip
 
 UNITS = {

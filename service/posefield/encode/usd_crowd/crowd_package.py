@@ -21,7 +21,7 @@ from posefield.encode.usd import character_prims
 from posefield.encode.usd_crowd import crowd_scene
 from posefield.encode.usd_crowd.crowd_scene import MotionSamples
 from posefield.encode.usd_layers import layers
-from posefield.motion.crowd_clip import CrowdClip
+from posefield.motion.clip import CrowdClip
 from posefield.question.motion_question import BodyKind
 
 

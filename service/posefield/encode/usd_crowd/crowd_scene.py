@@ -33,7 +33,7 @@ from posefield.encode.usd.usd_clip import AnimationLayerBuilder
 from posefield.encode.usd_layers import crate_template, layers
 from posefield.encode.usd_layers.layers import WEIGHTS, LayerContent, Samples, ValueTypes
 from posefield.motion import quat
-from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.clip import CrowdClip, Motions, Placement
 
 CORNERS = np.array(list(product((False, True), repeat=3)))
 

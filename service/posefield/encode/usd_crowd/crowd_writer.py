@@ -35,7 +35,7 @@ from posefield.encode.usd_crowd import (
 )
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.encode.usd_layers import layers
-from posefield.motion.crowd_clip import CrowdClip
+from posefield.motion.clip import CrowdClip
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
 
 CHILD_MODULE = "posefield.encode.usd_crowd.encoding_child"

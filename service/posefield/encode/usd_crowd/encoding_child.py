@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from posefield.encode.usd_crowd import crowd_writer
-from posefield.motion.crowd_clip import Motions
+from posefield.motion.clip import Motions
 from posefield.question.motion_question import BodyKind
 
 

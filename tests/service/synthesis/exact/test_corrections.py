@@ -9,7 +9,7 @@ from scipy.spatial import distance as apart
 from scipy.stats import chi
 
 from posefield.constraints import constraint, reachability
-from posefield.constraints.correction_task import CorrectionTask
+from posefield.constraints.constraint import CorrectionTask
 from posefield.constraints.reachability import Reachability
 
 

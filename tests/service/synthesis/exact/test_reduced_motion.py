@@ -10,8 +10,8 @@ from posefield.constraints.constraint import (
     StepLengthConstraint,
     TravelConstraint,
 )
-from posefield.inference import residual_covariance, session
-from posefield.kriging import leave_one_out
+from posefield.inference import reduced_motion, session
+from posefield.kriging import kriging_model
 from posefield.model_file import onnx_file
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
@@ -94,7 +94,7 @@ def test_positions_are_those_of_the_poses(name, request):
 def strays(trained) -> np.ndarray:
     """Return training's standardised leave-one-out errors of each clip's coefficients (n, r3)."""
     pose, laid, model = trained.pose, trained.samples, trained.model
-    left_out = leave_one_out.leave_out(pose.hyper, laid.points, laid.groups)
+    left_out = kriging_model.leave_out(pose.hyper, laid.points, laid.groups)
     sigmas = np.sqrt(model.bank.sill * pose.variances * len(laid.points))
     return left_out @ model.decoder.reduced.bases[2] / sigmas[:, None]
 
@@ -114,9 +114,9 @@ def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_ex
     opened = session.open_bytes(labelled_exported.content, "labelled.onnx")
     weights = onnx_file.initializers(opened.content)
     samples = opened.kriging_weights.samples
-    found = residual_covariance.sample_coefficients(opened.card, weights, samples)
+    found = reduced_motion.sample_coefficients(opened.card, weights, samples)
     bases = labelled.model.decoder.reduced.bases[2]
-    order = residual_covariance.importance_order(opened.card, weights, samples)
+    order = reduced_motion.importance_order(opened.card, weights, samples)
     assert np.abs(found - bases).max() < 1e-5
     assert not np.array_equal(order, np.arange(len(order)))
     # Negative control: in the order of the file they are other clips'.

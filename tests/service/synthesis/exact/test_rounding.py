@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from posefield.inference import named_model, session
+from posefield.inference import level_selection, session
 from posefield.synthesis.synthesizer import Synthesizer
 
 
@@ -12,7 +12,7 @@ def test_a_machine_that_rounds_otherwise_has_other_tags(model_path, monkeypatch)
     assert Synthesizer("reaching", opened).fingerprint == here
     solve = np.linalg.solve
     monkeypatch.setattr(np.linalg, "solve", lambda a, b: np.nextafter(solve(a, b), 2.0))
-    named_model.rounding_fingerprint.cache_clear()
+    level_selection.rounding_fingerprint.cache_clear()
     there = Synthesizer("reaching", opened).fingerprint
-    named_model.rounding_fingerprint.cache_clear()
+    level_selection.rounding_fingerprint.cache_clear()
     assert there != here

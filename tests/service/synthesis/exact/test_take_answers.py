@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
+from posefield.constraints.take_variation import TakeSampler
 from posefield.inference import reduced_motion, session
-from posefield.inference.takes import TakeSampler
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer

@@ -1,0 +1,358 @@
+"""Trust in answers: why one is what it is, sigma over two controls, and clips to capture next.
+
+The poses of the finest level are a weighted sum of the captured clips in the coordinates of the
+motion tensor; the weights depend on the controls and the performer, not on the time. Captures are
+ranked by the mean kriging variance, over the candidates, of the field that decides support: each
+next point is selected as if the points before had been captured already.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common import cancellation
+from posefield.common.array_shapes import SampleControls
+from posefield.common.cancellation import ProgressCallback, ignore_progress
+from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import Booleans, Floats, Indices, Singles
+from posefield.kriging import kriging_model, support
+from posefield.kriging.support import NUGGET, Support, covariances
+from posefield.model_file.model_card import PERFORMER, Control, ModelCard
+from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
+from posefield.question.results import (
+    CapturedClip,
+    Explanation,
+    GridAxis,
+    SigmaGrid,
+    Suggestion,
+    Suggestions,
+    SupportReport,
+)
+from posefield.question.value_validation import check_range
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import question_validation
+from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
+
+AVERAGED_CANDIDATES = 500
+"""Number of candidates over which the variance is averaged."""
+
+
+@dataclass(frozen=True)
+class VarianceReduction:
+    """Value of a point: the share by which the mean variance falls, and the variance there."""
+
+    gain: float
+    variance: float
+
+
+def rank_candidates(
+    candidates: Annotated[Floats, "candidates controls"],
+    samples: SampleControls,
+    count: int,
+    progress: ProgressCallback = ignore_progress,
+) -> list[tuple[int, VarianceReduction]]:
+    """Return the candidates (C, d) of the largest gains, by index, in greedy order.
+
+    samples (n, d): captured, in half-ranges like the candidates. Each gain assumes the candidates
+    before it as captured.
+    """
+    known = _ConditionedField.conditioned_on(candidates, samples)
+    found: list[tuple[int, VarianceReduction]] = []
+    most = min(count, len(candidates))
+    for done in range(most):
+        cancellation.check()
+        gains = known.gains()
+        gains[[at for at, _ in found]] = -1.0
+        at = int(np.argmax(gains))
+        found.append((at, VarianceReduction(float(gains[at]), float(known.variances[at]))))
+        known.condition_on(at)
+        progress(done + 1, most)
+    return found
+
+
+@dataclass
+class _ConditionedField:
+    """Kriging field over candidates (C, d), conditioned on the captured points.
+
+    whitened: k rows (C,), the whitened covariances of each captured point with the candidates.
+    variances (C,): of the candidates. remaining (C, G): covariances with the candidates over which
+    the variance is averaged, `averaged`.
+    """
+
+    candidates: Annotated[Floats, "candidates controls"]
+    whitened: list[Annotated[Floats, "candidates"]]
+    variances: Annotated[Floats, "candidates"]
+    remaining: Annotated[Floats, "candidates averaged"]
+    averaged: Annotated[Indices, "averaged"]
+
+    @classmethod
+    def conditioned_on(
+        cls, candidates: Annotated[Floats, "candidates controls"], samples: SampleControls
+    ) -> "_ConditionedField":
+        """Return the field conditioned on samples (n, d)."""
+        averaged = np.unique(
+            np.linspace(0, len(candidates) - 1, AVERAGED_CANDIDATES).astype(np.int64)
+        )
+        own = covariances(samples, samples) + NUGGET * np.eye(len(samples))
+        known = np.linalg.solve(np.linalg.cholesky(own), covariances(samples, candidates))
+        toward = covariances(candidates, candidates[averaged]) - known.T @ known[:, averaged]
+        left = 1.0 - np.sum(np.square(known), axis=0)
+        return cls(candidates, list(known), left, toward, averaged)
+
+    def gains(self) -> Annotated[Floats, "candidates"]:
+        """Return the share by which the mean variance falls if each candidate (C,) is captured."""
+        falls = np.mean(np.square(self.remaining), axis=1) / (self.variances + NUGGET)
+        return np.asarray(falls / self.variances[self.averaged].mean())
+
+    def condition_on(self, at: int) -> None:
+        """Condition the field on one of the candidates as well."""
+        known = np.stack(self.whitened)
+        own = covariances(self.candidates, self.candidates[[at]])[:, 0] - known.T @ known[:, at]
+        said = own / np.sqrt(self.variances[at] + NUGGET)
+        self.whitened.append(said)
+        self.variances = self.variances - np.square(said)
+        self.remaining = self.remaining - said[:, None] * said[self.averaged]
+
+
+DRAWN_CANDIDATES, MAX_CANDIDATES = 1000, 10_000
+"""Number of drawn candidates, and the largest number of given ones."""
+
+
+def suggest(
+    model: Synthesizer,
+    asked: SuggestQuestion,
+    candidates: Sequence[Mapping[str, float]] | None = None,
+    progress: ProgressCallback = ignore_progress,
+) -> Suggestions:
+    """Return points to capture in order of their expected variance reduction.
+
+    candidates: the points, by their controls; None for points across the sampled ranges. Each rank
+    assumes that the points before it were captured. Raises InvalidField for an unknown label and
+    for an unusable candidate.
+    """
+    card, own = model.session.card, model.validator.support
+    weights = question_validation.label_weights(card, asked.performer, asked.labels)[0]
+    points = _drawn_points(own) if candidates is None else _given_points(model, candidates)
+    captured = _captured_indices(card, weights)
+    scaled, known = own.scaled(points), own.samples[captured]
+    ranked = rank_candidates(scaled, known, asked.count, progress)
+    found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
+    return Suggestions(model.identity, asked.performer, len(points), found, asked.labels)
+
+
+def _captured_indices(card: ModelCard, weights: Floats) -> Indices:
+    """Return the indices of the captured clips of the names with weights (p,) above zero.
+
+    A label set without such a name admits all clips. Raises InvalidField if no clip is left.
+    """
+    kept = np.ones(len(card.examples), dtype=bool)
+    for columns in kriging_model.label_columns(0, card.label_counts):
+        if weights[columns].any():
+            kept &= card.clip_labels[:, columns] @ weights[columns] > 0.0
+    if not kept.any():
+        raise InvalidField("labels", "no captured clip has these names together")
+    return np.flatnonzero(kept)
+
+
+def _given_points(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
+    """Return the points (C, d) of candidates, in the card's order."""
+    check_range("candidates", len(candidates), 1, MAX_CANDIDATES, "points")
+    card = model.session.card
+    rows = []
+    for index, controls in enumerate(candidates):
+        try:
+            question_validation.check_names(card, controls)
+            rows.append([_value(control, controls) for control in card.controls])
+        except InvalidField as fault:
+            raise InvalidField(f"candidates/{index}/{fault.field}", fault.message) from fault
+    return np.array(rows)
+
+
+def _value(control: Control, controls: Mapping[str, float]) -> float:
+    """Return the value of a candidate's control; InvalidField if it is missing or unusable."""
+    if control.name not in controls:
+        raise InvalidField(f"controls/{control.name}", f"missing; give a number in {control.unit}")
+    return question_validation.check_control(control, controls[control.name])
+
+
+def _drawn_points(own: Support) -> Floats:
+    """Return points (DRAWN, d) across the sampled ranges by Roberts' additive recurrence."""
+    d = len(own.low)
+    ratio = 2.0
+    for _ in range(64):
+        # The root of x^(d + 1) = x + 1; for one control, the golden ratio.
+        ratio = (1.0 + ratio) ** (1.0 / (d + 1))
+    steps = ratio ** -np.arange(1.0, d + 1.0)
+    share = np.mod(0.5 + np.arange(1, DRAWN_CANDIDATES + 1)[:, None] * steps, 1.0)
+    return own.low + share * (own.high - own.low)
+
+
+def _suggestion(
+    card: ModelCard, own: Support, captured: Indices, point: Floats, found: VarianceReduction
+) -> Suggestion:
+    """Return a point with its nearest captured clip and the control in which that differs most."""
+    gaps = 0.5 * np.abs(own.samples[captured] - own.scaled(point[None]))
+    nearest = int(np.argmin(np.sum(np.square(gaps), axis=1)))
+    control = int(np.argmax(gaps[nearest]))
+    names = [each.name for each in card.controls]
+    return Suggestion(
+        dict(zip(names, point.tolist(), strict=True)),
+        found.gain,
+        found.variance,
+        card.sources[captured[nearest]],
+        names[control],
+        float(gaps[nearest, control]),
+    )
+
+
+NEAREST, MOST = 10, 10_000
+
+
+def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
+    """Return the nearest captured clips, their weights and the support of an answer.
+
+    Raises InvalidField and OutsideSamples as the validation of questions does.
+    """
+    card = model.session.card
+    question = model.validator.question(
+        asked.controls, asked.extrapolate, asked.performer, 0, asked.labels
+    )
+    distances = model.session.kriging_weights.distances(_point(card, question))[0]
+    limited = model.session.bounds.limit(question.point).astype(np.float64)
+    acting = replace(question, point=limited)
+    weights = model.session.kriging_weights.weights(_point(card, acting))[0]
+    order = np.argsort(distances, kind="stable")
+    near, others = order[: asked.nearest], order[asked.nearest :]
+    # Kriging weights sum to one, so at least one is positive.
+    positive = np.maximum(weights, 0.0)
+    shares = positive / positive.sum()
+    found = tuple(
+        _captured_clip(card, i, distances[i], weights[i], shares[i]) for i in near.tolist()
+    )
+    rest = float(weights[others].sum()), float(shares[others].sum())
+    controls, who = question.controls, question.performer
+    said = question_validation.merge_warnings(
+        question.warnings, question.deviations, asked.extrapolate
+    )
+    inferred, backing = question.inferred, _support_report(model.validator, question)
+    return Explanation(
+        model.identity,
+        controls,
+        who,
+        said,
+        backing,
+        found,
+        len(others),
+        *rest,
+        inferred,
+        question.named,
+    )
+
+
+def _support_report(door: QuestionValidator, question: ValidatedQuestion) -> SupportReport:
+    own = door.support
+    beyond = dict(zip(question.controls, own.beyond(question.point)[0].tolist(), strict=True))
+    variance = float(own.variance(question.point)[0])
+    return SupportReport(question.supported, beyond, support.RANGE_MARGIN, variance, own.limit)
+
+
+def _point(card: ModelCard, question: ValidatedQuestion) -> Floats:
+    """Return the point (1, d + p) of the kriging model."""
+    place = kriging_model.half_ranges(question.point, *card.sampled_ranges)
+    return np.hstack([place, question.labels])
+
+
+def _captured_clip(
+    card: ModelCard, index: int, distance: float, weight: float, share: float
+) -> CapturedClip:
+    names = (control.name for control in card.controls)
+    controls = dict(zip(names, card.examples[index], strict=True))
+    named = card.clip_names(index)
+    who = named.pop(PERFORMER, None)
+    numbers = float(distance), float(weight), float(share)
+    return CapturedClip(card.sources[index], controls, who, *numbers, named)
+
+
+# Larger batches exceed a core's cache between operators and take 1.5 times as long per row.
+BATCH = 1024
+
+
+def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
+    """Return the grid of sigma and support.
+
+    Raises InvalidField for an unknown control or label, and for a value too far outside the
+    sampled range.
+    """
+    card = model.session.card
+    question_validation.check_names(card, asked.controls)
+    labels = question_validation.label_weights(card, asked.performer, asked.labels)
+    across = _axis(card, "across", asked.across, asked.columns, asked)
+    along = _axis(card, "along", asked.along, asked.rows, asked)
+    fixed = _fixed(card, asked)
+    points = _points(card, across, along, fixed)
+    sigma = _sigmas(model, points, labels)
+    shape = asked.rows, asked.columns
+    return SigmaGrid(
+        model.identity,
+        across,
+        along,
+        fixed,
+        asked.performer,
+        sigma.reshape(shape),
+        _inside(card, points).reshape(shape),
+        model.validator.support.supported(points).reshape(shape),
+        asked.labels,
+    )
+
+
+def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
+    """Return sigma (B,), m, at points (B, d)."""
+    found = []
+    for first in range(0, len(points), BATCH):
+        cancellation.check()
+        found.append(model.session.sigmas(points[first : first + BATCH], labels))
+    return np.concatenate(found)
+
+
+def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> GridAxis:
+    control = card.control(name)
+    if control is None:
+        own = [c.name for c in card.controls]
+        found = f"{name!r}{did_you_mean(name, own)}"
+        raise InvalidField(
+            field, f"{found}, expected one of this model's controls, {', '.join(own)}"
+        )
+    if name in asked.controls:
+        raise InvalidField(f"controls/{name}", f"given, and {field} the grid too; expected one")
+    room = asked.margin * (control.maximum - control.minimum)
+    return GridAxis(control, np.linspace(control.minimum - room, control.maximum + room, count))
+
+
+def _fixed(card: ModelCard, asked: SigmaQuestion) -> dict[str, float]:
+    """Return the values of the controls that are not axes, in the card's order."""
+    usual = {control.name: control.default for control in card.controls} | dict(asked.controls)
+    return {
+        control.name: question_validation.check_control(control, usual[control.name])
+        for control in card.controls
+        if control.name not in (asked.across, asked.along)
+    }
+
+
+def _points(
+    card: ModelCard, across: GridAxis, along: GridAxis, fixed: Mapping[str, float]
+) -> Floats:
+    """Return the controls (R C, d) of the grid points in the card's order, row by row."""
+    right, up = np.meshgrid(across.values, along.values)
+    columns = {across.control.name: right.ravel(), along.control.name: up.ravel()}
+    full = (columns.get(c.name, np.full(right.size, fixed.get(c.name))) for c in card.controls)
+    return np.stack(list(full), axis=1)
+
+
+def _inside(card: ModelCard, points: Floats) -> Booleans:
+    low, high = np.transpose(
+        [question_validation.sampled_range(control) for control in card.controls]
+    )
+    return np.all((points >= low) & (points <= high), axis=1)
