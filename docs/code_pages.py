@@ -14,8 +14,8 @@ from page_parts import choices, code, page, table
 
 from posefield import cli
 from posefield.batch.tables import OPTION_COLUMNS
+from posefield.http import static_page
 from posefield.http.api.settings import PREFIX, Settings
-from posefield.http.pages import static_page
 from posefield.question import text_decoding
 from posefield.question.motion_question import NamedClipQuestion
 from posefield_train.cli import commands as add_training_commands

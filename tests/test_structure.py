@@ -24,8 +24,9 @@ class Code:
         return {name: file for name, file in self.files.items() if file.name != "__init__.py"}
 
     def folder(self, name):
-        """Package of a module; a package's own `__init__` belongs to it."""
-        return name if self.files[name].name == "__init__.py" else name.rpartition(".")[0]
+        """Package of a module, with its sub-packages; the top package for its own modules."""
+        parts = name.split(".")
+        return ".".join(parts[:2]) if self.files[name].parent.name != parts[0] else parts[0]
 
 
 def read(root):

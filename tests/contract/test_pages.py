@@ -7,9 +7,9 @@ from hashlib import sha256
 import pytest
 import yaml
 
+from posefield.http import static_page
 from posefield.http.api import contract
 from posefield.http.api.problems import PROBLEM_KINDS
-from posefield.http.pages import static_page
 
 BUILT = {"/": static_page.VIEWER, "/docs": static_page.DOCS}
 NO_ICON = '<link rel="icon" href="data:,"'

@@ -19,8 +19,8 @@ from image import Image
 
 from posefield import __version__
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
+from posefield.http import static_page
 from posefield.http.access import api_keys
-from posefield.http.pages import static_page
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer

@@ -12,7 +12,7 @@ from posefield.characters import user_character
 from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common.errors import UnknownFormat
 from posefield.common.name_suggestion import did_you_mean
-from posefield.http import header_fields, request_cycle
+from posefield.http import header_fields, request_cycle, static_page
 from posefield.http.access import access_control
 from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
@@ -20,7 +20,6 @@ from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.header_fields import HeadLimits
 from posefield.http.operations import OPERATIONS
-from posefield.http.pages import static_page
 from posefield.http.readiness import Readiness
 from posefield.http.request_cycle import ServerState
 from posefield.http.routing import Route, RouteTree

@@ -18,8 +18,8 @@ from posefield.http.access.access_control import AccessPolicy
 from posefield.http.api.problems import BAD_BODY, BODY_TOO_LARGE, NOT_JSON, OVERLOADED, RequestError
 from posefield.http.api.settings import Settings
 from posefield.http.batching import ClipBatcher, PoseBatcher
-from posefield.http.pages.static_page import StaticPage
 from posefield.http.readiness import Readiness
+from posefield.http.static_page import StaticPage
 from posefield.http.telemetry import NO_TELEMETRY, Telemetry
 from posefield.question import json_decoding, text_decoding
 from posefield.registry.model_registry import ModelRegistry

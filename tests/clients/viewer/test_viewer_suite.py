@@ -2,7 +2,7 @@
 
 import gzip
 
-from posefield.http.pages import static_page
+from posefield.http import static_page
 
 # Bytes that a page may weigh as it travels.
 BUDGET = 250_000

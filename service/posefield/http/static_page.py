@@ -42,7 +42,7 @@ class StaticPage:
         return blake2b(self.content, digest_size=16).digest()
 
 
-_PAGES = Path(__file__).parent
+_PAGES = Path(__file__).with_name("pages")
 VIEWER = _PAGES / "viewer/index.html"
 DOCS = _PAGES / "docs/index.html"
 PROBLEMS = _PAGES / "problems.html"

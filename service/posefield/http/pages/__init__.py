@@ -1,1 +1,0 @@
-"""Static documents: the contract and the HTML pages."""
