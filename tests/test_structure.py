@@ -11,6 +11,19 @@ import pytest
 ROOT = Path(__file__).parents[1]
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 
+BUDGETS = {
+    "service/posefield": 43_900,
+    "model_export/posefield_train": 26_460,
+    "clients/python": 2_080,
+    "clients/blender": 1_280,
+    "clients/viewer/src": 8_190,
+    "clients/typescript/src": 1_350,
+}
+"""Most lines of each part, without generated ones: who needs more takes lines away elsewhere."""
+GENERATED = {"generated.py", "client.py", "schema.ts"}
+MOST_TESTS = 0.785
+"""Lines of Python under tests for each line that ships."""
+
 
 @dataclass
 class Code:
@@ -127,3 +140,17 @@ def test_folders_names_and_arrows_follow_the_rules(own):
 def test_a_breach_is_found(plant, file, text, fault):
     found = list(faults(plant(file, text)))
     assert any(line.startswith(fault) for line in found) if fault else found == []
+
+
+def lines(folder):
+    """Lines of the sources of a folder by hand."""
+    files = [path for kind in ("*.py", "*.ts", "*.css") for path in (ROOT / folder).rglob(kind)]
+    kept = [path for path in files if path.name not in GENERATED and "build" not in path.parts]
+    return sum(path.read_bytes().count(b"\n") for path in kept)
+
+
+def test_parts_keep_their_budgets_of_lines():
+    counts = {folder: lines(folder) for folder in BUDGETS}
+    assert {name: count for name, count in counts.items() if count > BUDGETS[name]} == {}
+    shipped = sum(counts[distribution] for distribution in DISTRIBUTIONS)
+    assert 0.5 < lines("tests") / shipped <= MOST_TESTS
