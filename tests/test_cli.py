@@ -321,7 +321,7 @@ def test_a_recipe_that_is_wrong_is_refused_with_code_3(posefield, quick, tmp_pat
     code, out, err = posefield("train", wrong, "-o", tmp_path / "x.onnx")
     assert (code, out, err.count("\n")) == (3, "", 1)
     line = 1 + quick.read_text().split("cyclic = false")[0].count("\n")
-    assert err.startswith(f"posefield: {wrong}:{line}:1: motion.cyclic: ")
+    assert err.startswith(f"posefield: {wrong}:{line}: motion.cyclic: ")
 
 
 def test_a_recipe_that_is_not_there_is_refused_before_any_progress(refused, tmp_path):

@@ -1,6 +1,6 @@
 """Trial of model files: a child process with limits on time and memory opens each of them first.
 
-The check of operators (onnx_check) does not bound the sizes of their results: a few constants can
+The check of operators (onnx_file) does not bound the sizes of their results: a few constants can
 take any amount of time or memory, when the file is opened or at the first question.
 
 Memory is limited where the system enforces RLIMIT_AS and has /proc, as Linux does; elsewhere, as on

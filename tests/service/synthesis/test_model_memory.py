@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posefield.inference import graph_ports, session
+from posefield.inference import onnx_runtime, session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
@@ -25,11 +25,11 @@ from posefield.synthesis.synthesizer import Synthesizer
 def used():
     made = Synthesizer("model", session.open_bytes(content, ""))
     opened = made.session
-    points, no = graph_ports.default_controls(opened.card), np.zeros((1, 1))
+    points, no = onnx_runtime.default_controls(opened.card), np.zeros((1, 1))
     labels = np.zeros((1, sum(opened.card.label_counts)))
     for level in range(len(opened.card.levels)):
-        opened.run(points, no, *graph_ports.all_outputs(opened.card), level=level)
-        opened.run(points, no, *graph_ports.outputs(opened.card), level=level)
+        opened.run(points, no, *onnx_runtime.all_outputs(opened.card), level=level)
+        opened.run(points, no, *onnx_runtime.outputs(opened.card), level=level)
         opened.durations(points, level=level)
         opened.states(points, no, labels, level=level)
         controls = {each.name: each.default for each in opened.card.controls}

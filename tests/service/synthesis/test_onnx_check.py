@@ -49,7 +49,7 @@ def written(request):
 
 
 def used(message):
-    """Fields that messages have, as `onnx_check.MODEL` tells them."""
+    """Fields that messages have, as `onnx_file.MODEL` tells them."""
     found = {}
     for field, value in message.ListFields():
         inners = value if hasattr(value, "__len__") else [value]
