@@ -1,5 +1,6 @@
-"""Check of curves from end to end: the procedural face is sampled, trained and served by the
-commands, and its curves are read from USD and glTF in Blender, and from the page in a browser.
+"""Check of curves from end to end: the procedural face is trained and served by the commands.
+
+Its curves are read from USD and glTF in Blender, and from the page in a browser.
 """
 
 import json
@@ -15,6 +16,7 @@ import environment
 import httpx
 import numpy as np
 import running
+from families import face_files
 from usd_checks import defects
 
 COMMAND = Path(sys.executable).with_name("posefield")
@@ -30,9 +32,8 @@ def faults(python: Path, node: Path) -> list[str]:
     """Return the faults of all readers, a line each."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _call(COMMAND, "sample", "face", "-o", folder / "face")
         model = folder / "models/face.onnx"
-        _call(COMMAND, "train", folder / "face/recipe.toml", "-o", model)
+        _call(COMMAND, "train", face_files.write_family(folder / "face"), "-o", model)
         (port,) = running.ports(1)
         told = {"POSEFIELD_PORT": str(port), "POSEFIELD_LOG": "off"}
         served = running.started([COMMAND, "serve", model.parent], folder / "service.txt", **told)
