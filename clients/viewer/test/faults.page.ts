@@ -320,8 +320,8 @@ test("a version and an address are remarked on side by side", async () => {
 });
 
 for (const [contract, words] of [
-  ["4.0.0", null],
-  ["4.7.3", null],
+  ["5.0.0", null],
+  ["5.7.3", null],
   ["2.2.0", /another version.*2\.2\.0/],
   [undefined, /is older/],
 ] as const)
