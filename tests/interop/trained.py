@@ -1,10 +1,12 @@
 """Clips of trained models: the procedural family and the real recipes."""
 
 import os
-import sys
 import tempfile
 from functools import cache
 from pathlib import Path
+
+import environment
+from families import quadruped_walk, sample_walk
 
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
@@ -17,11 +19,7 @@ from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.recipe import Recipe
 
-sys.path.append(str(Path(__file__).parents[1]))
-
-from families import quadruped_walk, sample_walk
-
-ROOT = Path(__file__).parents[2]
+ROOT = environment.ROOT
 RECIPES = sorted((ROOT / "model_export/posefield_train/recipes").glob("*.toml"))
 DATA = Path(os.environ.get("POSEFIELD_DATA", ROOT.parent / "shared/data"))
 
