@@ -241,11 +241,15 @@ class _Placing:
         """Return the paths (N, 3), m, exactly at their anchors in each stance."""
         held = _stances_of(self.plans, foot, self.grids, self.ways, self.factors)
         found, groups = path.copy(), self.groups
-        each = FrameGroups(groups.counts[held.motions])
-        frames = groups.starts[held.motions][each.group] + each.frame
-        at = self.at_frames[frames]
-        within = (at >= held.first[each.group] - 1e-9) & (at <= held.last[each.group] + 1e-9)
-        found[frames[within]] = held.anchors[each.group[within]]
+        # Memory and time grow with the frames and the stances, not with their product.
+        for motion, at in enumerate(groups.split(self.at_frames)):
+            own = np.flatnonzero(held.motions == motion)
+            order = np.argsort(at, kind="stable")
+            begin = np.searchsorted(at, held.first[own] - 1e-9, "left", order)
+            counts = np.searchsorted(at, held.last[own] + 1e-9, "right", order) - begin
+            each = FrameGroups(counts)
+            rows = groups.starts[motion] + order[begin[each.group] + each.frame]
+            found[rows] = held.anchors[own[each.group]]
         return found
 
 

@@ -21,6 +21,9 @@ from posefield.question.performance_question import GivenPose, Join
 from posefield.question.performance_report import Reference, ScriptWarning, SegmentKind
 from posefield.question.results import ConstraintResult
 
+RESAMPLED_AT_ONCE = 4096
+"""Frames that are resampled at a time, which takes some ten times their memory."""
+
 
 @dataclass(frozen=True)
 class Span:
@@ -222,6 +225,9 @@ def resample(
     at = np.clip(times * rate, 0.0, len(roots) - 1.0)
     before = np.minimum(at.astype(np.int64), max(len(roots) - 2, 0))
     after = np.minimum(before + 1, len(roots) - 1)
-    share = at - before
-    turned = quat.slerp(rotations[before], rotations[after], share[:, None])
-    return turned, roots[before] + share[:, None] * (roots[after] - roots[before])
+    share = (at - before)[:, None]
+    turned = np.empty((len(at), *rotations.shape[1:]))
+    for first in range(0, len(at), RESAMPLED_AT_ONCE):
+        rows = slice(first, first + RESAMPLED_AT_ONCE)
+        turned[rows] = quat.slerp(rotations[before[rows]], rotations[after[rows]], share[rows])
+    return turned, roots[before] + share * (roots[after] - roots[before])
