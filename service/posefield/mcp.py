@@ -137,7 +137,7 @@ class Toolbox:
 
 
 def _decode(form: Any, arguments: Mapping[str, Any]) -> Any:
-    return json_decoding.decode_question(form, orjson.dumps(arguments))
+    return json_decoding.convert_question(form, arguments)
 
 
 def _file_name(name: str) -> str:

@@ -110,6 +110,8 @@ def test_what_a_crowd_takes_is_counted_before_it_is_made(loaded, query):
     [
         # 438 MB, made in 2.4 GB of memory.
         ("count=1&seconds=16000", "480001 frames of a motion, expected at most 36000"),
+        ("count=1&seconds=-1e308", "expected a time above 0"),
+        ("count=1&fps=-1e308", "expected 1 to 1000"),
         # More than a minute of work in 1.4 GB.
         ("count=100000&motions=5&seconds=0.1&instancing=flatten", "expected at most 268.4 MB"),
         ("count=100000&motions=2000&seconds=1", "expected at most 268.4 MB"),

@@ -81,6 +81,12 @@ def test_only_performing_writes(box, tmp_path):
             InvalidField,
             "no tool 'plan' (did you mean 'plan_performance'?), expected one of list_models, plan",
         ),
+        (
+            "plan_performance",
+            {"script": {"segments": [{"kind": "hold", "seconds": 1}], "take": 10**400}},
+            QueryError,
+            "script/take: Expected `int` <=",
+        ),
         ("list_models", {"all": True}, QueryError, "all: Object contains unknown field `all`"),
         ("plan_performance", {}, QueryError, "script: Object missing required field"),
         (

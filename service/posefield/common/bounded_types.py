@@ -10,7 +10,8 @@ from msgspec import Meta
 
 # Larger numbers would overflow when they are squared in float32.
 _MAX_NUMBER = 1e15
-_MAX_INTEGER = 2**53
+MAX_INTEGER = 2**53
+"""Largest integer up to which floats hold all of them."""
 
 Text = Annotated[str, Meta(max_length=100_000)]
 Name = Annotated[str, Meta(min_length=1, max_length=1_000)]
@@ -26,9 +27,11 @@ Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Rate = Annotated[float, Meta(ge=1.0, le=10_000.0)]
 """Frames a second."""
 
-Count = Annotated[int, Meta(ge=1, le=_MAX_INTEGER)]
-Index = Annotated[int, Meta(ge=0, le=_MAX_INTEGER)]
-Parent = Annotated[int, Meta(ge=-1, le=_MAX_INTEGER)]
+Count = Annotated[int, Meta(ge=1, le=MAX_INTEGER)]
+Index = Annotated[int, Meta(ge=0, le=MAX_INTEGER)]
+Parent = Annotated[int, Meta(ge=-1, le=MAX_INTEGER)]
 """Index of a parent, -1 for none."""
+Whole = Annotated[int, Meta(ge=-MAX_INTEGER, le=MAX_INTEGER)]
+"""Integer of a question; NumPy and float arithmetic hold it."""
 Degree = Annotated[int, Meta(ge=0, le=1)]
 """Degree of a polynomial drift."""

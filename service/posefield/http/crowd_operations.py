@@ -244,7 +244,8 @@ def checked_order(
     _check_size(made, flat, settings)
     skeleton, curves = card.skeleton, len(card.curves)
     points = character.body_size(skeleton, question.body or DEFAULT_BODY)
-    motions, frames = made.motions or made.count, walking_crowd.frames(made.seconds, made.fps)
+    motions = made.motions or made.count
+    frames = walking_crowd.frame_count(motions, made.seconds, made.fps, made.seed)
     counts = CrowdCounts(len(skeleton), made.count, motions, frames, points, curves)
     _check_output(counts, flat, ending, settings)
     return made

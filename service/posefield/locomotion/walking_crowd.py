@@ -55,7 +55,7 @@ def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) 
 
     Raises InvalidField for numbers out of range.
     """
-    frames = _frames(count, seconds, rate, seed)
+    frames = frame_count(count, seconds, rate, seed)
     characters = paths.draw_characters(gait, count, seed)
     ways = paths.draw_paths(gait, characters, seconds)
     return locomotion_plan.plan_along_paths(
@@ -71,7 +71,7 @@ def plan_routes(
     Raises InvalidField as `plan_random` and `given.paths_through` do, and for a route that is too
     short.
     """
-    frames = _frames(len(routes), seconds, rate, seed)
+    frames = frame_count(len(routes), seconds, rate, seed)
     characters = paths.draw_characters(gait, len(routes), seed)
     ways = given.paths_through(gait, routes)
     return locomotion_plan.plan_along_paths(
@@ -79,7 +79,8 @@ def plan_routes(
     )
 
 
-def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
+def frame_count(count: int, seconds: float, rate: float, seed: int) -> int:
+    """Return the number of frames of each motion; InvalidField for values out of range."""
     if count < 1:
         raise InvalidField("count", f"{count}, expected at least 1 character")
     if not 0 <= seed < SEED_LIMIT:
@@ -91,11 +92,6 @@ def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
     most = poses(count, seconds, rate)
     if most > MAX_POSES:
         raise InvalidField("count", f"{most:.3g} poses, expected {MAX_POSES} at most")
-    return frames(seconds, rate)
-
-
-def frames(seconds: float, rate: float) -> int:
-    """Return the number of frames of a motion of this length, s."""
     # Tolerance of a millionth of a frame for the rounding of seconds * rate.
     return math.floor(seconds * rate + 1e-6) + 1
 

@@ -78,7 +78,7 @@ def _form_error(form: Any, said: str, plain: Any) -> FormError:
         path, found = _resolve_path(error_path(said), plain)
     message = said.rpartition(_PATH)[0] or said
     typed = said.startswith("Expected") and not isinstance(found, dict | list)
-    shown = f" {found!r}" if typed else _accepted_names(form, path, plain, found)
+    shown = f" {found!r}"[:100] if typed else _accepted_names(form, path, plain, found)
     return FormError(json_pointer(*path).removeprefix("/"), message + shown)
 
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from posefield.common.bounded_types import Whole
 from posefield.common.errors import InvalidField
 from posefield.question.motion_question import (
     Controls,
@@ -28,8 +29,8 @@ class SigmaQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     across: str
     along: str
-    columns: int = 32
-    rows: int = 32
+    columns: Whole = 32
+    rows: Whole = 32
     controls: Controls = {}
     performer: Performer = None
     labels: Labels = {}
@@ -53,7 +54,7 @@ class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     extrapolate: Extrapolate = "warn"
     performer: Performer = None
     labels: Labels = {}
-    nearest: Annotated[int, Meta(description="number of captured clips to list")] = 10
+    nearest: Annotated[Whole, Meta(description="number of captured clips to list")] = 10
 
     def __post_init__(self) -> None:
         check_range("nearest", self.nearest, 1, MAX_NEAREST, "clips")
@@ -62,7 +63,7 @@ class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 class SuggestQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Query for the clips to capture next."""
 
-    count: Annotated[int, Meta(description="number of points to list")] = 10
+    count: Annotated[Whole, Meta(description="number of points to list")] = 10
     performer: Annotated[
         str | None,
         Meta(description="performer whose clips alone count as captured; default: all performers"),

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, cast
 import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
+from posefield.common.bounded_types import Whole
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.floor import Floor, at_height
@@ -105,7 +106,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     extrapolate: Extrapolate = "warn"
     performer: Performer = None
     labels: Labels = {}
-    level: Annotated[int, Meta(description="level of detail; 0 is the finest")] = 0
+    level: Annotated[Whole, Meta(description="level of detail; 0 is the finest")] = 0
     joint_sigma: Annotated[bool, Meta(description="include sigma of each joint, m")] = False
     exact: Annotated[
         ExactControls,
@@ -123,7 +124,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         ),
     ] = ()
     take: Annotated[
-        int,
+        Whole,
         Meta(
             description="seed of another take of the motion, equal for equal seeds; 0 is the mean"
         ),

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
+from posefield.common.bounded_types import Whole
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.motion_question import (
@@ -189,10 +190,10 @@ class PerformanceQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     start: Start = Start()
     obstacles: Annotated[tuple[Disc, ...], Meta(max_length=MAX_SEGMENTS)] = ()
     fps: float = 30.0
-    take: int = 0
+    take: Whole = 0
     variety: float = 0.7
     detail: bool = False
-    level: int = 0
+    level: Whole = 0
     feet: FeetMode = "stand"
     extrapolate: ExtrapolationPolicy = "warn"
     names: NamingConvention = "own"

@@ -299,17 +299,14 @@ PARSERS: Mapping[Any, Callable[[str], Any]] = {
 def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
     kind, meta = hint, Meta()
     if get_origin(hint) is Annotated and isinstance(get_args(hint)[1], Meta):
-        kind, meta = get_args(hint)
+        # The last one describes the field; others are bounds of its type.
+        kind, *_, meta = get_args(hint)
     kind = _without_none(kind)
     several = get_origin(kind) in (list, tuple) and kind not in PARSERS
     # Each label set of a mapping is a parameter of its own.
     repeated = several or field.name == LABELS_FIELD
-    one = get_args(kind)[0] if several else kind
-    read = (
-        choice_parser(get_args(one))
-        if get_origin(one) is Literal
-        else PARSERS[_without_annotations(one)]
-    )
+    one = _without_annotations(get_args(kind)[0] if several else kind)
+    read = choice_parser(get_args(one)) if get_origin(one) is Literal else PARSERS[one]
     extra = meta.extra or {}
     return Parameter(
         field.name,

@@ -29,7 +29,8 @@ def check_range(field: str, value: float, low: float, high: float, unit: str) ->
     """Raise InvalidField for a value outside low to high."""
     if not low <= value <= high:
         # Nine digits tell any two numbers of single precision apart.
-        raise InvalidField(field, f"{value:.9g} {unit}, expected {low:.9g} to {high:.9g} {unit}")
+        shown = f"{check_number(field, value):.9g}"
+        raise InvalidField(field, f"{shown} {unit}, expected {low:.9g} to {high:.9g} {unit}")
 
 
 def check_rounded_range(field: str, value: float, low: float, high: float, unit: str) -> float:

@@ -5,11 +5,12 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+from posefield.common.bounded_types import Whole
 from posefield.common.errors import InvalidField
 from posefield.question.motion_question import DEFAULT_VARIETY, Body, FeetMode, LabelValue
 
 Instancing = Literal["references", "scenegraph", "flatten"]
-WalkerTake = Literal["index"] | int
+WalkerTake = Literal["index"] | Whole
 """Seed of all characters, or "index" for a seed of its own for each."""
 DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
 
@@ -35,14 +36,14 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """
 
     # The default crowd fits a browser's tab: some ten megabytes.
-    count: Annotated[int, Meta(description="number of characters, each on its own path")] = 100
+    count: Annotated[Whole, Meta(description="number of characters, each on its own path")] = 100
     motions: Annotated[
-        int | None,
+        Whole | None,
         Meta(description="number of distinct motions; default: one motion per character"),
     ] = None
     seconds: Annotated[float, Meta(description="duration, s", extra={"unit": "s"})] = 5.0
     fps: Annotated[float, Meta(description="frame rate, frames a second")] = 30.0
-    seed: Annotated[int, Meta(description="seed of all random numbers")] = 0
+    seed: Annotated[Whole, Meta(description="seed of all random numbers")] = 0
     labels: Annotated[
         dict[str, LabelValue],
         Meta(
@@ -52,7 +53,7 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         ),
     ] = {}
     level: Annotated[
-        int | None,
+        Whole | None,
         Meta(description="level of detail; 0 is the finest; default: 0"),
     ] = None
     camera: Annotated[

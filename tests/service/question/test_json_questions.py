@@ -7,10 +7,14 @@ from typing import Annotated
 import msgspec
 import pytest
 
-from posefield.common.errors import FormError
+from posefield.common.errors import FormError, InvalidField
 from posefield.question import json_decoding as bodies
 from posefield.question.json_decoding import decode_question
+from posefield.question.model_question import SigmaQuestion, WhyQuestion
 from posefield.question.motion_question import ClipsQuestion, FileQuestion, PoseQuestion
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.value_validation import check_range
+from posefield.question.walk_question import WalkQuestion
 
 
 class Inner(msgspec.Struct, forbid_unknown_fields=True):
@@ -115,3 +119,32 @@ def test_an_unknown_name_is_answered_with_those_that_are_known(body, said):
     with pytest.raises(FormError) as caught:
         decode_question(PoseQuestion, body.encode())
     assert str(caught.value) == said
+
+
+HUGE = "1" + "0" * 400
+
+
+@pytest.mark.parametrize("number", [HUGE, f"-{HUGE}", "1e300", "9223372036854775808"])
+@pytest.mark.parametrize(
+    ("form", "body", "field"),
+    [
+        (WhyQuestion, '{"controls":{},"nearest":%s}', "nearest"),
+        (SigmaQuestion, '{"across":"a","along":"b","rows":%s}', "rows"),
+        (SigmaQuestion, '{"across":"a","along":"b","columns":%s}', "columns"),
+        (PoseQuestion, '{"controls":{},"times":[0],"level":%s}', "level"),
+        (FileQuestion, '{"controls":{},"take":%s}', "take"),
+        (PerformanceQuestion, '{"segments":[{"kind":"hold","seconds":1}],"take":%s}', "take"),
+        (WalkQuestion, '{"count":%s}', "count"),
+        (WalkQuestion, '{"motions":%s}', "motions"),
+    ],
+)
+def test_an_integer_beyond_floats_is_refused_by_the_name_of_its_field(form, body, field, number):
+    with pytest.raises(FormError) as caught:
+        decode_question(form, (body % number).encode())
+    assert caught.value.field == field
+    assert len(str(caught.value)) < 200
+
+
+def test_no_range_of_an_integer_overflows_in_its_message():
+    with pytest.raises(InvalidField, match="nearest"):
+        check_range("nearest", int(HUGE), 1, 10, "clips")
