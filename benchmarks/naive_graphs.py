@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 from family import Family
-from paper import naive_kriging
+from paper import naive_kriging, variogram
 from paper.naive_kriging import NaiveKriging
 
 from posefield.common.units import Floats
@@ -18,7 +18,7 @@ from posefield.model_file import onnx_file
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
-from posefield_train.kriging import kriging_graph, variogram
+from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables
 from posefield_train.tensor import decoder_graph

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from paper import naive_kriging
+from paper import naive_kriging, variogram
 
 from evaluation import linear_smoothers, peers
 from evaluation.linear_smoothers import LinearSmoother
@@ -15,7 +15,7 @@ from posefield.kriging import kriging_model
 from posefield_train.evaluate import gaussian_process, predictions
 from posefield_train.evaluate.predictions import GP, OURS, Predictions, Queries, Values
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import universal_kriging, variogram
+from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe

@@ -10,7 +10,7 @@ from timing import in_turn
 
 from paper import poses, precomputation
 from paper.measurement import CORE_GOAL, PRECOMPUTE_GOAL, SHOWN, Baseline, Size, Table1
-from posefield_train.kriging.variogram import ExperimentalVariogram, VariogramModel
+from paper.variogram import ExperimentalVariogram, VariogramModel
 
 
 def rows(table: Table1) -> list[Row]:

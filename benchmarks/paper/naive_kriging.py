@@ -12,12 +12,13 @@ from typing import Annotated
 import numpy as np
 from scipy.optimize import least_squares
 
+from paper import variogram
+from paper.variogram import RANGES, ExperimentalVariogram, VariogramModel
 from posefield.common.array_shapes import PointControls, PoseVectors
 from posefield.common.units import Floats
-from posefield_train.kriging import universal_kriging, variogram
+from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
-from posefield_train.kriging.variogram import RANGES, ExperimentalVariogram, VariogramModel
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 VariogramFitter = Callable[[ExperimentalVariogram, str], VariogramModel]

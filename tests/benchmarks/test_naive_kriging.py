@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from paper import naive_kriging
+from paper import naive_kriging, variogram
 from running import outputs
 from scipy.interpolate import RBFInterpolator
 
-from posefield_train.kriging import variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
 
 SAMPLES, FRAMES, JOINTS = 25, 6, 4

@@ -15,9 +15,6 @@ from posefield_train.report.drawing import left_out_clips, svg_chart
 from posefield_train.report.drawing.html_page import Chapter, Section, Table
 from posefield_train.tensor import hosvd
 
-MODES = ("degrees of freedom", "frames", "samples")
-# Lower end of the logarithmic axis, m: invisible in an animation.
-SMALLEST_DISTANCE = 1e-6
 # Error limits, m, for which the smallest size is listed.
 BUDGETS = (0.0025, 0.005, 0.01, 0.02, 0.03, 0.05)
 STEPS = 240
@@ -27,49 +24,6 @@ NAMED_CLIPS = 3
 NEAR_LIMIT = 0.85
 # First and last share of a clip, where a large change of speed suggests another cut.
 END_SHARE = 0.1
-
-
-def measure_spectra(trained: TrainedModel) -> list[Floats]:
-    """Return the RMS joint distance, m, of each direction of each mode (section 2 of the paper)."""
-    core = trained.full.core
-    energies = [np.sum(np.square(hosvd.unfold(core, mode)), axis=1) for mode in range(3)]
-    return [trained.tensor.rms(energy) for energy in energies]
-
-
-def spectra_chapter(trained: TrainedModel) -> Chapter:
-    """Return the singular values of the three modes (Mukai & Kuriyama 2006, section 2)."""
-    ranks = trained.model.decoder.reduced.core.shape
-    modes = list(zip(MODES, ranks, measure_spectra(trained), strict=True))
-    sizes = ", ".join(f"{rank} of {len(carried)} {mode}" for mode, rank, carried in modes)
-    paragraphs = (
-        "The motion tensor holds all clips as one array of degrees of freedom × frames × "
-        f"samples. The model keeps {sizes}, as basis directions. The steeper a curve falls, "
-        "the better the motions compress.",
-    )
-
-    def paint(figure: Figure) -> None:
-        axes = figure.subplots(1, 3, sharey=True)
-        for ax, (mode, rank, carried) in zip(axes, modes, strict=True):
-            at = np.arange(1, len(carried) + 1)
-            seen = carried > SMALLEST_DISTANCE
-            kept = seen & (at <= rank)
-            ax.semilogy(at[seen & ~kept], 100 * carried[seen & ~kept], ".", color=svg_chart.FAINT)
-            ax.semilogy(at[kept], 100 * carried[kept], ".", color=svg_chart.BLUE)
-            ax.axvline(rank + 0.5, color=svg_chart.ORANGE, linewidth=1.0)
-            ax.set(title=f"{mode}: {rank} of {len(carried)}", xlabel="direction")
-        axes[0].set_ylabel("RMS joint distance (cm)")
-        svg_chart.plain_logarithm(axes[0].yaxis)
-
-    chart = svg_chart.draw(
-        3.2,
-        paint,
-        f"Singular values of the three modes on a logarithmic scale; kept: {sizes}.",
-        "Contribution of each basis direction to the motions, as RMS joint distance. Blue "
-        "directions are kept, grey ones are dropped.",
-    )
-    facts = {mode: {"kept": rank, "carried_m": carried} for mode, rank, carried in modes}
-    title = "Spectra of the motion tensor"
-    return Chapter(facts, Section("spectra", title, paragraphs, (), (chart,)))
 
 
 @dataclass(frozen=True)

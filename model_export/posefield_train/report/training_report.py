@@ -11,7 +11,7 @@ from posefield_train.report.drawing import significant_digits
 from posefield_train.report.drawing.html_page import Chapter, Page, Section, Table
 from posefield_train.report.levels_of_detail import LevelCosts
 
-REPORT_VERSION = 1
+REPORT_VERSION = 2
 """Version of the JSON: increased when a name or a unit changes."""
 
 TERMS_SECTION = Section(
@@ -94,8 +94,6 @@ def render(
         "calibration": controls.calibration_chapter(trained),
         "coverage": controls.coverage_chapter(trained, card.controls),
         "trust": controls.trust_chapter(exported),
-        "variograms": kriging.variogram_chapter(trained, card.controls),
-        "spectra": tensor.spectra_chapter(trained),
         "sizes": tensor.truncation_chapter(trained),
         "levels": levels.chapter(),
         "warps": tensor.warp_chapter(trained),

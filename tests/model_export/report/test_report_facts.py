@@ -9,9 +9,8 @@ import pytest
 from posefield.motion.measures import Measure
 from posefield_train.align.warp import FIT_TIMES
 from posefield_train.graph.trained_model import Outlier
-from posefield_train.kriging import variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.report import clip_errors, kriging, tensor
+from posefield_train.report import clip_errors, tensor
 from posefield_train.report import controls as chapters
 from posefield_train.report.drawing import left_out_clips
 from posefield_train.report.tensor import TimeWarps
@@ -69,13 +68,6 @@ def test_performers_add_up_to_all_clips(trained):
     assert counts @ means**2 != pytest.approx(len(counts) * trained.left_out_errors.mean())
 
 
-def test_spectra_add_up_to_the_tensor(trained):
-    total = trained.tensor.rms(np.sum(np.square(trained.tensor.values))) ** 2
-    for carried in tensor.measure_spectra(trained):
-        assert np.sum(np.square(carried)) == pytest.approx(total)
-        assert np.sum(np.square(carried[1:])) != pytest.approx(total)
-
-
 def test_the_chosen_size_has_the_models_error_and_no_smaller_one_has_as_little(trained):
     """It is chosen by true distances, and so not quite at the budget in the tensor's metric."""
     every = tensor.measure_truncation(trained)
@@ -99,19 +91,6 @@ def test_nothing_lies_below_the_front(trained, rng):
     # Negative control: a front of sizes half as large again would lie above some.
     chosen = found.facts(found.chosen)
     assert chosen["rms_m"] < errors[marks >= chosen["numbers_stored"] / 1.5][0]
-
-
-def test_the_isotropic_variogram_is_that_of_scaled_controls(trained, controls):
-    found = kriging.measure_variograms(trained, controls)[-1]
-    hyper, points = trained.pose.hyper, trained.samples.half_ranges
-    left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
-    expected = variogram.experimental_variogram(points * hyper.scales, left)
-    shared = trained.tensor.weight * trained.tensor.values.shape[1]
-    assert found.mean.distances == pytest.approx(expected.distances)
-    assert found.mean.values == pytest.approx(expected.values / shared)
-    assert len(found.distances) == len(points) * (len(points) - 1) // 2
-    other = variogram.experimental_variogram(points, left)
-    assert other.distances != pytest.approx(expected.distances)
 
 
 def test_a_control_with_one_value_a_performer_is_named(trained, controls):

@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import nnls
-
-from posefield_train.kriging import variogram
-from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.variogram import (
+from paper import variogram
+from paper.variogram import (
     BATCH_NUMBERS,
     FEWEST_PAIRS,
     LAGS,
@@ -14,6 +11,9 @@ from posefield_train.kriging.variogram import (
     RANGES,
     ExperimentalVariogram,
 )
+from scipy.optimize import nnls
+
+from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.tensor import hosvd
 
 TOLERANCE = 1e-9
