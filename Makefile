@@ -111,11 +111,11 @@ typescript: $(PAGE) ## check types, style and tests of the TypeScript client and
 
 .PHONY: unit
 unit: $(PAGE) $(DOCS)
-	$(BIN)/python -m pytest -n auto -m "not system" --durations=15
+	$(BIN)/python -m pytest -n auto --dist worksteal -m "not system" --durations=15
 
 .PHONY: test-system
 test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, stores, clusters, browsers, Blender, the image
-	$(BIN)/python -m pytest -n auto -m system --durations=25
+	$(BIN)/python -m pytest -n auto --dist worksteal -m system --durations=25
 	$(BIN)/python tests/interop/run.py
 
 .PHONY: test-all

@@ -21,7 +21,7 @@ from types import FunctionType, ModuleType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 PACKAGES = ("posefield", "posefield_train")
-CHECKED_CALLS = 10
+CHECKED_CALLS = 3
 """Calls of each function that are checked in each test."""
 METHODS = (FunctionType, classmethod, staticmethod, property, cached_property)
 

@@ -67,11 +67,6 @@ def test_an_audit_passes_only_where_something_was_audited(name, fake_uv):
     assert ("NOT AUDITED" not in done.stderr) is audited
 
 
-def test_an_audit_without_uv_fails(tmp_path):
-    done = run(ROOT / ".ci/audit", UV=str(tmp_path / "none"))
-    assert done.returncode == 2 and "NOT AUDITED" in done.stderr
-
-
 @pytest.fixture
 def database(request):
     """An OSV database that knows of faults in some packages, and the packages it was asked for."""
@@ -199,43 +194,11 @@ def test_a_slow_run_says_so_and_passes(checkout, fake_uv):
 
 # --- Pythons --------------------------------------------------------------------------------------
 
-FIND = ROOT / ".ci/find-python"
-
 
 def python(path, version, venv=True):
     """Write a Python of a version, with or without what makes environments."""
     missing = "" if venv else "[[ $2 == *ensurepip* ]] && exit 1; "
     return program(path, f"{missing}[[ $2 == *version_info* ]] && echo {version}; exit 0")
-
-
-@pytest.fixture
-def pythons(tmp_path):
-    """Pythons of a machine: one too old, one without venv, a dead shim, one too new."""
-    folder = tmp_path / "bin"
-    python(folder / "python3.10", "3.10")
-    python(folder / "python3.11", "3.11", venv=False)
-    program(folder / "python3.12", "echo 'pyenv: python3.12: command not found' >&2; exit 127")
-    python(folder / "python3.13", "3.13")
-    python(folder / "python3", "3.14")
-    return folder
-
-
-def test_make_takes_the_first_python_that_fits(pythons):
-    path = f"{pythons}{os.pathsep}{os.environ['PATH']}"
-    done = run(FIND, "python3.11", "python3.12", "python3.13", "python3", PATH=path)
-    assert (done.returncode, done.stdout.strip()) == (0, str(pythons / "python3.13"))
-    python(pythons / "python3", "3.12")
-    done = run(FIND, "python3.12", "python3", PATH=path)
-    assert done.stdout.strip() == str(pythons / "python3")
-
-
-def test_where_none_fits_it_says_which_are_accepted_and_what_was_found(pythons):
-    path = f"{pythons}{os.pathsep}{os.environ['PATH']}"
-    done = run(FIND, "python3.10", "python3.11", "python3.12", "python3", PATH=path)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert "needs Python 3.11, 3.12 or 3.13 with venv" in done.stderr
-    assert "found python3.10 (3.10), python3.11 (3.11 without venv), python3 (3.14)" in done.stderr
-    assert "found none" in run(FIND, "no-such-python").stderr
 
 
 def listed(tmp_path, uv, *versions):

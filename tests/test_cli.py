@@ -184,14 +184,6 @@ def test_sample_writes_the_family(posefield, tmp_path, reaching_folder):
         assert again.read_bytes() == path.read_bytes()
 
 
-def test_sample_says_what_to_do_next(posefield, reaching_folder):
-    code, out, _ = posefield("sample", "reaching", "-o", reaching_folder)
-    assert (code, out) == (
-        0,
-        f"{reaching_folder / 'recipe.toml'}: train it with posefield train\n",
-    )
-
-
 def test_sample_writes_any_number_of_clips(posefield, tmp_path, reaching_folder):
     """The seed changes the noise alone; without a number the family has 92 clips."""
     for name, words in {"a": (), "b": ("--seed", 7), "c": ("--seed", 7)}.items():
@@ -278,14 +270,6 @@ def test_train_writes_a_model_and_says_what_it_measured(posefield, train_words, 
     assert [p.name for p in path.parent.iterdir()] == ["quick.onnx"]
 
 
-def test_train_tells_people_the_same(posefield, train_words, tmp_path):
-    path = tmp_path / "quick.onnx"
-    code, out, _ = posefield(*train_words, "-o", path)
-    assert code == 0
-    assert re.search(r"quick\.onnx: [0-9.]+ kB from 30 clips, ranks \[\d+, \d+, \d+\]", out)
-    assert "onnxruntime differs from the reference by at most 0.0" in out
-
-
 def test_train_finds_its_data_beside_the_recipe(posefield, quick, tmp_path):
     """Omit --data; this recipe stands elsewhere, so its table is not found."""
     said = refused_after_progress(posefield, 3, "train", quick, "-o", tmp_path / "x.onnx")
@@ -335,26 +319,22 @@ def test_a_model_is_an_onnx_file(refused, train_words, tmp_path):
     assert said == "output: 'quick.bin', expected a name that ends in .onnx"
 
 
-def test_train_writes_a_report_where_one_is_asked_for(posefield, train_words, tmp_path):
-    words = (*train_words, "-o", tmp_path / "quick.onnx")
-    page = tmp_path / "told" / "quick.html"
-    code, _, err = posefield(*words, "--report", page)
+@pytest.mark.system
+def test_a_report_is_written_and_changes_nothing_in_the_model(posefield, train_words, tmp_path):
+    model, quiet, page = tmp_path / "quick.onnx", tmp_path / "quiet.onnx", tmp_path / "a/quick.html"
+    code, out, err = posefield(*train_words, "-o", model, "--report", page)
     assert code == 0
-    told = json.loads(page.with_suffix(".json").read_text())
+    assert re.search(r"quick\.onnx: [0-9.]+ kB from 30 clips, ranks \[\d+, \d+, \d+\]", out)
+    assert "onnxruntime differs from the reference by at most 0.0" in out
+    facts = json.loads(page.with_suffix(".json").read_text())
     assert [p.name for p in sorted(page.parent.iterdir())] == ["quick.html", "quick.json"]
     steps = [line.split(" s  ")[1] for line in err.splitlines()]
-    assert [step["step"] for step in told["about"]["steps"]] == steps[:-2]
+    assert [step["step"] for step in facts["about"]["steps"]] == steps[:-2]
     assert steps[-2:] == ["drawing the report", "done"]
-    assert told["about"]["bytes"] == (tmp_path / "quick.onnx").stat().st_size
+    assert facts["about"]["bytes"] == model.stat().st_size
     assert page.read_text().startswith("<!DOCTYPE html>")
-
-
-@pytest.mark.system
-def test_a_report_changes_nothing_in_the_model(posefield, train_words, tmp_path):
-    told, quiet = tmp_path / "told.onnx", tmp_path / "quiet.onnx"
-    assert posefield(*train_words, "-o", told, "--report", tmp_path / "told.html")[0] == 0
     assert posefield(*train_words, "-o", quiet)[0] == 0
-    assert told.read_bytes() == quiet.read_bytes()
+    assert model.read_bytes() == quiet.read_bytes()
 
 
 def test_a_report_is_a_html_file(refused, train_words, tmp_path):

@@ -1,9 +1,7 @@
 """Test that functions and classes which docstrings and comments name in backticks exist."""
 
 import ast
-import io
 import re
-import tokenize
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -13,24 +11,15 @@ DOTTED = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)(?:\(\))?`")
 NOT_CODE = re.compile(r"\.(py|toml|csv|jsonl?|onnx|proto|usda|usdc|html)$|^asset\.|^bpy\.")
 
 
-def prose(text):
-    """Line and text of each docstring and comment of a module."""
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            if isinstance(node.value.value, str):
-                yield node.lineno, node.value.value
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.COMMENT:
-            yield token.start[0], token.string
-
-
 def defined(files):
     """Names that stand in each module and class, by the module's or class's own name."""
     names = {}
     for text in files.values():
+        lines = text.splitlines()
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.ClassDef):
-                names.setdefault(node.name, set()).update(words(ast.get_source_segment(text, node)))
+                body = "\n".join(lines[node.lineno - 1 : node.end_lineno])
+                names.setdefault(node.name, set()).update(words(body))
     for path, text in files.items():
         name = path.parent.name if path.name == "__init__.py" else path.stem
         names.setdefault(name, set()).update(words(text))
@@ -46,14 +35,13 @@ def unknown(files):
     """Each dotted name in backticks whose parts are not found where it says they are."""
     names = defined(files)
     for path, text in files.items():
-        for line, said in prose(text):
-            code = words(text.replace(said, ""))
-            for found in DOTTED.findall(said):
-                owner, _, last = found.rpartition(".")
-                owner = owner.rpartition(".")[2]
-                own = last in names[owner] if owner in names else owner in code
-                if not own and not NOT_CODE.search(found):
-                    yield f"{path.name}:{line}: {found}"
+        dotted = [found for found in DOTTED.findall(text) if not NOT_CODE.search(found)]
+        code = words(DOTTED.sub("", text)) if dotted else set()
+        for found in dotted:
+            owner, _, last = found.rpartition(".")
+            owner = owner.rpartition(".")[2]
+            if not (last in names[owner] if owner in names else owner in code):
+                yield f"{path.name}: {found}"
 
 
 def sources():
@@ -69,4 +57,4 @@ def test_a_name_that_does_not_exist_is_found():
     text = '"""See `goals.read_all`, `Goals.read` and `numpy.cross`."""\nimport numpy\n'
     goals = "class Goals:\n    def read(self): ...\n"
     files = {Path("a/steps.py"): text, Path("a/goals.py"): goals}
-    assert list(unknown(files)) == ["steps.py:1: goals.read_all"]
+    assert list(unknown(files)) == ["steps.py: goals.read_all"]

@@ -11,12 +11,10 @@ DOCS = Path(__file__).parents[1] / "docs"
 sys.path[:0] = [str(DOCS), str(DOCS.parent / "benchmarks")]
 
 import equal_tables  # noqa: E402
-import evaluation_summary  # noqa: E402
 import evaluation_tables  # noqa: E402
 import measure_models  # noqa: E402
 import measured_tables  # noqa: E402
 import result_tables  # noqa: E402
-from rows import Row, compact, record  # noqa: E402
 
 
 def row(ours, theirs, error, verdict, peer="gp"):
@@ -81,16 +79,8 @@ def test_the_pooled_rival_is_one_peer_for_all_families(folder):
     assert cells[3] == "**worse**"
 
 
-def test_calibration_has_a_column_for_each_family(folder):
-    rows = list(equal_tables.calibration())
-    assert rows[0][:3] == ["sigma ratio", "1.10", "1.10"]
-    assert rows[1][1:3] == ["10.0 %", "10.0 %"]
-    assert {len(cells) for cells in rows} == {4}
-
-
 MEASURED = [name for name in result_tables.SPEED if measured_tables.exists(name)]
 UNMEASURED = {*result_tables.SPEED} - {*MEASURED}
-PAGES = ("quality", "speed", "targets", "support", "discovery")
 
 
 def test_tables_of_speed_without_a_file_are_named():
@@ -103,14 +93,6 @@ def test_tables_of_speed_without_a_file_are_named():
 
 def tables(name):
     return json.loads((DOCS / f"results/{name}.json").read_text())["tables"]
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_every_table_of_a_page_is_made_of_a_file(name):
-    """A page's own file names tables, and has neither rows nor columns."""
-    for each in tables(name):
-        assert set(each) == {"title", "about", "from", "remarks"}
-        assert each["from"] in result_tables.TABLES
 
 
 @pytest.mark.parametrize("name", sorted({*result_tables.ORIGINS.values()} - UNMEASURED))
@@ -147,16 +129,6 @@ def test_every_cell_of_a_measured_table_is_from_its_file(name, tmp_path, monkeyp
     assert shown and [old for old, new in shown if old == new and not old.startswith("0 ")] == []
 
 
-def test_the_words_of_a_table_of_speed_are_those_of_its_file():
-    for name in MEASURED:
-        rows = measured_tables.read(name)["rows"]
-        shown = list(measured_tables.speed(name))
-        assert [each[0] for each in shown if each[0] != "the same"] == list(
-            dict.fromkeys(row["name"] for row in rows)
-        )
-        assert [each[2] for each in shown] == [row["baseline"] for row in rows]
-
-
 def scaled(node):
     """A file whose numbers are seven times as large, and whose words are the same."""
     if isinstance(node, dict):
@@ -167,114 +139,9 @@ def scaled(node):
     return 7 * node if is_number else node
 
 
-def test_rows_are_told_with_their_verdict_and_a_subject_once(tmp_path, monkeypatch):
-    (tmp_path / "speed").mkdir()
-    made = [
-        Row("a pose", 2.0, "µs", "ours before", 4.54, 5.0),
-        Row("a pose", 2.0, "µs", "theirs", 12.8, 5.0),
-        Row("clips", 1330.0, "clips/s", "", None, 1000.0),
-    ]
-    record({"training": made}, "python benchmarks/bench.py --record", tmp_path / "speed")
-    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    assert list(measured_tables.speed("speed/training")) == [
-        ["a pose", "2 µs", "ours before", "4.54", "5 times, **missed**"],
-        ["the same", "", "theirs", "12.8", "5 times, met"],
-        ["clips", "1,330 clips/s", "", "", "1,000 clips/s, **missed**"],
-    ]
-    assert measured_tables.origin("speed/training").startswith(
-        "Measured by `python benchmarks/bench.py --record`, 20"
-    )
-
-
 def test_the_figures_of_models_are_those_of_the_shipped_files():
     """After a training: docs/measure_models.py, then docs/generate.py."""
     found = {each["name"]: each for each in measured_tables.read("models")["models"]}
     for file in (DOCS.parent / "service/posefield/shipped").glob("*.onnx"):
         own = measure_models.figures(file)
         assert json.loads(json.dumps(own)) == found[own["name"]]
-
-
-def test_the_table_of_feet_is_that_of_the_files(folder):
-    folder_file = evaluation_tables.FOLDER / "one.json"
-    found = json.loads(folder_file.read_text())
-    skate = {"predicted": 2.0, "standing": 0.25, "locked": 1.5}
-    ratios = dict.fromkeys(("skate", "weighted_skate"), skate)
-    ratios |= {key: {"predicted": 1.0, "standing": 1.1} for key in ("acceleration", "knee_peak")}
-    costs = {"predicted_error_cm": 5.0, "standing_error_cm": 5.1, "lowered_worst_cm": 4.0}
-    folder_file.write_text(json.dumps(found | {"feet": ratios | costs}))
-    evaluation_tables.protocols.cache_clear()
-    assert evaluation_tables.feet_families() == ["one"], "the other family has none"
-    cells = [row[1] for row in evaluation_tables.feet()]
-    changes = [
-        "2.00 → 0.25",
-        "2.00 → 0.25",
-        "1.50",
-        "1.50",
-        "5.00 → 5.10",
-        "1.00 → 1.10",
-        "1.00 → 1.10",
-        "4.0",
-    ]
-    assert cells == changes
-
-
-def test_takes_stand_beside_their_negative_controls(folder):
-    assert evaluation_tables.take_families() == [] and len(list(evaluation_tables.takes())) == 9
-    fields = {
-        "variogram": [0.98, 1.02],
-        "variance": 1.01,
-        "mean_in_standard_errors": 1.0,
-        "controls": {
-            "variogram_of_half_scales": [0.5, 0.9],
-            "variance_without_conditioning": 6.0,
-            "mean_in_standard_errors_of_equal_errors": 4.0,
-        },
-    }
-    answers = {"predicted": 0.9, "take": 1.0, "sliding": 1.5, "unlimited": 2.0}
-    moving = dict.fromkeys(("acceleration", "skate", "weighted_skate"), answers)
-    for name, takes in {"one": fields, "two": fields | {"clips": 9} | moving}.items():
-        (folder / f"{name}.json").write_text(json.dumps(family(2.0) | {"takes": takes}))
-    evaluation_tables.protocols.cache_clear()
-    # Of the other family only the fields were measured: its clips have no feet.
-    assert evaluation_tables.take_families() == ["two"]
-    rows = {cells[0]: cells[1] for cells in evaluation_tables.takes()}
-    assert rows["variance over kriging variance (without conditioning)"] == "1.01 (6.0)"
-    taken = "acceleration of a take over captured (all time functions varied)"
-    assert rows[taken] == "1.00 (2.00)"
-    assert rows["acceleration with detail over captured (without)"] == ""
-
-
-def test_judged_rows_have_a_verdict_for_goal_and_wish(tmp_path, monkeypatch):
-    made = [
-        Row("strides: missed", 1.0, "%", "of 92", None, 2.0),
-        Row("example: found", 3.0, "s", "", None, None),
-    ]
-    record({"discovered": made}, "python benchmarks/discovery.py", tmp_path)
-    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    assert list(measured_tables.judged("discovered")) == [
-        ["strides: missed", "1 %", "2 %, met", "0 %, **missed**", "of 92"],
-        ["example: found", "3 s", "", "", ""],
-    ]
-
-
-def test_a_summary_shows_what_the_result_shows(folder):
-    """Figures of tables stay; figures of single joints and clips leave."""
-    whole = family(2.0) | {"joint_sigma_ratio": {"Hips": 1.0}, "family": "one"}
-    whole["methods"]["gp"] = {"relative_cm": 2.0, "global_cm": 3.0, "distances_cm": {"p95": 4.0}}
-    short = evaluation_summary.summary(whole)
-    assert short["methods"]["gp"] == {"relative_cm": 2.0, "global_cm": 3.0}
-    assert not {"joint_sigma_ratio", "family"} & short.keys()
-    before = [*equal_tables.best("known"), *equal_tables.pooled("known")]
-    for name in ("one", "two"):
-        file = folder / f"{name}.json"
-        found = json.loads(file.read_text())
-        file.write_text(json.dumps(evaluation_summary.summary(found) | {"others": []}))
-    evaluation_tables.protocols.cache_clear()
-    assert before == [*equal_tables.best("known"), *equal_tables.pooled("known")]
-
-
-def test_files_of_results_have_a_line_for_each_row():
-    value = {"rows": [{"name": "a" * 150, "value": n} for n in range(3)], "short": [1, 2]}
-    text = compact(value)
-    assert json.loads(text) == value
-    assert len(text.splitlines()) == 3 + 5

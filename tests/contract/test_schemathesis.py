@@ -28,7 +28,7 @@ from posefield.registry.model_registry import ModelRegistry
 # `make fuzz` draws for longer, from another seed.
 SEED = int(os.environ.get("POSEFIELD_FUZZ_SEED", "1"))
 DETERMINISTIC = "POSEFIELD_FUZZ_SEED" not in os.environ
-SECONDS = int(os.environ.get("POSEFIELD_FUZZ_SECONDS", "30"))
+SECONDS = int(os.environ.get("POSEFIELD_FUZZ_SECONDS", "15"))
 """Budget of each of the two runs that draw requests, s."""
 
 HOST = "testserver"

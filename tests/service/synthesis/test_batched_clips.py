@@ -65,7 +65,7 @@ SHARE = st.floats(-0.2, 1.2)
 ASKED = st.tuples(st.tuples(st.tuples(*[SHARE] * 4), st.integers(0, 9)), st.integers(0, 11))
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None, derandomize=True)
 @given(places=st.lists(ASKED, min_size=2, max_size=12))
 def test_a_clip_has_the_same_bytes_alone_and_in_a_batch(pair, places):
     batched, single = pair
@@ -104,7 +104,7 @@ def posed(model, place, level):
 PLACE = st.tuples(st.tuples(*[SHARE] * 4), st.floats(0.0, 0.5), st.integers(0, 9))
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(places=st.lists(PLACE, min_size=2, max_size=40), number=st.integers(0, 11))
 def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, number):
     level = number % len(model.session.card.levels)
