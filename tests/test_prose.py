@@ -1,4 +1,4 @@
-"""Tests of the prose check: all that ships passes, and planted sentences do not."""
+"""Tests of the prose check, which `make lint` runs: planted sentences do not pass."""
 
 import subprocess
 import sys
@@ -12,13 +12,6 @@ CHECK = Path(__file__).parents[1] / "docs/check_prose.py"
 def check(*files):
     words = [sys.executable, str(CHECK), *map(str, files)]
     return subprocess.run(words, capture_output=True, text=True, check=False)
-
-
-def test_what_ships_is_in_plain_words():
-    done = check()
-    assert done.returncode == 0, done.stdout
-    # Negative control: it has read something.
-    assert int(done.stdout.split()[0]) > 400
 
 
 @pytest.mark.parametrize(

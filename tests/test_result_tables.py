@@ -1,7 +1,6 @@
 """Tests of the tables of results: equal information, pooled rows, and families without a file."""
 
 import json
-import re
 import sys
 from pathlib import Path
 
@@ -93,50 +92,6 @@ def test_tables_of_speed_without_a_file_are_named():
 
 def tables(name):
     return json.loads((DOCS / f"results/{name}.json").read_text())["tables"]
-
-
-@pytest.mark.parametrize("name", sorted({*result_tables.ORIGINS.values()} - UNMEASURED))
-def test_every_figure_has_an_origin(name):
-    found = json.loads((DOCS / f"results/{name}.json").read_text())
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d(/\d{4}-\d\d-\d\d)?", found["date"])
-    assert found["machine"]
-    # Commands of this project, whose files are there.
-    words = found["command"].split()
-    scripts = [word for word in words if word.endswith((".py", ".ts"))]
-    assert words[0] == "posefield" or all((DOCS.parent / each).exists() for each in scripts)
-
-
-FIGURE = re.compile(r"\d[\d,]*(?:\.\d+)?")
-
-
-@pytest.mark.parametrize("name", ["recipes", "levels", *MEASURED])
-def test_every_cell_of_a_measured_table_is_from_its_file(name, tmp_path, monkeypatch):
-    """A table shows other figures where its file has others."""
-    columns, rows = result_tables.TABLES[name]()
-    before = [columns, *rows]
-    source = result_tables.ORIGINS[name]
-    found = json.loads((DOCS / f"results/{source}.json").read_text())
-    (tmp_path / "speed").mkdir()
-    (tmp_path / f"{source}.json").write_text(json.dumps(scaled(found)))
-    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    columns, rows = result_tables.TABLES[name]()
-    changed = zip(before, [columns, *rows], strict=True)
-    # The first column names the row, and that of baselines has words of the file.
-    cells = [pair for old, new in changed for pair in [*zip(old, new, strict=True)][1:]]
-    words = {row.get("baseline") for row in found.get("rows", [])}
-    shown = [pair for pair in cells if FIGURE.match(pair[0]) and pair[0] not in words]
-    # 0 stays 0 when it is scaled.
-    assert shown and [old for old, new in shown if old == new and not old.startswith("0 ")] == []
-
-
-def scaled(node):
-    """A file whose numbers are seven times as large, and whose words are the same."""
-    if isinstance(node, dict):
-        return {key: scaled(value) for key, value in node.items()}
-    if isinstance(node, list):
-        return [scaled(each) for each in node]
-    is_number = isinstance(node, int | float) and not isinstance(node, bool)
-    return 7 * node if is_number else node
 
 
 def test_the_figures_of_models_are_those_of_the_shipped_files():

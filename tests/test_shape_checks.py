@@ -10,8 +10,7 @@ import pytest
 import shape_checks
 from beartype.roar import BeartypeCallHintViolation, BeartypeDoorHintViolation
 
-from posefield.kriging import support
-from posefield.motion import quat, skeleton
+from posefield.motion import quat
 from posefield.motion.clip import Placement
 from posefield_train.tensor.pose_vectors import PoseChart
 
@@ -27,8 +26,6 @@ ANY_RANK = {"decompose", "mode_dot", "restored", "unfold"}
 WRONG = {
     "a quaternion of three numbers": lambda: quat.mul(np.ones((5, 3)), np.ones(4)),
     "integers": lambda: quat.conj(np.array([1, 0, 0, 0])),
-    "other joints": lambda: skeleton.forward_kinematics((-1, 0), np.ones((3, 4)), np.ones((2, 3))),
-    "a sample of other controls": lambda: support.covariances(np.ones((2, 3)), np.ones((2, 4))),
     "a method's argument": lambda: PoseChart(np.ones((2, 4)), "stereographic").far_joints(
         np.ones((5, 2, 4))
     ),

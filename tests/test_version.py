@@ -29,12 +29,8 @@ PLACES = {
 SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
 
 
-@pytest.mark.parametrize("folder", PROJECTS)
-def test_projects_of_the_workspace_have_the_version(folder):
-    assert _project(folder)["version"] == __version__
-
-
-def test_distributions_require_each_other_at_the_same_version():
+def test_projects_of_the_workspace_have_the_version_and_require_it_of_each_other():
+    assert {_project(folder)["version"] for folder in PROJECTS} == {__version__}
     service, training = _project("service"), _project("model_export")
     extras = [line for extra in service["optional-dependencies"].values() for line in extra]
     lines = [line for line in (*extras, *training["dependencies"]) if "==" in line]
