@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from pxr import Usd, UsdSkel
 from rich.text import Text
 
 from posefield import __version__, cli
@@ -26,7 +25,6 @@ from posefield_train.source import bvh
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 CONTROLS = [word for name, value in POINT.items() for word in ("-c", f"{name}={value}")]
 TALL = ("--performer", "tall")
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack")
 
 
 @pytest.fixture
@@ -66,15 +64,6 @@ def test_an_application_that_calls_main_twice_registers_commands_once(posefield)
     first, second = posefield("train", "--help"), posefield("train", "--help")
     assert first == second and first[0] == 0
     assert len(cli.app.registered_commands) == registered
-
-
-@pytest.mark.system
-def test_it_is_a_command_of_its_own():
-    command = str(Path(sys.executable).parent / "posefield")
-    done = subprocess.run([command, "--help"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0
-    for name in ("sample", "train", "inspect", "pose", "clip", "why", "suggest", "serve"):
-        assert re.search(rf"\b{name}\b", done.stdout)
 
 
 def test_help_is_shown_as_it_is_written():
@@ -126,16 +115,6 @@ def test_why_answers_as_json(posefield, labelled_path):
     assert min(clip["share"] for clip in found["nearest"]) >= 0.0
 
 
-def test_a_gap_is_warned_of_and_refused_where_that_is_asked(posefield, refused, labelled_path):
-    sitting = ["-c", "stature=1.88", "-c", "hip_height=0.46", "-c", "turn=90"]
-    asked = ["pose", labelled_path, *sitting, "-c", "target_height=1.9"]
-    code, out, err = posefield(*asked)
-    assert (code, json.loads(out)["trust"]["supported"]) == (0, False)
-    assert err.startswith("warning: ")
-    assert posefield(*asked, "--extrapolate", "ok")[2] == ""
-    refused(2, *asked, "--extrapolate", "refuse")
-
-
 def test_sigma_by_joint_is_said_where_it_is_asked_for(posefield, labelled_path, tmp_path):
     code, out, _ = posefield("pose", labelled_path, *CONTROLS, "--joint-sigma")
     assert code == 0 and len(json.loads(out)["trust"]["joint_sigma"]) == 33
@@ -175,19 +154,12 @@ def test_why_of_nothing_is_refused(refused, labelled_path):
 # --- sample ---------------------------------------------------------------------------------------
 
 
-def test_sample_writes_the_family(posefield, tmp_path, reaching_folder):
-    code, out, _ = posefield("sample", "reaching", "-o", tmp_path / "family", "--json")
-    assert code == 0
-    assert json.loads(out) == {"recipe": str(tmp_path / "family" / "recipe.toml")}
-    for path in sorted(reaching_folder.rglob("*.*")):
-        again = tmp_path / "family" / path.relative_to(reaching_folder)
-        assert again.read_bytes() == path.read_bytes()
-
-
 def test_sample_writes_any_number_of_clips(posefield, tmp_path, reaching_folder):
     """The seed changes the noise alone; without a number the family has 92 clips."""
     for name, words in {"a": (), "b": ("--seed", 7), "c": ("--seed", 7)}.items():
-        posefield("sample", "reaching", "-o", tmp_path / name, "--clips", 8, *words)
+        own = ("sample", "reaching", "-o", tmp_path / name, "--clips", 8, "--json", *words)
+        code, out, _ = posefield(*own)
+        assert (code, json.loads(out)) == (0, {"recipe": str(tmp_path / name / "recipe.toml")})
     tables = [(tmp_path / name / "clips.csv").read_text() for name in "abc"]
     controls = [[row.rpartition(",")[0] for row in table.splitlines()] for table in tables]
     assert len(controls[0]) == 9
@@ -200,12 +172,10 @@ def test_sample_writes_any_number_of_clips(posefield, tmp_path, reaching_folder)
     }
 
 
-@pytest.mark.parametrize("option", ["clips", "seed"])
-def test_the_noise_free_motion_has_no_number_of_clips(refused, tmp_path, option):
-    words = ("reaching", "--truth", f"--{option}", 5, "-o", tmp_path / "x")
-    assert refused(2, "sample", *words) == (
-        f"{option}: found with --truth, expected for a family of clips"
-    )
+def test_the_noise_free_motion_has_no_number_of_clips(refused, tmp_path):
+    words = ("reaching", "--truth", "--clips", 5, "-o", tmp_path / "x")
+    said = "clips: found with --truth, expected for a family of clips"
+    assert refused(2, "sample", *words) == said
 
 
 def test_sample_of_another_family_is_refused(refused, tmp_path):
@@ -213,14 +183,8 @@ def test_sample_of_another_family_is_refused(refused, tmp_path):
     assert said == "family: 'dancing', expected reaching"
 
 
-def test_sample_into_a_folder_of_something_else_is_refused(refused, tmp_path):
-    (tmp_path / "mine.txt").touch()
-    assert "not empty and not this family" in refused(3, "sample", "reaching", "-o", tmp_path)
-
-
-@pytest.mark.parametrize("fps", [30.0, 120.0])
-def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path, fps):
-    path = tmp_path / "truth.bvh"
+def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path):
+    path, fps = tmp_path / "truth.bvh", 30.0
     words = ("sample", "reaching", "--truth", "-o", path, *CONTROLS, "--fps", fps, "--json")
     code, out, _ = posefield(*words)
     assert code == 0
@@ -233,18 +197,6 @@ def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path, fps):
     said = json.loads(out)
     assert (said["model"], said["frames"], said["sigma"]) == ("reaching@truth", len(expected), 0.0)
     assert said["duration"] == pytest.approx(noise_free.duration(POINT), abs=1.0 / fps)
-
-
-def test_sample_truth_of_what_no_body_can_do_is_refused(refused, tmp_path):
-    path = tmp_path / "truth.usda"
-    words = ("sample", "reaching", "--truth", "-o", path, *CONTROLS[:-1], "target_height=4.0")
-    assert "target_height" in refused(2, *words)
-    assert not path.exists()
-
-
-def test_sample_truth_without_controls_is_refused(refused, tmp_path):
-    said = refused(2, "sample", "reaching", "--truth", "-o", tmp_path / "truth.bvh")
-    assert said == "stature: missing control"
 
 
 # --- train and inspect ----------------------------------------------------------------------------
@@ -308,15 +260,19 @@ def test_a_recipe_that_is_wrong_is_refused_with_code_3(posefield, quick, tmp_pat
     assert err.startswith(f"posefield: {wrong}:{line}: motion.cyclic: ")
 
 
-def test_a_recipe_that_is_not_there_is_refused_before_any_progress(refused, tmp_path):
-    path = tmp_path / "nope.toml"
-    said = refused(3, "train", path, "-o", tmp_path / "x.onnx")
-    assert said == f"{path}: cannot be read: No such file or directory"
-
-
-def test_a_model_is_an_onnx_file(refused, train_words, tmp_path):
-    said = refused(2, *train_words, "-o", tmp_path / "quick.bin")
-    assert said == "output: 'quick.bin', expected a name that ends in .onnx"
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-o", "quick.bin"), "output: 'quick.bin', expected a name that ends in .onnx"),
+        (("-o", "q.onnx", "--report", "q.pdf"), "report: 'q.pdf', expected a name that ends in"),
+    ],
+)
+def test_a_model_is_an_onnx_file_and_a_report_a_page(
+    refused, train_words, tmp_path, monkeypatch, words, said
+):
+    monkeypatch.chdir(tmp_path)
+    assert refused(2, *train_words, *words).startswith(said)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.system
@@ -337,12 +293,6 @@ def test_a_report_is_written_and_changes_nothing_in_the_model(posefield, train_w
     assert model.read_bytes() == quiet.read_bytes()
 
 
-def test_a_report_is_a_html_file(refused, train_words, tmp_path):
-    words = (*train_words, "-o", tmp_path / "quick.onnx", "--report", tmp_path / "quick.pdf")
-    assert refused(2, *words) == "report: 'quick.pdf', expected a name that ends in .html"
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.system
 def test_a_report_that_cannot_be_written_leaves_no_half_of_it(posefield, train_words, tmp_path):
     page = tmp_path / "told" / "quick.html"
@@ -351,13 +301,6 @@ def test_a_report_that_cannot_be_written_leaves_no_half_of_it(posefield, train_w
     said = refused_after_progress(posefield, 3, *words)
     assert said.startswith(f"{page}: cannot be written: ")
     assert [p.name for p in page.parent.iterdir()] == ["quick.html"]
-
-
-def test_inspect_lists_the_curves_of_a_model(posefield, model_file, model_path):
-    code, out, _ = posefield("inspect", model_file("face"))
-    assert code == 0
-    assert "curve jawOpen: 0 to 1, a unit counts as 2 cm" in out.splitlines()
-    assert "curve" not in posefield("inspect", model_path)[1]
 
 
 def test_inspect_answers_as_json(posefield, model_path):
@@ -373,7 +316,7 @@ def test_inspect_answers_as_json(posefield, model_path):
     assert costs == sorted(costs, reverse=True)
 
 
-def test_inspect_tells_people_the_same(posefield, model_path):
+def test_inspect_tells_people_the_same(posefield, model_path, model_file):
     code, out, _ = posefield("inspect", model_path)
     assert code == 0
     assert "reaching@" in out and "46 clips of 33 joints" in out and "licence: CC0-1.0" in out
@@ -381,6 +324,14 @@ def test_inspect_tells_people_the_same(posefield, model_path):
         assert re.search(rf"^  {name}: [-0-9.]+ to [0-9.]+ (m|deg), ", out, re.MULTILINE)
     levels = re.findall(r"^  (\d): ranks .*, here [0-9.]+ µs a pose$", out, re.MULTILINE)
     assert levels == ["0", "1", "2", "3"]
+    others = {
+        "face": "\ncurve jawOpen: 0 to 1, a unit counts as 2 cm\n",
+        "measured": " m/s, speed (measured: speed)\n",
+        "labelled": "\nperformers: middle, short, tall\n",
+    }
+    for name, said in others.items():
+        assert said in posefield("inspect", model_file(name))[1]
+        assert said not in out
 
 
 def test_what_a_pose_costs_is_not_in_the_file(model_path):
@@ -392,7 +343,7 @@ def test_what_a_pose_costs_is_not_in_the_file(model_path):
 def test_a_corrupt_model_is_refused_with_code_3(refused, model_path, tmp_path):
     path = tmp_path / "half.onnx"
     path.write_bytes(model_path.read_bytes()[:5000])
-    for words in (("inspect", path), ("pose", path, *CONTROLS)):
+    for words in (("inspect", path), ("serve", path)):
         assert refused(3, *words).startswith(f"{path}: does not end with its checksum: ")
 
 
@@ -413,19 +364,12 @@ def test_pose_answers_as_json(posefield, model_path):
     assert np.abs(said["rotations"] - expected.rotations).max() < 1e-6
 
 
-def test_pose_without_a_time_is_the_first(posefield, model_path):
-    assert json.loads(posefield("pose", model_path, *CONTROLS)[1])["times"] == [0.0]
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         ([*CONTROLS, "-c", "speed=1"], "controls/speed: no such control; this model has stature"),
-        ([*CONTROLS[:-1], "target_height=high"], "controls/target_height: 'high', expected a num"),
-        ([*CONTROLS[:-1], "target_height=nan"], "controls/target_height: nan, expected a finite"),
         ([*CONTROLS[:-1], "target_height"], "control: 'target_height', expected NAME=VALUE"),
         ([*CONTROLS, *CONTROLS[:2]], "control: 'stature=1.7', expected NAME=VALUE, each name once"),
-        ([*CONTROLS, "--time", "99"], "times/0: 99 s, expected 0 to "),
     ],
 )
 def test_a_question_without_an_answer_is_refused_with_code_2(refused, model_path, words, said):
@@ -478,40 +422,11 @@ def test_a_performer_is_asked_for_by_name(posefield, labelled_path, tmp_path):
     assert trust == json.loads(asked[0])["trust"]
 
 
-def test_an_unknown_performer_is_refused_with_code_2(refused, labelled_path, model_path, tmp_path):
-    path = tmp_path / "clip.json"
-    words = (*CONTROLS, "--performer", "ada")
-    said = "performer: 'ada', expected one of middle, short, tall"
-    assert refused(2, "pose", labelled_path, *words) == said
-    assert refused(2, "clip", labelled_path, *words, "-o", path) == said
-    assert not path.exists()
-    none = "performer: 'ada', expected none: this model knows none"
-    assert refused(2, "pose", model_path, *words) == none
-
-
-def test_inspect_says_how_controls_are_measured(posefield, measured_walk_path, model_path):
-    out = posefield("inspect", measured_walk_path)[1]
-    assert " m/s, speed (measured: speed)\n" in out
-    assert " deg, turn (measured: turn)\n" in out
-    assert "measured" not in posefield("inspect", model_path)[1]
-
-
-def test_inspect_lists_the_performers_there_are(posefield, labelled_path, model_path):
-    assert "\nperformers: middle, short, tall\n" in posefield("inspect", labelled_path)[1]
-    assert "\nperformers: " not in posefield("inspect", model_path)[1]
-    plain = json.loads(posefield("inspect", labelled_path, "--json")[1])
-    assert plain["performers"] == ["middle", "short", "tall"]
-
-
 # --- clip -----------------------------------------------------------------------------------------
 
 
-def test_all_formats_are_tested():
-    assert set(FORMATS) == set(CLIP_ENCODERS)
-
-
-@pytest.mark.parametrize("ending", FORMATS)
-def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
+@pytest.mark.parametrize("ending", ["usdz", "bvh", "npz"])
+def test_clip_writes_what_the_encoder_of_the_ending_does(posefield, model_path, tmp_path, ending):
     path = tmp_path / "new" / f"clip.{ending}"
     code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
     assert (code, err) == (0, "")
@@ -529,18 +444,6 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
     assert path.read_bytes() == CLIP_ENCODERS[ending].encode(answer)
     assert stat.S_IMODE(path.stat().st_mode) == 0o644
     assert [p.name for p in path.parent.iterdir()] == [path.name]
-
-
-def test_clips_of_the_formats_hold_the_same_motion(posefield, model_path, tmp_path):
-    paths = {ending: tmp_path / f"clip.{ending}" for ending in FORMATS}
-    for path in paths.values():
-        assert posefield("clip", model_path, *CONTROLS, "-o", path)[0] == 0
-    frames = len(bvh.read(paths["bvh"]).values)
-    assert json.loads(paths["json"].read_text())
-    for ending in ("usda", "usdc", "usdz"):
-        stage = Usd.Stage.Open(str(paths[ending]))
-        assert stage.GetEndTimeCode() - stage.GetStartTimeCode() == frames - 1
-        assert any(prim.IsA(UsdSkel.Root) for prim in stage.Traverse())
 
 
 def test_clip_takes_a_rate_and_a_span(posefield, model_path, tmp_path):
@@ -565,19 +468,10 @@ def test_clip_names_joints_and_measures_as_asked_for(posefield, model_path, tmp_
     assert path.read_bytes() == CLIP_ENCODERS["json"].encode(answer, Convention(0.01, "z"))
 
 
-def test_clip_writes_a_loop(posefield, walk_path, tmp_path):
-    path = tmp_path / "clip.json"
-    words = ("-c", "haste=4", "-c", "veer=100", "--loop", "--root", "in_place")
-    assert posefield("clip", walk_path, *words, "-o", path)[0] == 0
-    found = json.loads(path.read_text())
-    assert found["rotations"][0] == found["rotations"][-1]
-
-
 @pytest.mark.parametrize(
     ("ending", "words", "said"),
     [
         ("glb", ("--unit", "cm"), "unit: 0.01 m, expected 1 m: the law of glb"),
-        ("glb", ("--up", "z"), "up: 'z', expected 'y': the law of glb"),
         ("bvh", ("--loop",), "loop: true, expected false: this model's last pose does not lead"),
     ],
 )
@@ -589,9 +483,6 @@ def test_what_a_clip_cannot_be_is_refused(refused, model_path, tmp_path, ending,
 
 FAILING = {
     "a rate of zero": [*CONTROLS, "--fps", "0"],
-    "a rate of ten thousand": [*CONTROLS, "--fps", "10000"],
-    "an end before the start": [*CONTROLS, "--start", "0.5", "--end", "0.1"],
-    "a control that there is not": [*CONTROLS, "--control", "speed=1"],
     "outside the samples": [*OUTSIDE, "--extrapolate", "refuse"],
 }
 
@@ -607,14 +498,7 @@ def test_a_clip_that_fails_leaves_no_file_and_spoils_none(refused, model_path, t
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_clip_replaces_one_that_was_there(posefield, model_path, tmp_path):
-    path = tmp_path / "clip.json"
-    path.write_text("made before")
-    assert posefield("clip", model_path, *CONTROLS, "-o", path)[0] == 0
-    assert json.loads(path.read_text())
-
-
-@pytest.mark.parametrize("name", ["clip.fbx", "clip", "clip.USDA"])
+@pytest.mark.parametrize("name", ["clip.fbx", "clip.USDA"])
 def test_an_unknown_format_is_refused_before_anything_is_read(refused, tmp_path, name):
     said = refused(2, "clip", tmp_path / "none.onnx", "-o", tmp_path / name)
     assert said.startswith(f"output: {name!r} ends in none of usda, usdc")
@@ -623,54 +507,5 @@ def test_an_unknown_format_is_refused_before_anything_is_read(refused, tmp_path,
 # --- serve ----------------------------------------------------------------------------------------
 
 
-def test_serve_refuses_a_file_that_it_cannot_serve(refused, tmp_path):
-    path = tmp_path / "broken.onnx"
-    path.write_bytes(b"nothing")
-    assert refused(3, "serve", path).startswith(f"{path}: does not end with its checksum: ")
-
-
 def test_serve_refuses_a_port_that_is_none(refused, model_path):
     assert refused(2, "serve", model_path, "--port", "70000").endswith("70000, expected 0 to 65535")
-
-
-# In a process of its own, in which the training job's packages are not installed.
-WITHOUT_PACKAGES = """
-import sys
-
-class Hiding:
-    def __init__(self, finder):
-        self.finder = finder
-
-    def __getattr__(self, name):
-        return getattr(self.finder, name)
-
-    def find_spec(self, name, *rest):
-        hidden = name.partition(".")[0] in {"scipy", "onnx"}
-        return None if hidden else self.finder.find_spec(name, *rest)
-
-sys.meta_path[:] = [Hiding(finder) for finder in sys.meta_path]
-from posefield import cli
-cli.main()
-"""
-
-
-def without_packages(*words):
-    command = [sys.executable, "-c", WITHOUT_PACKAGES, *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-@pytest.mark.system
-def test_what_ships_answers_without_the_training_jobs_packages(model_path, tmp_path):
-    path = tmp_path / "clip.usda"
-    done = without_packages("clip", model_path, *CONTROLS, "-o", path)
-    assert done.returncode == 0, done.stderr
-    assert path.exists()
-
-
-@pytest.mark.system
-def test_train_without_its_packages_says_what_to_install(quick, reaching_folder, tmp_path):
-    path = tmp_path / "x.onnx"
-    done = without_packages("train", quick, "--data", reaching_folder, "-o", path)
-    assert done.returncode == 2
-    assert done.stderr == 'posefield: needs scipy, onnx: pip install "posefield[train]"\n'
-    assert not path.exists()

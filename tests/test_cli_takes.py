@@ -3,8 +3,6 @@
 import csv
 import json
 
-import pytest
-
 
 def test_a_take_is_the_same_in_every_run_and_another_clip_than_the_mean(
     posefield, walk_path, tmp_path
@@ -26,16 +24,9 @@ def test_variety_and_detail_are_options(posefield, walk_path):
     assert json.loads(out)["rotations"] != plain["rotations"]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--take", "-1"], "take: -1, expected 0 to 999999999"),
-        (["--variety", "2"], "variety: 2, expected 0 to 1"),
-    ],
-)
-def test_what_is_out_of_range_is_refused(posefield, walk_path, words, said):
-    code, out, err = posefield("pose", walk_path, *words)
-    assert (code, out) == (2, "") and err.startswith(f"posefield: {said}")
+def test_what_is_out_of_range_is_refused(posefield, walk_path):
+    code, out, err = posefield("pose", walk_path, "--take", "-1")
+    assert (code, out) == (2, "") and err.startswith("posefield: take: -1, expected 0 to 999999999")
 
 
 def test_an_export_has_a_take_for_each_row(posefield, walk_path, tmp_path):
