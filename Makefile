@@ -127,11 +127,11 @@ fuzz: $(PAGE) $(DOCS) ## send requests drawn from the contract for half an hour;
 	POSEFIELD_FUZZ_SECONDS=$(or $(SECONDS),900) POSEFIELD_FUZZ_SEED=$(or $(SEED),$(shell date +%s)) \
 		$(BIN)/python -m pytest -n 2 tests/contract/test_schemathesis.py -k drawn
 
-# Everything installable: both distributions of the workspace as wheels and sdists.
+# Everything installable: all distributions of the workspace as wheels and sdists.
 .PHONY: wheels
-wheels: $(PAGE) $(DOCS) ## build wheels and sdists of posefield and posefield-train in dist
+wheels: $(PAGE) $(DOCS) ## build wheels and sdists of posefield, posefield-train and posefield-client in dist
 	rm -rf dist
-	for name in posefield posefield-train; do $(BIN)/uv build --quiet --package $$name --out-dir dist; done
+	for name in posefield posefield-train posefield-client; do $(BIN)/uv build --quiet --package $$name --out-dir dist; done
 
 .PHONY: audit
 audit: $(ENV) ## ask OSV for known vulnerabilities of what the lock file names; fails where it cannot ask

@@ -347,6 +347,16 @@ def test_a_corrupt_model_is_refused_with_code_3(refused, model_path, tmp_path):
         assert refused(3, *words).startswith(f"{path}: does not end with its checksum: ")
 
 
+def test_shipped_models_are_known_by_their_names(posefield, refused, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = posefield("pose", "cmu_walk", "-c", "speed=1.2")
+    assert code == 0 and json.loads(out)["trust"]["model"].startswith("cmu_walk@")
+    assert refused(3, "inspect", "cmu_wlak") == (
+        "cmu_wlak: no such file, expected one or a shipped model: cmu_walk, reaching "
+        "(did you mean 'cmu_walk'?)"
+    )
+
+
 # --- pose -----------------------------------------------------------------------------------------
 
 

@@ -14,7 +14,7 @@ import serving
 
 ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
-NAMES = ("posefield", "posefield-train")
+NAMES = ("posefield", "posefield-train", "posefield-client")
 SHIPPED = [f"posefield/shipped/{name}" for name in ("cmu_walk.onnx", "reaching.onnx", "NOTICE")]
 TABLES = ("cmu_walk/strides.csv", "hdm05_reach/returns.csv", "hdm05_kick/clips.csv")
 
@@ -82,17 +82,27 @@ def test_wheels_train_and_serve_in_a_fresh_environment(dist, tmp_path):
 
 
 def test_the_service_alone_shows_a_walk_and_tells_how_to_get_the_training_commands(dist, tmp_path):
-    bin_ = installed(dist, tmp_path, sys.executable, "posefield")
+    bin_ = installed(dist, tmp_path, sys.executable, "posefield", "posefield-client")
     run(bin_ / "posefield", "demo", "--once", "--output", "demo", cwd=tmp_path)
     assert (tmp_path / "demo/walk_1.2.usdc").read_bytes().startswith(b"PXR-USDC")
     helped = run(bin_ / "posefield", "--help", cwd=tmp_path).stdout
     assert all(command in helped for command in ("serve", "train", "evaluate"))
+    assert 'pip install "posefield[train]"' in " ".join(helped.replace("│", "").split())
     for words in (["train", "a.toml", "--output", "b.onnx"], ["sample", "--help"]):
         told = run(bin_ / "posefield", *words, cwd=tmp_path, code=2).stderr
         # Another package may have brought pydantic.
         missing = "posefield_train, scipy, onnx, (pydantic, )?matplotlib, joblib"
         line = re.escape(': pip install "posefield[train]"\n')
         assert re.fullmatch(f"posefield: needs {missing}{line}", told), told
+
+
+def test_the_lines_of_the_readme_run_after_its_installation(dist, tmp_path):
+    bin_ = installed(dist, tmp_path, sys.executable, "posefield", "posefield-client")
+    (lines,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    with serving.started([bin_ / "posefield", "serve"]) as child:
+        lines = lines.replace("http://127.0.0.1:8000", serving.address(child))
+        run(bin_ / "python", "-c", lines, cwd=tmp_path)
+    assert (tmp_path / "reach.usdc").read_bytes().startswith(b"PXR-USDC")
 
 
 def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):

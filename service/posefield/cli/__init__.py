@@ -112,7 +112,8 @@ def _list_training() -> None:
 
     anything = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
     for name, purpose in TRAINING.items():
-        text = f'{purpose} Needs pip install "posefield[train]".'
+        # Rich takes a bare [train] for a style.
+        text = f'{purpose} Needs pip install "posefield\\[train]".'
         app.command(name, help=text, context_settings=anything, rich_help_panel=MAKE)(absent)
 
 

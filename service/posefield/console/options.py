@@ -25,7 +25,14 @@ if TYPE_CHECKING:
     from posefield.characters.user_character import UserCharacter
 
 
-ModelPath = Annotated[Path, typer.Argument(help="model file", metavar="MODEL")]
+ModelPath = Annotated[
+    Path,
+    typer.Argument(
+        help="model file, or name of a shipped model",
+        metavar="MODEL",
+        callback=model_registry.file_or_shipped,
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON on standard output")]
 
 

@@ -15,7 +15,7 @@ from itertools import accumulate, chain, takewhile
 from pathlib import Path
 from typing import Protocol
 
-from posefield.common.errors import UnknownModel
+from posefield.common.errors import ModelError, UnknownModel
 from posefield.common.name_suggestion import did_you_mean
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry.model_loading import LoadFailure, ModelLoader
@@ -252,6 +252,20 @@ NOTICE = SHIPPED_FOLDER / "NOTICE"
 def or_shipped(places: Sequence[str]) -> list[str]:
     """Return the places of models as given; for none, the folder of the shipped models."""
     return list(places) or [str(SHIPPED_FOLDER)]
+
+
+def file_or_shipped(path: Path) -> Path:
+    """Return the path of a model file, or that of the shipped model of this name.
+
+    Raises ModelError for a name without a file: a path without a suffix and a folder.
+    """
+    names = sorted(file.stem for file in SHIPPED_FOLDER.glob("*.onnx"))
+    if path.exists() or path.suffix or path.name != str(path):
+        return path
+    if path.name in names:
+        return SHIPPED_FOLDER / f"{path.name}.onnx"
+    known = ", ".join(names) + did_you_mean(path.name, names)
+    raise ModelError(path, f"no such file, expected one or a shipped model: {known}")
 
 
 def with_shipped(places: Sequence[Path]) -> ModelRegistry:
