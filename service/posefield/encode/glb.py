@@ -9,7 +9,10 @@ displacement of the first joint of _ANCHORS, and _SHARE of the second's. The mes
 fewer triangles on the same points, for characters seen from afar; no node draws it.
 """
 
+import re
 import struct
+import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -248,17 +251,13 @@ def with_curves(parts: dict[str, Any], store: GlbBuffer, curves: CurveValues) ->
     """
     if "meshes" in parts:
         return {**parts, "meshes": [_with_targets(store, parts["meshes"][0], curves)]}
-    carrier = _carrier(store, curves)
+    # A mesh for the curves of a file without a body: one triangle without area.
+    points = store.add_bounded(np.zeros((3, 3), np.float32), "VEC3", target=VERTICES)
+    mesh = {"name": "Curves", "primitives": [{"attributes": {"POSITION": points}}]}
+    carrier = _with_targets(store, mesh, curves)
     nodes = [*parts["nodes"], {"name": carrier["name"], "mesh": 0}]
     scene = {"nodes": [0, len(nodes) - 1]}
     return {**parts, "scenes": [scene], "nodes": nodes, "meshes": [carrier]}
-
-
-def _carrier(store: GlbBuffer, curves: CurveValues) -> dict[str, Any]:
-    """Return a mesh for the curves of a file without a body: one triangle without area."""
-    points = store.add_bounded(np.zeros((3, 3), np.float32), "VEC3", target=VERTICES)
-    mesh = {"name": "Curves", "primitives": [{"attributes": {"POSITION": points}}]}
-    return _with_targets(store, mesh, curves)
 
 
 def _with_targets(store: GlbBuffer, mesh: dict[str, Any], curves: CurveValues) -> dict[str, Any]:
@@ -279,7 +278,9 @@ def _with_targets(store: GlbBuffer, mesh: dict[str, Any], curves: CurveValues) -
 
 
 CONSTANT_TOLERANCE = 1e-9
-"""Largest variation, m, of a joint's translation that is taken as constant."""
+"""Largest variation of a joint's translation, in units of the file, that is taken as constant."""
+MOST_NAME = 80
+"""Most characters of an animation's name before its checksum."""
 
 
 def glb(answer: SampledClip, said: Convention) -> bytes:
@@ -294,21 +295,19 @@ def glb(answer: SampledClip, said: Convention) -> bytes:
     parts = character_parts(store, resting)
     if clip.curves is not None:
         parts = with_curves(parts, store, clip.curves)
-    document = {
-        "asset": asset(answer.trust.facts()),
-        **parts,
-        "animations": [_animation(store, clip)],
-    }
-    return container(document, store)
+    return container(parts | animation(store, answer, clip, resting.offsets[0]), store)
 
 
-def _animation(store: GlbBuffer, clip: Clip) -> dict[str, Any]:
-    """Return channels of all rotations, of translations that are not constant, and of curves."""
+def animation(store: GlbBuffer, answer: SampledClip, clip: Clip, rest: Floats) -> dict[str, Any]:
+    """Return the asset of a result, and the animation of a clip in the space of its nodes.
+
+    It has channels of all rotations, of translations other than at rest (J, 3), and of curves.
+    """
     when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
     # Readers interpolate between neighbours, which must lie in one hemisphere.
     turns = _as_float32(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
-    spread = np.ptp(clip.translations[:, 1:], axis=0).max(axis=-1, initial=0.0)
-    moved = [0, *(np.flatnonzero(spread > CONSTANT_TOLERANCE) + 1).tolist()]
+    apart = np.abs(clip.translations - rest).max(axis=(0, 2))
+    moved = [0, *(np.flatnonzero(apart[1:] > CONSTANT_TOLERANCE) + 1).tolist()]
     paths = _as_float32(np.moveaxis(clip.translations[:, moved], 1, 0))
     outputs = [
         *((joint, "rotation", o) for joint, o in enumerate(_tracks(store, turns, "VEC4"))),
@@ -318,14 +317,25 @@ def _animation(store: GlbBuffer, clip: Clip) -> dict[str, Any]:
         # The node of the mesh follows those of the joints.
         weights = store.add(_as_float32(clip.curves.values).reshape(-1), "SCALAR")
         outputs.append((len(clip.skeleton), "weights", weights))
-    return {
-        "name": "clip",
+    facts = answer.trust.facts()
+    made = {
+        "name": _animation_name(facts, store),
         "samplers": [{"input": when, "output": output} for _, _, output in outputs],
         "channels": [
             {"sampler": index, "target": {"node": joint, "path": path}}
             for index, (joint, path, _) in enumerate(outputs)
         ],
     }
+    return {"asset": asset(facts), "animations": [made]}
+
+
+def _animation_name(facts: Mapping[str, Any], store: GlbBuffer) -> str:
+    """Return model and controls, and a checksum of all numbers: engines merge equal names."""
+    models = [facts["model"]] if "model" in facts else facts["models"]
+    words = [model.partition("@")[0] for model in models]
+    words += [f"{name}{value:.4g}" for name, value in facts.get("controls", {}).items()]
+    name = re.sub(r"[^\w.-]+", "_", "_".join(words))[:MOST_NAME]
+    return f"{name}_{zlib.crc32(b''.join(store.parts)):08x}"
 
 
 def _tracks(store: GlbBuffer, tracks: Singles, kind: str) -> list[int]:
@@ -354,7 +364,8 @@ def _character_glb(rig: CharacterRig, identity: str) -> bytes:
     (body,) = parts["meshes"]
     (primitive,) = body["primitives"]
     primitive["attributes"] |= _anchors(store, rig.skeleton, mesh)
-    coarse = primitive | {"indices": _coarse_corners(store, mesh)}
+    corners = mesh.coarse.reshape(-1).astype(smallest_index_type(len(mesh.points)))
+    coarse = primitive | {"indices": store.add(corners, "SCALAR", target=CORNERS)}
     parts["meshes"].append({"name": "BodyCoarse", "primitives": [coarse]})
     return container({"asset": asset({"model": identity}), **parts}, store)
 
@@ -368,9 +379,3 @@ def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[st
         "_ANCHORS": store.add(anchors, "VEC2", target=VERTICES),
         "_SHARE": store.add(shares, "SCALAR", target=VERTICES),
     }
-
-
-def _coarse_corners(store: GlbBuffer, mesh: SkinnedMesh) -> int:
-    kind = smallest_index_type(len(mesh.points))
-    corners = mesh.coarse.reshape(-1).astype(kind)
-    return store.add(corners, "SCALAR", target=CORNERS)

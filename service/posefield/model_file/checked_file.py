@@ -12,7 +12,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal, NotRequired, TypedDict, get_type_hints
 
@@ -24,6 +24,7 @@ from posefield.common.errors import ModelError
 from posefield.common.units import Floats
 from posefield.model_file import card_check, onnx_file
 from posefield.model_file.model_card import FORMAT, OPTIONAL_ENTRIES, PREFIX, UNITS, ModelCard
+from posefield.roles.standing import standing
 
 CHECKSUM_KEY = b"posefield_sha256"
 
@@ -228,7 +229,8 @@ def check_size(size: int, source: str | Path) -> None:
 def load_card(content: bytes, source: str) -> ModelCard:
     """Return the card of a file with a valid checksum, graph and card; ModelError for any other.
 
-    source: path or URL of the file, for messages.
+    Its skeleton stands on the floor at the origin, wherever the file has its root. source: path or
+    URL of the file, for messages.
     """
     check_size(len(content), source)
     if not has_valid_checksum(content):
@@ -239,7 +241,7 @@ def load_card(content: bytes, source: str) -> ModelCard:
         card_check.check_graph(card, onnx.shapes, onnx.values)
     except (ValueError, OverflowError) as fault:
         raise ModelError(source, str(fault)) from fault
-    return card
+    return replace(card, skeleton=standing(card.skeleton))
 
 
 def sha256(content: bytes) -> str:

@@ -9,12 +9,13 @@ import numpy as np
 
 from posefield.common.array_shapes import Bones, Vector
 from posefield.common.units import Floats
-from posefield.motion import quat
+from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 
 WORD = re.compile(r"[^\s{}]+", re.ASCII)
 """Only ASCII blanks separate words: the ideographic space belongs to a Japanese name."""
+BLANKS = re.compile(r"[\s{}]+")
 
 AXES = "ZYX"
 ROTATIONS = "Zrotation Yrotation Xrotation"
@@ -35,29 +36,20 @@ of all roundings before it, each turned into a length by the arm behind it.
 def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
     """Return the clip as a BVH file, in degrees and the given unit, with joints depth first.
 
-    The root's OFFSET is zero, since readers differ on whether its channels replace or follow it. A
-    joint whose translation varies has six channels and the mean translation as OFFSET; another has
+    Blanks and braces in names become underscores: many readers end a name at its first blank. The
+    root's OFFSET is zero, since readers differ on whether its channels replace or follow it. A
+    joint whose translation varies has six channels and the mean translation as OFFSET, another
     three. A leaf without an end site gets one of zero length, which other readers require. Readers
     recover the exact rate where it lies within 1e-4 of a whole or broadcast rate. Raises ValueError
-    for a name that the grammar cannot hold and for numbers that are not finite.
+    for numbers that are not finite.
     """
-    check_writable(clip, metres_per_unit)
+    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
+        raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
+    if not all(np.all(np.isfinite(values)) for values in (clip.rotations, clip.translations)):
+        raise ValueError("rotations or translations that are not finite, expected numbers")
     sheet = BvhLayout(clip, metres_per_unit)
     header = f"MOTION\nFrames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.10g}\n"
     return ("HIERARCHY\n" + sheet.hierarchy() + header).encode() + sheet.motion_lines()
-
-
-def check_writable(clip: Clip, metres_per_unit: float) -> None:
-    """Raise ValueError for a unit, names or numbers that a BVH file cannot hold."""
-    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
-        raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
-    for name in clip.skeleton.names:
-        if not name or name != " ".join(WORD.findall(name)):
-            raise ValueError(
-                f"joint name {name!r}, expected words parted by single blanks, without braces"
-            )
-    if not all(np.all(np.isfinite(values)) for values in (clip.rotations, clip.translations)):
-        raise ValueError("rotations or translations that are not finite, expected numbers")
 
 
 @dataclass(frozen=True)
@@ -71,6 +63,13 @@ class BvhLayout:
     def skeleton(self) -> Skeleton:
         """Return the clip's skeleton."""
         return self.clip.skeleton
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the joints, each one word."""
+        return joint_roles.clean_names(
+            self.skeleton.names, lambda name: BLANKS.sub("_", name) or "_"
+        )
 
     @cached_property
     def has_position_channels(self) -> list[bool]:
@@ -103,7 +102,7 @@ class BvhLayout:
             f"6 {POSITIONS} {ROTATIONS}" if self.has_position_channels[joint] else f"3 {ROTATIONS}"
         )
         lines = [
-            f"{'JOINT' if joint else 'ROOT'} {self.skeleton.names[joint]}",
+            f"{'JOINT' if joint else 'ROOT'} {self.names[joint]}",
             "{",
             f"\tOFFSET {self.format_lengths(self.offsets[joint])}",
             f"\tCHANNELS {channels}",

@@ -4,9 +4,9 @@ Renaming is not retargeting: a skeleton of another convention has other bone axe
 that a renamed motion still has to be retargeted.
 """
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from itertools import count
 from typing import Literal, get_args
 
 from posefield.common.errors import InvalidField
@@ -92,19 +92,32 @@ def rename_joints(
             "names", f"{names!r}, expected 'own': this model's recipe gives its joints no [roles]"
         )
     said = {joint: NAMES_BY_CONVENTION[names][role] for role, joint in roles.items()}
-    return replace(skeleton, names=_unique_names(skeleton.names, said))
-
-
-def _unique_names(names: Iterable[str], said: Mapping[str, str]) -> tuple[str, ...]:
-    given, taken = list(names), set(said.values())
+    taken, counts = set(said.values()), Counter[str]()
     # Names that are not taken are kept first, so that no ending of another joint takes them.
-    taken |= (kept := {name for name in given if name not in said and name not in taken})
-    return tuple(
-        said.get(name) or (name if name in kept else _unused_name(name, taken)) for name in given
+    taken |= (kept := {name for name in skeleton.names if name not in said and name not in taken})
+    renamed = (
+        said.get(name) or (name if name in kept else _free_name(name, taken, counts))
+        for name in skeleton.names
     )
+    return replace(skeleton, names=tuple(renamed))
 
 
-def _unused_name(name: str, taken: set[str]) -> str:
-    found = next(ending for n in count(2) if (ending := f"{name}_{n}") not in taken)
-    taken.add(found)
-    return found
+def clean_names(names: Iterable[str], clean: Callable[[str], str]) -> tuple[str, ...]:
+    """Return unique clean names in the given order; names that `clean` keeps are kept.
+
+    Of several names that become equal, the later ones get the endings _2, _3, and so on.
+    """
+    given = list(names)
+    taken = {name for name in given if clean(name) == name}
+    counts = Counter[str]()
+    return tuple(n if n in taken else _free_name(clean(n), taken, counts) for n in given)
+
+
+def _free_name(name: str, taken: set[str], counts: Counter[str]) -> str:
+    """Return a name that is not taken; counts: the last ending tried, by name."""
+    while True:
+        counts[name] += 1
+        found = name if counts[name] == 1 else f"{name}_{counts[name]}"
+        if found not in taken:
+            taken.add(found)
+            return found

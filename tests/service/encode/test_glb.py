@@ -1,5 +1,8 @@
 """Tests of glTF files with another library: positions of the joints and the skinned body."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pygltflib import GLTF2
@@ -95,7 +98,7 @@ def test_the_body_moves_with_its_joints(file, walk):
         clip.skeleton.parents, clip.rotations, clip.translations
     )
     offsets = clip.translations[0].copy()
-    offsets[0] = clip.skeleton.offsets[0]
+    offsets[0] = file.nodes[0].translation
     arms = points - clip.skeleton.at_rest(offsets)[owners]
     expected = places[:, owners] + quat.rotate(turns[:, owners], arms)
     assert np.abs(found - expected).max() < NEAR
@@ -110,6 +113,13 @@ def test_names_tree_times_and_facts_are_those_of_the_clip(file, walk):
     assert np.abs(locals_of(file)[0] - np.arange(len(clip)) / clip.rate).max() < 1e-6
     assert file.asset.version == "2.0"
     assert file.asset.extras == {"posefield": walk.trust.facts()}
+
+
+def test_each_clip_has_a_name_of_its_own(file, walk):
+    later = replace(walk, clip=replace(walk.clip, translations=walk.clip.translations + 0.01))
+    names = [file.animations[0].name, read(CLIP_ENCODERS["glb"].encode(later)).animations[0].name]
+    assert names[0] == read(CLIP_ENCODERS["glb"].encode(walk)).animations[0].name != names[1]
+    assert all(re.fullmatch(r"walk_speed1.25_turn_rate-0.5_[0-9a-f]{8}", own) for own in names)
 
 
 def test_neighbouring_quaternions_lie_in_one_hemisphere(file, walk):

@@ -5,7 +5,6 @@ whole skeleton; readers that identify joints by their leaf name alone merge join
 """
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,9 +18,9 @@ from posefield.encode import conventions
 from posefield.encode.body.mannequin import mannequin
 from posefield.encode.body.skinned_mesh import SkinnedMesh, bones_body
 from posefield.encode.character import extent
-from posefield.encode.character import extent as reach
 from posefield.encode.character.extent import BodyBounds, PointTree
 from posefield.encode.conventions import METRES, Convention
+from posefield.motion import joint_roles
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
 
@@ -29,16 +28,8 @@ LEGAL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def legal_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Return unique legal names in the given order; legal names are kept.
-
-    Of several names that become equal, the later ones get the endings _2, _3, and so on.
-    """
-    given = list(names)
-    taken = {name for name in given if LEGAL_NAME.fullmatch(name)}
-    counts: Counter[str] = Counter()
-    return tuple(
-        n if n in taken else _unique_name(_legal_characters(n), taken, counts) for n in given
-    )
+    """Return unique legal names in the given order; legal names are kept."""
+    return joint_roles.clean_names(names, _legal_characters)
 
 
 def joint_paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
@@ -52,17 +43,6 @@ def joint_paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...
 def _legal_characters(name: str) -> str:
     cleaned = re.sub(r"[^A-Za-z0-9_]", "_", name)
     return cleaned if LEGAL_NAME.fullmatch(cleaned) else f"_{cleaned}"
-
-
-def _unique_name(name: str, taken: set[str], counts: Counter[str]) -> str:
-    """Return a name that is not taken; counts: the last ending tried, by name."""
-    found = name
-    while True:
-        counts[name] += 1
-        found = name if counts[name] == 1 else f"{name}_{counts[name]}"
-        if found not in taken:
-            taken.add(found)
-            return found
 
 
 CharacterArrays = Mapping[str, npt.NDArray[Any]]
@@ -90,9 +70,8 @@ class CharacterRig:
 
 def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY) -> CharacterRig:
     """Return the rig of a skeleton, cached: it takes up to a tenth of a second to build."""
-    tips = skeleton.tip_offsets.tobytes()
-    shape = (skeleton.offsets.tobytes(), skeleton.tip_joints, tips)
-    return _cached_rig(_SkeletonKey((skeleton.names, skeleton.parents, *shape), skeleton), body)
+    arrays = skeleton.offsets.tobytes(), skeleton.tip_offsets.tobytes()
+    return _cached_rig(skeleton.names, skeleton.parents, skeleton.tip_joints, *arrays, body)
 
 
 def body_size(skeleton: Skeleton, body: BodyKind) -> int:
@@ -101,26 +80,17 @@ def body_size(skeleton: Skeleton, body: BodyKind) -> int:
     return 0 if mesh is None else len(mesh.points)
 
 
-class _SkeletonKey:
-    """Skeleton as a cache key, compared by content: arrays cannot be compared or hashed."""
-
-    def __init__(self, said: tuple[Any, ...], skeleton: Skeleton) -> None:
-        self.said, self.skeleton = said, skeleton
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _SkeletonKey) and self.said == other.said
-
-    def __hash__(self) -> int:
-        return hash(self.said)
-
-
 @lru_cache(maxsize=64)
-def _cached_rig(key: _SkeletonKey, kind: BodyKind) -> CharacterRig:
-    joints = key.skeleton
+def _cached_rig(
+    names: tuple[str, ...], parents: tuple[int, ...], owners: tuple[int, ...],
+    arms: bytes, tips: bytes, kind: BodyKind,
+) -> CharacterRig:  # fmt: skip
+    offsets, tip_offsets = (np.frombuffer(own).reshape(-1, 3) for own in (arms, tips))
+    joints = Skeleton(names, parents, offsets, owners, tip_offsets)
     paths = joint_paths(legal_names(joints.names), joints.parents)
     body = _mesh(joints, kind)
     bounds = extent.bounds(joints, body)
-    return CharacterRig(joints, joints.names, paths, reach.tree(joints), body, bounds)
+    return CharacterRig(joints, joints.names, paths, extent.tree(joints), body, bounds)
 
 
 def _mesh(skeleton: Skeleton, kind: BodyKind) -> SkinnedMesh | None:
@@ -145,15 +115,24 @@ class RestPose:
 
 
 def rest_pose(rig: CharacterRig, offsets: Floats | Singles) -> RestPose:
-    """Return characters with bone offsets (M, J, 3), m; each root is at the rig's root position."""
+    """Return characters with bone offsets (M, J, 3), m; all stand as low as the rig does."""
     rest = offsets.astype(np.float64)
     rest[:, 0] = rig.skeleton.offsets[0]
+    lowest = _lowest(rig.skeleton, rig.skeleton.offsets)
+    rest[:, 0, 1] += lowest - _lowest(rig.skeleton, rest)
     if rig.body is None:
         none = np.zeros((len(rest), len(rig.tree.order)))
         return RestPose(rig, rest, np.empty((len(rest), 0, 3), np.float32), none)
     moved = rig.bounds.displacements(rest)
     along = rig.body.places.displacements(moved)
     return RestPose(rig, rest, rig.body.points_at(along), rig.bounds.radii(moved, along))
+
+
+def _lowest(skeleton: Skeleton, offsets: Floats) -> Floats:
+    """Return the height (...) of the lowest joint or tip at rest with offsets (..., J, 3), m."""
+    heights = skeleton.at_rest(offsets)[..., 1]
+    tips = heights[..., list(skeleton.tip_joints)] + skeleton.tip_offsets[:, 1]
+    return np.concatenate([heights, tips], axis=-1).min(axis=-1)
 
 
 def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.NDArray[Any]]:
@@ -174,8 +153,8 @@ def rest_pose_arrays(rig: CharacterRig, convention: Convention = METRES) -> Char
     places = made["bind"][:, 3, :3]
     if "points" in made:
         places = np.concatenate([places, made["points"]])
-    extent = reach.enlarged_box(places.min(axis=0), places.max(axis=0))
-    return made | {"extent": extent.astype(np.float32)}
+    box = extent.enlarged_box(places.min(axis=0), places.max(axis=0))
+    return made | {"extent": box.astype(np.float32)}
 
 
 def _translation_matrices(convention: Convention, metres: Floats) -> Floats:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Vt
 
-from posefield.common.units import Singles
 from posefield.encode import conventions
 from posefield.encode.body import skinned_mesh
-from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
+from posefield.encode.body.skinned_mesh import FULL_WEIGHT
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterArrays, CharacterRig
 from posefield.encode.conventions import METRES, Convention
@@ -53,17 +52,15 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
     return _MeshArrays(
         Vt.IntArray.FromNumpy(mesh.counts),
         Vt.IntArray.FromNumpy(mesh.corners),
-        Vt.Vec3fArray.FromNumpy(_normals(mesh, convention)),
+        Vt.Vec3fArray.FromNumpy(
+            np.ascontiguousarray(conventions.convert_directions(convention, mesh.normals))
+        ),
         Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.joints[:, :used]).reshape(-1)),
         Vt.FloatArray.FromNumpy(weights.reshape(-1)),
         used,
         Vt.Vec3fArray.FromNumpy(colours),
         Vt.IntArray.FromNumpy(mesh.tints) if len(colours) > 1 else None,
     )
-
-
-def _normals(mesh: SkinnedMesh, convention: Convention) -> Singles:
-    return np.ascontiguousarray(conventions.convert_directions(convention, mesh.normals))
 
 
 def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:

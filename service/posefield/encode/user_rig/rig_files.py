@@ -11,7 +11,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, LengthUnit, Singles, UpAxis
+from posefield.common.units import Floats, LengthUnit, UpAxis
 from posefield.encode import glb
 from posefield.encode.conventions import METRES, Convention
 from posefield.encode.formats import ClipEncoder
@@ -26,8 +26,6 @@ from posefield.question.results import SampledClip
 from posefield.rigs.rest_joints import RestJoints
 from posefield.rigs.rig import Rig
 
-CONSTANT_TOLERANCE = 1e-9
-"""Largest variation of a joint's translation, in units of the file, that is taken as constant."""
 OUTER = "Armature"
 
 
@@ -38,13 +36,14 @@ def animation_glb(answer: SampledClip, rest: RestJoints) -> bytes:
     is the identity.
     """
     store = GlbBuffer()
-    document = {
-        "asset": glb.asset(answer.trust.facts()),
-        "scene": 0,
-        **_nodes(rest),
-        "animations": [_animation(store, answer, rest)],
-    }
-    return glb.container(document, store)
+    clip = replace(
+        answer.clip,
+        rotations=quat.normalize(rest.file_rotations(answer.clip.rotations)),
+        translations=rest.file_translations(answer.clip.translations),
+        curves=None,
+    )
+    motion = glb.animation(store, answer, clip, rest.translations)
+    return glb.container({"scene": 0, **_nodes(rest), **motion}, store)
 
 
 def _nodes(rest: RestJoints) -> dict[str, Any]:
@@ -89,37 +88,6 @@ def _outer_node(rest: RestJoints) -> dict[str, Any]:
 
 def _scale(size: Floats) -> dict[str, Any]:
     return {} if np.allclose(size, 1.0) else {"scale": size.tolist()}
-
-
-def _animation(store: GlbBuffer, answer: SampledClip, rest: RestJoints) -> dict[str, Any]:
-    """Return channels of all rotations, and of the translations that are not those of the rest."""
-    clip = answer.clip
-    rotations = quat.unroll(quat.normalize(rest.file_rotations(clip.rotations)))
-    translations = rest.file_translations(clip.translations)
-    when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
-    turns = _as_float32(np.moveaxis(rotations, 1, 0)[..., [1, 2, 3, 0]])
-    spread = np.abs(translations - rest.translations).max(axis=(0, 2))
-    moved = [0, *(np.flatnonzero(spread[1:] > CONSTANT_TOLERANCE) + 1).tolist()]
-    paths = _as_float32(np.moveaxis(translations[:, moved], 1, 0))
-    outputs = [
-        *((joint, "rotation", store.add(own, "VEC4")) for joint, own in enumerate(turns)),
-        *(
-            (joint, "translation", store.add(own, "VEC3"))
-            for joint, own in zip(moved, paths, strict=True)
-        ),
-    ]
-    return {
-        "name": "clip",
-        "samplers": [{"input": when, "output": output} for _, _, output in outputs],
-        "channels": [
-            {"sampler": index, "target": {"node": joint, "path": path}}
-            for index, (joint, path, _) in enumerate(outputs)
-        ],
-    }
-
-
-def _as_float32(values: Floats) -> Singles:
-    return np.ascontiguousarray(values, dtype=np.float32)
 
 
 LAYERS = ("usda", "usdc", "usdz")
@@ -243,27 +211,23 @@ class RigTarget:
     def encode(self, form: ClipEncoder, answer: SampledClip, convention: Convention) -> bytes:
         """Return the file of a motion of the rig's skeleton, in the convention of `convention`."""
         if form.extension in LAYERS:
-            return _layer_bytes(form.extension, self._layer(answer))
+            # usd-core takes 0.12 CPU seconds to import.
+            from posefield.encode.usd import usd_clip
+            from posefield.encode.usd_layers import layers
+
+            layer = self._layer(answer)
+            if form.extension == "usda":
+                return bytes(layer.ExportToString(), "utf-8")
+            binary = layers.crate_bytes(layer)
+            return binary if form.extension == "usdc" else usd_clip.usdz_package(binary)
         if form.extension == "glb":
             own = self.rig.rest if self.stage is None else rig_stage.in_metres(self.rig.rest)
             return animation_glb(answer, own)
         return form.encode(answer, replace(convention, body="none"))
 
     def _layer(self, answer: SampledClip) -> Any:
-        # usd-core takes 0.12 CPU seconds to import.
         from posefield.encode.user_rig import rig_layer
 
         if self.stage is None:
             return rig_layer.skeleton_layer(answer, self.rig.rest)
         return rig_layer.referring_layer(answer, self.rig.rest, self.stage, self.reference)
-
-
-def _layer_bytes(extension: str, layer: Any) -> bytes:
-    from posefield.encode.usd import usd_clip
-    from posefield.encode.usd_layers import layers
-
-    if extension == "usda":
-        text: str = layer.ExportToString()
-        return text.encode()
-    binary = layers.crate_bytes(layer)
-    return binary if extension == "usdc" else usd_clip.usdz_package(binary)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
 
-from posefield.common.array_shapes import Bones, JointRotations
 from posefield.common.errors import UsdError
 from posefield.common.units import Floats, Singles
 from posefield.encode.character import character
@@ -203,11 +202,8 @@ def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
         ("bindTransforms", (rest.orientations, places)),
         ("restTransforms", (rest.rotations, rest.translations)),
     ):
-        layers.uniform_attribute(skeleton, name, ValueTypes.Matrix4dArray, _matrix_array(*poses))
-
-
-def _matrix_array(rotations: JointRotations, translations: Bones) -> Any:
-    return Vt.Matrix4dArray.FromNumpy(rig_stage.matrices(rotations, translations))
+        matrices = Vt.Matrix4dArray.FromNumpy(rig_stage.matrices(*poses))
+        layers.uniform_attribute(skeleton, name, ValueTypes.Matrix4dArray, matrices)
 
 
 def _add_animation(
