@@ -14,7 +14,7 @@ DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 BUDGETS = {
     "service/posefield": 43_900,
     "model_export/posefield_train": 26_460,
-    "clients/python": 2_080,
+    "clients/python": 2_110,
     "clients/blender": 1_280,
     "clients/viewer/src": 8_190,
     "clients/typescript/src": 1_350,

@@ -108,6 +108,8 @@ WORDS = {
     r"\ba(?=close|read\(|iter_bytes)": "",
     r"^import anyio\n": "",
     r"\banyio\.sleep": "time.sleep",
+    r" +# The client that waits asks.*\n": "",
+    r"= self\._card  # synchronous: (.*)": r"= \1",
 }
 
 

@@ -66,7 +66,9 @@ class AsyncClient:
     """Client of a service at an address.
 
     key: an API key or token. timeout: seconds without data from the service. cache_bytes: limit of
-    the responses that are cached in memory. transport: of httpx, in place of connections.
+    the responses that are cached in memory. transport: of httpx, in place of connections. checks:
+    unknown controls of clips and crowds are refused at the call, for which the card is read; the
+    asynchronous client refuses them there once its card has been read, else when awaited.
     """
 
     def __init__(
@@ -78,7 +80,9 @@ class AsyncClient:
         retry: Retry = Retry(),  # noqa: B008  # it is frozen
         cache_bytes: int = 16 * 2**20,
         transport: httpx.AsyncBaseTransport | None = None,
+        checks: bool = True,
     ) -> None:
+        self.checks = checks
         self.address = wire.address(base_url)
         headers = wire.client_headers(key)
         self._http = httpx.AsyncClient(headers=headers, timeout=timeout, transport=transport)
@@ -292,6 +296,12 @@ class AsyncMotion(AsyncSaving, Generic[N]):
         self._numbers = answer
         return answer
 
+    @property
+    async def trust(self) -> Any:
+        """Return the Trust of a clip or the report of a performance; its numbers are requested."""
+        numbers = await self.numbers
+        return getattr(numbers, "trust", None)
+
 
 class AsyncModel:
     """A model of a service, by name.
@@ -320,6 +330,14 @@ class AsyncModel:
         """Return the controls by name, in the card's order."""
         card = await self.card
         return {control.name: control for control in card.controls}
+
+    def _check(self, words: Mapping[str, Any]) -> None:
+        """Raise WrongQuestion for a control that the model does not have."""
+        # The client that waits asks for the card; this one cannot before it is awaited.
+        card = self._card  # synchronous: self.card if self.client.checks else self._card
+        if card is not None and self.client.checks:
+            known = [control.name for control in card.controls]
+            questions.check_names(words.get("controls", ()), known)
 
     async def character(self) -> bytes:
         """Return the character at rest as binary glTF: joints and the body skinned to them."""
@@ -428,6 +446,7 @@ class AsyncModel:
     ) -> "AsyncMotion[ClipNumbers]":
         """Return a clip; the request is sent when it is saved or its numbers are read."""
         words = questions.question(locals())
+        self._check(words)
         call = partial(questions.ask, "ClipInFormat", self.name, words)
         files = Files(call, "getClipInFormat", questions.about(self.name, words))
         return AsyncMotion(self.client, files, CLIP)
@@ -479,6 +498,7 @@ class AsyncModel:
         Lists and arrays have one value per character; other values hold for all characters.
         """
         words = questions.question(locals())
+        self._check(words)
         name = "queryCrowdInFormat"
         call = partial(questions.post, name, self.name, words)
         files = Files(call, name, questions.about(self.name, words))

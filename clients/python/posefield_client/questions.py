@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from difflib import get_close_matches
 from typing import Any, Literal, TypeVar
 from urllib.parse import quote_plus
 
@@ -150,6 +151,14 @@ def digits(value: Any) -> str:
     text = str(value)
     is_exponential = isinstance(value, float) and "e" in text
     return format(Decimal(text), "f") if is_exponential else text
+
+
+def check_names(names: Iterable[str], known: Sequence[str]) -> None:
+    """Raise WrongQuestion for a control that is none of the known ones."""
+    for name in names:
+        if name not in known:
+            hint = "".join(f" (did you mean {n!r}?)" for n in get_close_matches(name, known, 1))
+            raise WrongQuestion(f"{name}: no such control, expected {', '.join(known)}{hint}")
 
 
 def model_name(name: str) -> str:

@@ -2,14 +2,16 @@
 
 import subprocess
 import sys
+from functools import partial
 from urllib.parse import parse_qsl, urlsplit
 
+import anyio
 import httpx
 import msgspec
 import numpy as np
 import posefield_client
 import pytest
-from posefield_client import Client, Floor, Target, generated, numbers
+from posefield_client import AsyncClient, Client, Floor, Target, generated, numbers
 from posefield_client.errors import WrongQuestion
 from posefield_client.numbers import Pose, SigmaGrid
 from posefield_client.wire import Reply
@@ -197,3 +199,24 @@ def test_it_needs_nothing_of_the_service(name):
     command = [sys.executable, "-W", "error", "-c", f"{ALONE}import {name}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) is (name == posefield_client.__name__), done.stderr
+
+
+def test_an_unknown_control_is_refused_at_the_call(address):
+    with Client(address) as client:
+        model = client.model("reach")
+        for ask in (model.clip, partial(model.crowd, 0.0)):
+            with pytest.raises(WrongQuestion, match=r"turm: no such control.*did you mean 'turn'"):
+                ask(turm=1.0)
+        clip = model.clip(turn=1.0)
+        assert clip.trust == clip.numbers.trust and clip.trust.controls["turn"] == 1.0
+
+
+def test_the_client_that_awaits_refuses_it_once_it_has_the_card(address):
+    async def ask():
+        async with AsyncClient(address) as client:
+            model = client.model("reach")
+            await model.card
+            with pytest.raises(WrongQuestion, match="turm: no such control"):
+                model.clip(turm=1.0)
+
+    anyio.run(ask)
