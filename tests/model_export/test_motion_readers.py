@@ -146,19 +146,31 @@ def test_a_table_names_the_animations_of_a_file(tmp_path):
         table(tmp_path, "a.glb,1,")
 
 
-def test_a_recipe_that_contradicts_a_file_is_an_error(tmp_path):
+def test_a_recipe_overrules_what_a_file_states(tmp_path):
     (tmp_path / "a.glb").write_bytes(encoded(small_clip(), "glb"))
     (tmp_path / "clips.csv").write_text("file,v\na.glb,1\n")
-    assert len(ingest.ingest(recipe_with(), tmp_path)[0]) == 1
+    (plain,), notes = ingest.ingest(recipe_with(), tmp_path)
+    assert notes == []
     for source, said in (
-        ({"metres_per_unit": 0.01}, "a.glb: states a unit of 1 m, expected .*metres_per_unit 0.01"),
-        ({"up": "z"}, "a.glb: states y as its up axis, expected source.up 'z'"),
+        ({"metres_per_unit": 0.01}, "a.glb: states a unit of 1 m, overruled: read as 0.01 m"),
+        ({"up": "z"}, "a.glb: states y as its up axis, overruled: read as z"),
     ):
-        with pytest.raises(MotionFileError, match=said):
-            ingest.ingest(recipe_with(source=source), tmp_path)
-    folder = write_clips(tmp_path, [small_clip()])
-    with pytest.raises(MotionFileError, match=r"30 frames a second \(frame time .*\), .*rate 60"):
-        ingest.ingest(recipe_with(source={"rate": 60.0}), folder)
+        (example,), notes = ingest.ingest(recipe_with(source=source), tmp_path)
+        assert notes[0] == said
+        scale = source.get("metres_per_unit", 1.0)
+        lengths = [np.linalg.norm(own.offsets, axis=1) for own in (example, plain)]
+        assert lengths[0] == pytest.approx(scale * lengths[1])
+
+
+def test_a_file_keeps_its_unit_beside_files_that_need_that_of_the_recipe(tmp_path):
+    """BVH in centimetres and GLB, which states metres and y up, in one family."""
+    clips = [small_clip(), small_clip(0.5)]
+    folder = write_clips(tmp_path, clips, metres_per_unit=0.01)
+    (folder / "1.glb").write_bytes(encoded(clips[1], "glb"))
+    (folder / "clips.csv").write_text("file,v\n0.bvh,0\n1.glb,1\n")
+    examples, notes = ingest.ingest(recipe_with(source={"metres_per_unit": 0.01}), folder)
+    assert any("1.glb: states a unit of 1 m, kept" in note for note in notes)
+    assert examples[1].offsets == pytest.approx(examples[0].offsets, abs=1e-5)
 
 
 def test_probe_takes_what_files_state_and_says_what_contradicts_it(tmp_path, examples):

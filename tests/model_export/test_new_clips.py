@@ -131,7 +131,7 @@ def rewritten(table, change):
     ("change", "said"),
     [
         (lambda text: text.replace("LeftHand", "LeftFist"), r"0\.bvh has no joints \['LeftHand'\]"),
-        (exchanged, "in another order or hierarchy"),
+        (exchanged, "with other parents"),
     ],
 )
 def test_a_clip_of_another_skeleton_is_refused(reopened, table, change, said):

@@ -248,14 +248,11 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
             f"{row.place} has no joints {missing}, which the model has: expected a clip of the "
             "same skeleton"
         )
-    kept = [joint for joint, name in enumerate(own.names) if name in family.names]
-    smaller = (
-        clip_joints.keep_joints(clip, kept) if clip_joints.has_all_parents(own, kept) else None
-    )
+    smaller = clip_joints.ordered_as(clip, family.names)
     if smaller is None or not smaller.skeleton.same_tree(family):
         raise row.error(
-            f"{row.place} has the model's joints in another order or hierarchy: expected a clip of "
-            "the same skeleton"
+            f"{row.place} has the model's joints with other parents: expected a clip of the same "
+            "skeleton"
         )
     others = [name for name in own.names if name not in family.names]
     said = f"{row.place}: joints {others}, which the model does not have, were left out"

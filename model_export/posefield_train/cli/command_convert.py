@@ -35,16 +35,17 @@ class SourceArguments:
     unit: Annotated[
         float | None,
         typer.Option(
-            help="length of the file's unit in metres, for files that state none", metavar="METRES"
+            help="length of the file's unit in metres; it overrules that of the file",
+            metavar="METRES",
         ),
     ] = None
     up: Annotated[
-        UpAxis | None, typer.Option(help="up axis of the file, for files that state none")
+        UpAxis | None, typer.Option(help="up axis of the file; it overrules that of the file")
     ] = None
     rate: Annotated[
         float | None,
         typer.Option(
-            help="frames a second: of AMC files, and to sample curves without even keys",
+            help="frames a second: of AMC and BVH files, and to sample the curves of others",
             metavar="FPS",
         ),
     ] = None

@@ -130,7 +130,8 @@ def convert(path: Path, said: Conventions) -> ConvertedFile:
             f"states no {'unit' if unit is None else 'up axis'}, expected {lacks}; posefield probe "
             "proposes it"
         )
-    clip = motion_file.to_clip(file, metres_per_unit=unit, up=up, rate=said.options.rate)
+    file = motion_file.overrule(file, metres_per_unit=unit, up=up)
+    clip = motion_file.to_clip(file, metres_per_unit=unit, up=up)
     clip = replace(clip, translations=_rigid_bones(clip))
     try:
         content = bvh_writer.dumps(clip, metres_per_unit=METRES_PER_UNIT)

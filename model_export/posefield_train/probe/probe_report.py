@@ -13,7 +13,7 @@ from posefield.roles import joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import proposals
 from posefield_train.probe.proposals import Figure, Proposal
-from posefield_train.source import motion_readers
+from posefield_train.source import ingest, motion_file, motion_readers
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
 SHOWN_JOINTS, SHOWN_FAULTS = 40, 20
@@ -147,6 +147,9 @@ def _propose_rate(figures: Sequence[Figure]) -> Proposal:
     said = sorted({each.file.evidence for each in figures if each.file.rate is not None})
     evidence = f"{', '.join(said[:5])} in the files"
     rate, count = rates.most_common(1)[0]
+    meant, doubt = motion_file.doubted_rate(rate)
+    if doubt:
+        return Proposal(meant, "low" if meant else "none", (evidence, doubt))
     if count < len(figures):
         counted = ", ".join(f"{count} files at {each:g}" for each, count in rates.most_common(5))
         return Proposal(rate, "medium", (evidence, counted))
@@ -155,7 +158,7 @@ def _propose_rate(figures: Sequence[Figure]) -> Proposal:
 
 def _warnings(figures: Sequence[Figure], usual: Sequence[Figure]) -> list[str]:
     """Return what keeps the files from being trained together, and joints that hint at damage."""
-    found = []
+    found = ingest.reader_notes({each.file.source: each.file for each in figures})
     if len(usual) < len(figures):
         odd = next(each for each in figures if each.names != usual[0].names)
         differ = sorted(set(odd.names) ^ set(usual[0].names))[:6]

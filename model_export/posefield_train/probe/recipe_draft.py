@@ -120,8 +120,9 @@ def source_lines(report: ProbeReport) -> list[str]:
     rate, stated = report.proposed["fps"], report.proposed.get("rate")
     if stated is not None:
         lines.append(f"rate = {json.dumps(stated.value)}")
-    elif rate.value is None:
-        lines += [*(f"# {said}" for said in rate.evidence), "# TODO rate = "]
+    elif rate.confidence in ("low", "none"):
+        lines += [f"# {said}" for said in rate.evidence]
+        lines.append("# TODO rate = " if rate.value is None else f"rate = {rate.value:g}")
     return [*lines, ""]
 
 

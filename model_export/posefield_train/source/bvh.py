@@ -1,9 +1,11 @@
 """BVH motion files: strict reading, whose errors name the line, and conversion to a clip."""
 
+import array
 import io
 import re
 import string
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO, Literal, Protocol
 
@@ -16,20 +18,22 @@ from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source import motion_file as motion_files
 from posefield_train.source.bvh_hierarchy import (
+    CHANNELS,
     MAX_NUMBER,
     NUMBER,
     BvhJoint,
     Vector,
     decode,
+    foreign_encoding,
     parse_hierarchy,
     quote,
 )
-from posefield_train.source.motion_file import MotionFile, RootOffset, snapped_rate
+from posefield_train.source.motion_file import MotionFile, RootOffset, rate_of_digits
 
 FRAMES = re.compile(r"\s*Frames\s*:\s*(\d{1,18})\s*", re.ASCII | re.IGNORECASE)
 FRAME_TIME = re.compile(rf"\s*Frame\s+Time\s*:\s*({NUMBER.pattern})\s*", re.ASCII | re.IGNORECASE)
 # A joint can be named MOTION_head, so the section begins at a line of the keyword alone.
-MOTION_LINE = re.compile(r"^[ \t]*MOTION[ \t]*$", re.MULTILINE | re.IGNORECASE)
+MOTION_LINE = re.compile(r"[ \t]*MOTION[ \t]*\n?", re.IGNORECASE)
 
 MIN_FRAME_TIME, MAX_FRAME_TIME = 1e-6, 1e6
 """Bounds of a frame time, s."""
@@ -42,8 +46,10 @@ MAX_POSES = 10_000_000
 
 Joints without channels add nothing to the MOTION section, so the file's size does not limit them.
 """
-BLOCK = 256_000
-"""Bytes per read; parsing their numbers takes fifty times as much memory."""
+RELATIVE = 0.1
+"""Share of the OFFSETs below which the mean positions of joints are taken as relative to them."""
+MAX_LINE = 256_000
+"""Limit of a line, characters: twice that of a frame of MAX_JOINTS joints."""
 BLOCK_ROTATIONS = 50_000
 """Rotations that are converted at once."""
 
@@ -55,7 +61,7 @@ class BvhFile:
     source: its name, for messages. joints: in file order, parents first. tips: the joint index and
     offset of every End Site. values: (F, C), a row per frame, a column per channel, the joints'
     channels one after another, in degrees and the file's unit. frame_time: as written, s. rate:
-    frames per second, rounded from the frame time.
+    frames per second, rounded from the frame time. notes: on what the reader assumed.
     """
 
     source: str
@@ -64,6 +70,7 @@ class BvhFile:
     values: Floats
     frame_time: float
     rate: float
+    notes: tuple[str, ...] = ()
 
 
 class Readable(Protocol):
@@ -93,232 +100,148 @@ def load(file: IO[bytes], source: str) -> BvhFile:
     At most the numbers of MAX_POSES and a few megabytes are kept in memory, whatever the file's
     size. Raises BvhError for a violation of the grammar or an inconsistency.
     """
-    text = _TextCursor(file, source)
-    # Read one more block, so that a line that begins before the limit is complete.
-    text.fill(MAX_HEADER + BLOCK)
-    motion = MOTION_LINE.search(text.ahead)
-    size = motion.start() if motion else len(text.ahead)
-    end = "MOTION" if motion else "the end of the file"
-    if size > MAX_HEADER:
-        size, end = MAX_HEADER, f"{MAX_HEADER // 1_000_000} MB without a line MOTION"
+    text = io.TextIOWrapper(file, "latin-1")
     try:
-        joints, tips = parse_hierarchy(text.take(size), end)
+        return _load(_Lines(text, source), source)
+    finally:
+        # The caller closes the file.
+        text.detach()
+
+
+def _load(lines: "_Lines", source: str) -> BvhFile:
+    head, size, end = list[str](), 0, "the end of the file"
+    for line in lines:
+        if MOTION_LINE.fullmatch(line):
+            end = "MOTION"
+            break
+        head.append(line)
+        size += len(line)
+        if size >= MAX_HEADER:
+            end = f"{MAX_HEADER // 1_000_000} MB without a line MOTION"
+            break
+    try:
+        joints, tips = parse_hierarchy("".join(head), end)
     except BvhError as fault:
         raise BvhError(source, fault.message, fault.line) from None
     channels = sum(len(joint.channels) for joint in joints)
     if not channels:
-        raise text.error(f"found no channel in {len(joints)} joints, expected at least one")
-    text.take_line()
-    frames = int(_header(text, FRAMES, "'Frames: N', N a whole number"))
+        raise lines.error(f"found no channel in {len(joints)} joints, expected at least one")
+    frames = int(_header(lines, FRAMES, "'Frames: N', N a whole number"))
     if frames < 1:
-        raise text.error("found 0 frames, expected at least 1")
-    seconds = _header(text, FRAME_TIME, "'Frame Time: seconds'")
+        raise lines.error("found 0 frames, expected at least 1")
+    seconds = _header(lines, FRAME_TIME, "'Frame Time: seconds'")
     if not MIN_FRAME_TIME <= float(seconds) <= MAX_FRAME_TIME:
         expected = f"a positive number of seconds from {MIN_FRAME_TIME:g} to {MAX_FRAME_TIME:g}"
-        raise text.error(f"found frame time {seconds}, expected {expected}")
-    values = _values(text, frames, channels, len(joints))
-    return BvhFile(source, joints, tips, values, float(seconds), snapped_rate(float(seconds)))
+        raise lines.error(f"found frame time {seconds}, expected {expected}")
+    values = _values(lines, frames, channels, len(joints))
+    rate, notes = rate_of_digits(seconds)
+    if len(values) != frames:
+        notes += (f"states {frames} frames and has {len(values)}: those were read",)
+    return BvhFile(source, joints, tips, values, float(seconds), rate, notes)
 
 
-class _TextCursor:
-    """Cursor over the characters of a binary file, one per byte (Latin-1), read in blocks.
+class _Lines:
+    """Lines of a file, a character per byte (Latin-1), with any line ends.
 
-    Only line feeds end a line; carriage returns are translated. ahead: characters read and not yet
-    taken. line: number of the line at the cursor.
+    number: of the last line, from 1. Raises BvhError for another encoding, for a line longer than
+    MAX_LINE, and beyond MAX_BYTES.
     """
 
-    def __init__(self, file: IO[bytes], source: str) -> None:
-        self.source, self.ahead, self.line = source, "", 1
-        self._file, self._bytes, self._ended = file, 0, False
-        self._newlines = io.IncrementalNewlineDecoder(None, translate=True)
+    def __init__(self, text: io.TextIOWrapper, source: str) -> None:
+        self.source, self.number = source, 0
+        self._text, self._read = text, 0
 
-    def error(self, message: str) -> BvhError:
-        """Return an error at the line of the cursor."""
-        return BvhError(self.source, message, self.line)
-
-    def fill(self, count: int) -> None:
-        """Read until `count` characters are ahead or the file ends; BvhError beyond MAX_BYTES."""
-        while len(self.ahead) < count and not self._ended:
-            block = self._file.read(BLOCK)
-            self._bytes += len(block)
-            if self._bytes > MAX_BYTES:
+    def __iter__(self) -> Iterator[str]:
+        while line := self._text.readline(MAX_LINE):
+            self.number, self._read = self.number + 1, self._read + len(line)
+            packed = foreign_encoding(line[:4].encode("latin-1")) if self.number == 1 else ""
+            if packed:
+                raise self.error(f"found {packed}, expected HIERARCHY, as plain text")
+            if len(line) == MAX_LINE:
+                raise self.error(f"found {MAX_LINE} characters in a line, expected fewer")
+            if self._read > MAX_BYTES:
                 most = f"{MAX_BYTES // 1_000_000} MB"
                 raise BvhError(self.source, f"found more than {most}, expected at most {most}")
-            self._ended = not block
-            self.ahead += self._newlines.decode(block.decode("latin-1"), final=self._ended)
+            yield line
 
-    def take(self, count: int) -> str:
-        """Return the next characters and advance past them."""
-        taken, self.ahead = self.ahead[:count], self.ahead[count:]
-        self.line += taken.count("\n")
-        return taken
-
-    def take_line(self) -> str:
-        """Return the next line that is not blank, without its line feed; empty at the end.
-
-        The cursor then stands before its line feed, so that `line` is its number.
-        """
-        self.fill(1)
-        while blank := len(self.ahead) - len(self.ahead.lstrip(string.whitespace)):
-            self.take(blank)
-            self.fill(1)
-        # A line longer than a block is cut; it cannot match any expected line.
-        self.fill(BLOCK)
-        return self.take(len(self.ahead.partition("\n")[0]))
-
-    def blocks(self) -> Iterator[str]:
-        """Yield the rest of the text in pieces that end with white space, except the last one.
-
-        The cursor stays at the start of a piece until the next is requested. A word longer than a
-        block is split.
-        """
-        self.fill(BLOCK)
-        while self.ahead:
-            piece = self.ahead[:BLOCK]
-            end = max(piece.rfind(blank) for blank in string.whitespace) + 1
-            if end and len(self.ahead) >= BLOCK:
-                piece = piece[:end]
-            yield piece
-            self.take(len(piece))
-            self.fill(BLOCK)
+    def error(self, message: str) -> BvhError:
+        """Return an error at the last line."""
+        return BvhError(self.source, message, self.number)
 
 
-def _header(text: _TextCursor, pattern: re.Pattern[str], expected: str) -> str:
+def _header(lines: _Lines, pattern: re.Pattern[str], expected: str) -> str:
     """Return the group that the pattern matches in the next line that is not blank."""
-    line = text.take_line()
+    line = next((line.strip() for line in lines if not line.isspace()), "")
     if match := pattern.fullmatch(line):
         return match.group(1)
-    shown = quote(decode(line.strip().encode("latin-1"))) if line else "the end of the file"
-    raise text.error(f"found {shown}, expected {expected}")
+    shown = quote(decode(line.encode("latin-1"))) if line else "the end of the file"
+    raise lines.error(f"found {shown}, expected {expected}")
 
 
-# Python's float also accepts nan, inf and 1_000, which other characters give away.
-NOT_IN_NUMBERS = bytes(set(range(256)) - set(b"0123456789+-.eE \t\n\r\v\f"))
-# One list for all blank lines, of which a file can have millions.
-EMPTY_ROW: list[bytes] = []
+IN_NUMBERS = "0123456789+-.eE" + string.whitespace
+"""Characters of finite numbers; Python's float also accepts nan, inf and 1_000."""
 
 
-def _values(text: _TextCursor, frames: int, channels: int, joints: int) -> Floats:
+def _values(lines: _Lines, frames: int, channels: int, joints: int) -> Floats:
     """Return the numbers (frames, channels) of the lines after the frame time.
 
-    A frame may extend over several lines, but not end within one. The total alone is not checked,
-    because a line with too few numbers and one with too many would shift all frames between them by
-    a column. Memory is allocated for numbers read, not for the count that the file declares.
+    A frame may extend over several lines, but not end within one. There may be one frame more or
+    less than declared, as some exporters count. Memory is allocated for numbers read, not for the
+    count that the file declares.
     """
-    # Skip the line feed after the frame time.
-    text.fill(1)
-    text.take(1)
-    expected, most = frames * channels, MAX_POSES // joints * channels
-    values, total = np.empty(0), 0
-    lines = _LineCounter(frames, channels, text.line)
-    for piece in text.blocks():
-        block = piece.encode("latin-1")
-        rows = [row.split() or EMPTY_ROW for row in block.split(b"\n")]
-        numbers = _parse_numbers(block, rows)
-        if numbers is None:
-            raise _wrong_word(text, rows, expected - total)
-        lines.add(rows)
-        end = total + len(numbers)
-        if end <= min(expected, most):
-            if end > len(values):
-                size = min(max(end, 2 * len(values)), expected, most)
-                values.resize(size, refcheck=False)
-            values[total:end] = numbers
-        total = end
-        if expected > most < total:
+    values, begin = array.array("d"), lines.number
+    for line in lines:
+        if line.isspace():
+            continue
+        numbers = _numbers(lines, line, frames * channels - len(values))
+        begun = len(values) % channels
+        begin = begin if begun else lines.number
+        if begun + len(numbers) > channels:
+            split = f"{begun} and then {len(numbers)}" if begun else len(numbers)
+            message = f"found {split} numbers, expected {channels} a frame, on lines of its own"
+            raise BvhError(lines.source, message, begin)
+        values.extend(numbers)
+        if len(values) > (frames + 1) * channels:
+            raise lines.error(f"found more than {frames + 1} frames, expected {frames}")
+        if len(values) // channels * joints > MAX_POSES:
             message = f"found {frames} frames of {joints} joints, expected at most {MAX_POSES}"
-            raise text.error(f"{message} poses of a joint")
-        if total > expected + most:
-            raise text.error(
-                f"found more than {expected + most} numbers, expected {frames} frames x "
-                f"{channels} channels = {expected}"
-            )
-    lines.end_line()
-    if total != expected or lines.ends_inside_line:
-        # The first line of a wrong length, else the end of the numbers.
-        raise BvhError(
-            text.source,
-            f"found {total} numbers in {lines.filled} lines, expected {frames} frames x "
-            f"{channels} channels = {expected}, each frame on lines of its own",
-            lines.wrong_line or lines.last or lines.line,
-        )
-    return values.reshape(frames, channels)
+            raise lines.error(f"{message} poses of a joint")
+    count, rest = divmod(len(values), channels)
+    if rest:
+        message = f"found {rest} numbers, expected {channels} a frame, on lines of its own"
+        raise BvhError(lines.source, message, begin)
+    if not count or count < frames - 1:
+        raise lines.error(f"found {count} frames, expected {frames}")
+    return np.frombuffer(values).reshape(count, channels)
 
 
-@dataclass
-class _LineCounter:
-    """Counts of the numbers on each line, over consecutive blocks.
+def _numbers(lines: _Lines, line: str, missing: int) -> list[float]:
+    """Return the numbers of a line; BvhError for its first word that is none, or out of range.
 
-    line: number of the current line. count: numbers on it so far. before: numbers on the lines
-    before. filled: lines before that have numbers, last: the last of them. wrong_line: first line
-    of a wrong length. ends_inside_line: whether a line extends past the end of a frame.
+    missing: numbers that the file declares from the line on.
     """
-
-    frames: int
-    channels: int
-    line: int
-    count: int = 0
-    before: int = 0
-    filled: int = 0
-    last: int = 0
-    wrong_line: int = 0
-    ends_inside_line: bool = False
-
-    def add(self, rows: list[list[bytes]]) -> None:
-        """Count the words of a block by line, of which the first and last may be parts."""
-        first, *others = map(len, rows)
-        self.count += first
-        for count in others:
-            self.end_line()
-            self.line, self.count = self.line + 1, count
-
-    def end_line(self) -> None:
-        """End the current line."""
-        if not self.count:
-            return
-        if self.count != self.channels or self.filled == self.frames:
-            self.wrong_line = self.wrong_line or self.line
-        frame, begun = divmod(self.before, self.channels)
-        self.ends_inside_line |= begun + self.count > self.channels and frame < self.frames
-        self.before, self.filled, self.last = self.before + self.count, self.filled + 1, self.line
-
-
-def _parse_numbers(block: bytes, rows: list[list[bytes]]) -> Floats | None:
-    """Return the numbers of a block's words; None for a word that is none, or above MAX_NUMBER."""
-    if len(block.translate(None, NOT_IN_NUMBERS)) != len(block):
-        return None
-    try:
-        numbers = np.array([word for row in rows for word in row], dtype=float)
-    except ValueError:
-        return None
-    return numbers if np.all(np.abs(numbers) <= MAX_NUMBER) else None
-
-
-def _wrong_word(text: _TextCursor, rows: list[list[bytes]], missing: int) -> BvhError:
-    """Return the error for a block's first word that is not a number, or out of range.
-
-    missing: numbers that the file declares from the block on.
-    """
-    for line, row in enumerate(rows, text.line):
-        for content in row:
-            word = content.decode("latin-1")
-            is_number = NUMBER.fullmatch(word)
-            if not is_number or abs(float(word)) > MAX_NUMBER:
-                expected = (
-                    f", expected at most {MAX_NUMBER:g}" if is_number else ", expected a number"
-                )
-                if missing <= 0:
-                    expected = " after the last frame, expected nothing"
-                return BvhError(text.source, f"found {quote(decode(content))}{expected}", line)
-            missing -= 1
-    raise AssertionError("a block without a fault")
+    words, numbers = line.split(), list[float]()
+    with suppress(ValueError):
+        numbers = [] if line.strip(IN_NUMBERS) else [*map(float, words)]
+    if len(numbers) == len(words) and -MAX_NUMBER <= min(numbers, default=0.0):
+        if max(numbers, default=0.0) <= MAX_NUMBER:
+            return numbers
+    wrong = (w for w in words if not NUMBER.fullmatch(w) or abs(float(w)) > MAX_NUMBER)
+    word = next(wrong, line.strip(IN_NUMBERS))
+    expected = ", expected a number"
+    if missing <= 0:
+        expected = " after the last frame, expected nothing"
+    elif NUMBER.fullmatch(word):
+        expected = f", expected at most {MAX_NUMBER:g}"
+    raise lines.error(f"found {quote(decode(word.encode('latin-1')))}{expected}")
 
 
 def motion_file(file: BvhFile) -> MotionFile:
     """Return the file's joints and their motion in its own unit and axes.
 
-    A position channel replaces its component of the OFFSET; without a channel the OFFSET stays. The
-    rest pose is the file's OFFSETs with identity rotations.
+    A position channel replaces its component of the OFFSET; without a channel the OFFSET stays.
+    Those of all joints but the root are added where they are small beside the OFFSETs, with a note.
+    The rest pose is the file's OFFSETs with identity rotations.
     """
     frames, offsets = len(file.values), np.array([joint.offset for joint in file.joints])
     rotations = np.empty((frames, len(offsets), 4))
@@ -342,6 +265,14 @@ def motion_file(file: BvhFile) -> MotionFile:
             some = alike[start : start + step]
             angles = np.deg2rad(file.values[:, [turns for _, turns in some]])
             rotations[:, [index for index, _ in some]] = quat.from_euler(angles, axes)
+    notes = file.notes
+    moving = [
+        j for j, joint in enumerate(file.joints) if j and set(CHANNELS[:3]) <= {*joint.channels}
+    ]
+    usual = np.abs(translations[:, moving].mean(axis=0)).sum()
+    if usual < RELATIVE * np.abs(offsets[moving]).sum():
+        translations[:, moving] += offsets[moving]
+        notes += (f"positions of {len(moving)} joints are relative to their OFFSETs: added",)
     root = file.joints[0]
     x, y, z = (
         value if f"{axis}position" in root.channels else 0.0
@@ -362,6 +293,7 @@ def motion_file(file: BvhFile) -> MotionFile:
         file.rate,
         f"frame time {file.frame_time:g} s",
         added_offset=(x, y, z),
+        notes=notes,
     )
 
 

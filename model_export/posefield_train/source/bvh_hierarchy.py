@@ -222,6 +222,18 @@ def decode(content: bytes) -> str:
     return content.decode("latin-1")
 
 
+def foreign_encoding(start: bytes) -> str:
+    """Return the encoding or packing that the first bytes of a file tell; empty for plain text."""
+    marks = {
+        b"\xff\xfe": "text in UTF-16",
+        b"\xfe\xff": "text in UTF-16",
+        b"\x1f\x8b": "a file packed by gzip",
+        b"PK\x03\x04": "a zip archive",
+    }
+    found = next((name for mark, name in marks.items() if start.startswith(mark)), "")
+    return found or ("text in UTF-16" if start[:2].count(0) == 1 else "")
+
+
 def quote(text: str) -> str:
     """Quote text for a message, cut to 40 characters."""
     return repr(text if len(text) <= 40 else f"{text[:37]}...")

@@ -50,13 +50,8 @@ def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     return keep_joints(clip, kept)
 
 
-def has_all_parents(joints: Skeleton, kept: Sequence[int]) -> bool:
-    """Return True if the parent of every kept joint is kept too."""
-    return all(joints.parents[joint] in kept or joints.parents[joint] < 0 for joint in kept)
-
-
 def keep_joints(clip: Clip, kept: Sequence[int]) -> Clip:
-    """Return the clip of some of its joints, in order; `kept` must be closed under parents."""
+    """Return the clip of some of its joints, each with its parent before it in `kept`."""
     joints = clip.skeleton
     tips = [i for i, joint in enumerate(joints.tip_joints) if joint in kept]
     smaller = Skeleton(
@@ -86,19 +81,68 @@ def named_joints(recipe: Recipe) -> set[str]:
     return listed | event
 
 
-def expect_same_skeleton(rows: Sequence[ClipRow], clips: Sequence[Clip]) -> None:
-    """Raise RecipeError for a row whose clip has other joints than the first row\'s."""
+def in_common_order(rows: Sequence[ClipRow], clips: Sequence[Clip]) -> tuple[list[Clip], list[str]]:
+    """Return the clips with the joints in the order of the first one, and notes.
+
+    Joints are matched by their names. End sites that not all clips have are left out. Raises
+    RecipeError for a row whose clip has other joints than the first row's, or other parents.
+    """
     first = clips[0].skeleton
-    for row, clip in zip(rows, clips, strict=True):
-        if not clip.skeleton.same_tree(first):
+    found = [ordered_as(clip, first.names) for clip in clips]
+    for row, clip, same in zip(rows, clips, found, strict=True):
+        if same is None or not same.skeleton.same_tree(first):
             only = sorted(set(clip.skeleton.names) ^ set(first.names))
-            difference = "the same names in another order or hierarchy"
+            difference = "the same names with other parents"
             if only:
                 difference = f"only one of them has {only}"
             raise row.error(
                 f"{row.place} has other joints than {rows[0].place} of line {rows[0].line}: "
                 f"{difference}; of people, say skeleton.topology = 'roles'"
             )
+    return _with_common_sites([clip for clip in found if clip is not None])
+
+
+def ordered_as(clip: Clip, names: Sequence[str]) -> Clip | None:
+    """Return the clip of the named joints alone, in their order.
+
+    None for a clip that lacks one of them or its parent, or has a parent after its child.
+    """
+    own = clip.skeleton
+    if own.names == tuple(names):
+        return clip
+    if not set(names) <= set(own.names):
+        return None
+    kept = [own.names.index(name) for name in names]
+    is_tree = all(own.parents[j] in kept[:at] or own.parents[j] < 0 for at, j in enumerate(kept))
+    return keep_joints(clip, kept) if is_tree and kept[0] == 0 else None
+
+
+def _with_common_sites(clips: Sequence[Clip]) -> tuple[list[Clip], list[str]]:
+    """Return the clips of one tree with the end sites that all of them have, and a note."""
+    sites = [_numbered_sites(clip.skeleton) for clip in clips]
+    common = [site for site in sites[0] if all(site in other for other in sites)]
+    found = []
+    for clip, numbered in zip(clips, sites, strict=True):
+        own, kept = clip.skeleton, [numbered[site] for site in common]
+        tips = tuple(own.tip_joints[at] for at in kept)
+        skeleton = replace(own, tip_joints=tips, tip_offsets=own.tip_offsets[kept])
+        found.append(replace(clip, skeleton=skeleton))
+    names = clips[0].skeleton.names
+    lost = sorted({joint for own in sites for joint, _ in own.keys() - set(common)})
+    if not lost:
+        return found, []
+    listed = ", ".join(names[joint] for joint in lost[:MAX_LISTED])
+    return found, [f"end sites of {listed}: left out, since not all {len(clips)} clips have them"]
+
+
+def _numbered_sites(joints: Skeleton) -> dict[tuple[int, int], int]:
+    """Return the index of each end site by its joint and its number there."""
+    counts: Counter[int] = Counter()
+    found = {}
+    for at, joint in enumerate(joints.tip_joints):
+        found[joint, counts[joint]] = at
+        counts[joint] += 1
+    return found
 
 
 ENDING = "_end"

@@ -1,6 +1,6 @@
 """Clips from rows of the table: cut, in metres, Y up, with heading and origin removed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
@@ -39,6 +39,9 @@ from posefield_train.source.skeleton_checks import RigError
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
 MAX_POSES = 30_000_000
+LEAST_RATE, MOST_RATE = 1.0, 10_000.0
+"""Bounds of a model's frames a second."""
+TINY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -77,8 +80,7 @@ def ingest(
     """Return the examples of a recipe, and notes on assumptions and corrections.
 
     known: files that were read before, which are not read again. Raises RecipeError for an invalid
-    row, MotionFileError for a file that cannot be read or that states another unit, up axis or
-    rate.
+    row, MotionFileError for a file that cannot be read.
     """
     rows = clip_table.read(recipe, folder)
     alone = recipe.curves is not None and recipe.curves.alone
@@ -111,7 +113,8 @@ def ingest(
     left = list(reversed(shared))
     del shared, clips
     clips = [clip_joints.drop_joints(left.pop(), recipe, row) for row in rows]
-    clip_joints.expect_same_skeleton(rows, clips)
+    clips, joint_notes = clip_joints.in_common_order(rows, clips)
+    notes += joint_notes
     motion, joints = recipe.motion, {role: recipe.joint_with(role) for role in get_args(Role)}
     directions = {"left", "forward", "step_length"}
     try:
@@ -159,7 +162,7 @@ def read_files(
     """Return the motions of rows by their names, each content read once.
 
     Raises MotionFileError for a file that cannot be read and RecipeError for more than MAX_POSES in
-    all.
+    all. A file that states another unit or up axis than the source is overruled, with a note.
     """
     known, files = known or MotionFiles(), dict[str, MotionFile]()
     poses = 0
@@ -172,7 +175,30 @@ def read_files(
                 f"found {poses} poses of a joint in the files up to {row.place}, expected at most "
                 f"{MAX_POSES}"
             )
-    return files
+    return {name: _as_stated(file, source, files.values()) for name, file in files.items()}
+
+
+def _as_stated(file: MotionFile, source: Source, others: Collection[MotionFile]) -> MotionFile:
+    """Return a file with the unit and up axis of the source, or its own where those fit better.
+
+    Beside files that state no unit, whose unit the source says, one that states its own keeps it if
+    its bones then are nearer to the length of theirs.
+    """
+    silent = [_bone_length(other) for other in others if other.metres_per_unit is None]
+    unit, up, stated = source.metres_per_unit, source.up, file.metres_per_unit
+    if stated is None or not silent:
+        return motion_file.overrule(file, metres_per_unit=unit, up=up)
+    usual, own = unit * float(np.median(silent)), _bone_length(file)
+    apart = [abs(np.log(max(own * each, TINY) / max(usual, TINY))) for each in (stated, unit)]
+    if apart[0] >= apart[1]:
+        return motion_file.overrule(file, metres_per_unit=unit, up=file.up or up)
+    note = f"states a unit of {stated:g} m, kept: with it the bones are as long as those of others"
+    return replace(file, up=file.up or up, notes=(*file.notes, note))
+
+
+def _bone_length(file: MotionFile) -> float:
+    """Return the total length of a file's bones, in its unit."""
+    return float(np.linalg.norm(file.skeleton.offsets[1:], axis=-1).sum())
 
 
 @dataclass(frozen=True)
@@ -225,14 +251,17 @@ def _example(
 def clip_of_file(file: MotionFile, source: Source) -> Clip:
     """Return the clip of all frames of a file.
 
-    By default position channels replace the root's OFFSET.
+    By default position channels replace the root's OFFSET. Raises MotionFileError for a rate that a
+    model cannot have.
     """
+    if file.rate is not None and not LEAST_RATE <= file.rate <= MOST_RATE:
+        _, doubt = motion_file.doubted_rate(file.rate)
+        raise file.error(f"{file.evidence}, {file.rate:.3g} frames a second: {doubt}")
     return motion_file.to_clip(
         file,
-        metres_per_unit=source.metres_per_unit,
-        up=source.up,
+        metres_per_unit=file.metres_per_unit or source.metres_per_unit,
+        up=file.up or source.up,
         root_offset=source.root_offset or "replace",
-        rate=source.rate,
     )
 
 
@@ -304,7 +333,9 @@ def reader_notes(files: Mapping[str, MotionFile]) -> list[str]:
         for note in file.notes:
             found.setdefault(note, []).append(place)
     return [
-        note if len(places) == 1 else f"{len(places)} of {len(files)} files: {note}"
+        (note if len(places) == 1 else f"{len(places)} of {len(files)} files: {note}")
+        if len(places) > 1 or note.startswith((places[0], Path(places[0]).name))
+        else f"{Path(places[0]).name}: {note}"
         for note, places in found.items()
     ]
 

@@ -1,6 +1,7 @@
 """Motion of a file in its own unit and axes, its frame rate, and its conversion to a clip."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,13 @@ from posefield.motion.skeleton import Skeleton
 BROADCAST_RATES = tuple(1000.0 * base / 1001.0 for base in (24, 30, 60, 120))
 RATE_TOLERANCE = 1e-4
 """Relative error of a frame time cut to few digits, such as .008333 or 0.0333333."""
+USUAL_RATES = (
+    *(10.0, 12.0, 15.0, 20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 75.0),
+    *(90.0, 100.0, 120.0, 144.0, 200.0, 240.0, 250.0),
+)
+"""Frames a second of cameras, games and captures."""
+LEAST_PLAUSIBLE, MOST_PLAUSIBLE = 5.0, 1000.0
+"""Frames a second beyond which a stated rate is doubted."""
 
 
 def snapped_rate(frame_time: float) -> float:
@@ -24,6 +32,49 @@ def snapped_rate(frame_time: float) -> float:
     rate = 1.0 / frame_time
     nearest = min((max(1.0, float(round(rate))), *BROADCAST_RATES), key=lambda c: abs(c - rate))
     return nearest if abs(nearest - rate) <= RATE_TOLERANCE * nearest else rate
+
+
+def rate_of_digits(frame_time: str) -> tuple[float, tuple[str, ...]]:
+    """Return frames per second of a frame time as written, s, and a note on digits cut off.
+
+    A time such as 0.033 stands for all that are rounded or cut to its digits: of the usual rates
+    among them the nearest is taken, whole ones first.
+    """
+    written = Decimal(frame_time)
+    exact, digit = (
+        snapped_rate(float(written)),
+        float(Decimal(1).scaleb(int(written.as_tuple()[2]))),
+    )
+    least, most = 1.0 / (float(written) + digit), 1.0 / max(float(written) - 0.5 * digit, 1e-9)
+    if exact in (*USUAL_RATES, *BROADCAST_RATES) or most / least < 1.0 + RATE_TOLERANCE:
+        return exact, ()
+    for rates in (USUAL_RATES, BROADCAST_RATES):
+        within = [rate for rate in rates if least < rate <= most]
+        if within:
+            rate = min(within, key=lambda rate: abs(rate - exact))
+            return rate, (
+                f"frame time {frame_time} s, cut to its digits, is taken as {rate:g} frames a "
+                f"second rather than {exact:.5g}; source.rate or --rate overrules it",
+            )
+    return exact, ()
+
+
+def doubted_rate(rate: float) -> tuple[float | None, str]:
+    """Return the rate that is likely meant by an implausible one, and the doubt; "" for none.
+
+    A frame time may be given in milliseconds, or the rate in its place.
+    """
+    if LEAST_PLAUSIBLE <= rate <= MOST_PLAUSIBLE:
+        return None, ""
+    time = 1.0 / rate
+    meant, reading = None, "no usual rate"
+    if time > 20.5 and any(abs(time - usual) < 0.005 * usual for usual in USUAL_RATES):
+        meant, reading = time, f"{time:g} looks like the rate itself"
+    elif LEAST_PLAUSIBLE <= 1000.0 / time <= USUAL_RATES[-1]:
+        meant = rate_of_digits(f"{time / 1000.0:.6g}")[0]
+        reading = f"{time:g} looks like milliseconds, {meant:g} frames a second"
+    doubt = f"a frame every {time:g} s is implausible: {reading}; say source.rate or --rate"
+    return meant, doubt
 
 
 Vector = tuple[float, float, float]
@@ -150,20 +201,46 @@ SAME = 1e-4
 """Largest relative difference of two numbers that state the same unit or rate."""
 
 
+def overrule(
+    file: MotionFile,
+    *,
+    rate: float | None = None,
+    metres_per_unit: float | None = None,
+    up: UpAxis | None = None,
+) -> MotionFile:
+    """Return a file with what a user states of it, and a note on each that it states otherwise."""
+    notes = list(file.notes)
+    if rate is not None:
+        if file.rate is not None and abs(file.rate - rate) > SAME * rate:
+            notes.append(
+                f"states {file.rate:.5g} frames a second ({file.evidence}), overruled: read at "
+                f"{rate:g}"
+            )
+        file = replace(file, rate=rate)
+    if metres_per_unit is not None:
+        stated = file.metres_per_unit
+        if stated is not None and abs(stated - metres_per_unit) > SAME * stated:
+            notes.append(f"states a unit of {stated:g} m, overruled: read as {metres_per_unit:g} m")
+        file = replace(file, metres_per_unit=metres_per_unit)
+    if up is not None:
+        if file.up is not None and file.up != up:
+            notes.append(f"states {file.up} as its up axis, overruled: read as {up}")
+        file = replace(file, up=up)
+    return replace(file, notes=tuple(notes))
+
+
 def to_clip(
     file: MotionFile,
     *,
     metres_per_unit: float,
     up: UpAxis,
     root_offset: RootOffset = "replace",
-    rate: float | None = None,
 ) -> Clip:
     """Return the file's motion in metres with Y up.
 
     up="z" turns the basis of every offset and local rotation, (x, y, z) to (x, z, -y), so the rest
     pose stands upright. root_offset="add" adds the root's OFFSET to its path, as three.js does.
-    rate: frames a second, needed for a file without one. Raises MotionFileError if the file states
-    otherwise, ValueError for an invalid argument.
+    Raises MotionFileError for a file without a rate, ValueError for an invalid argument.
     """
     if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
         raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
@@ -171,7 +248,6 @@ def to_clip(
         raise ValueError(
             f"up {up!r}, root_offset {root_offset!r}; expected 'y' or 'z', 'replace' or 'add'"
         )
-    check_stated(file, metres_per_unit, up, rate)
     rotations, translations = file.rotations, file.translations
     if root_offset == "add":
         translations = translations.copy()
@@ -179,27 +255,11 @@ def to_clip(
     if up != "y":
         rotations = np.concatenate([rotations[..., :1], to_y_up(rotations[..., 1:], up)], axis=-1)
     lengths = metres_per_unit * to_y_up(translations, up)
-    found = rate if file.rate is None else file.rate
-    if found is None:
+    if file.rate is None:
         raise file.error(
             f"{file.format} files state no frame rate, expected source.rate, frames a second"
         )
-    return Clip(_upright(file.skeleton, metres_per_unit, up), rotations, lengths, found)
-
-
-def check_stated(file: MotionFile, metres_per_unit: float, up: UpAxis, rate: float | None) -> None:
-    """Raise MotionFileError if a file states another unit, up axis or rate than the recipe."""
-    stated = file.metres_per_unit
-    if stated is not None and abs(stated - metres_per_unit) > SAME * stated:
-        raise file.error(
-            f"states a unit of {stated:g} m, expected source.metres_per_unit {metres_per_unit:g}"
-        )
-    if file.up is not None and file.up != up:
-        raise file.error(f"states {file.up} as its up axis, expected source.up {up!r}")
-    if rate is not None and file.rate is not None and abs(file.rate - rate) > SAME * rate:
-        raise file.error(
-            f"has {file.rate:g} frames a second ({file.evidence}), expected source.rate {rate:g}"
-        )
+    return Clip(_upright(file.skeleton, metres_per_unit, up), rotations, lengths, file.rate)
 
 
 def to_y_up(vectors: Floats, up: UpAxis) -> Floats:

@@ -5,13 +5,19 @@ import shutil
 import tempfile
 from collections import OrderedDict
 from collections.abc import Callable, Container
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from posefield.common.errors import AcclaimError, FileError, MotionFileError
 from posefield_train.source import acclaim, bvh, data_folder
 from posefield_train.source.data_folder import FileLocation
-from posefield_train.source.motion_file import AS_STATED, MotionFile, ReadOptions
+from posefield_train.source.motion_file import (
+    AS_STATED,
+    MotionFile,
+    ReadOptions,
+    doubted_rate,
+    overrule,
+)
 
 MAX_GLTF_BYTES = 1_000_000_000
 """Limit of a glTF file or buffer: the project's own take 0.5 MB for a minute."""
@@ -147,7 +153,9 @@ def read(place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
             f"found animation {options.animation!r}, but {own.name} files hold one motion: "
             "expected an empty cell",
         )
-    return own.read(place, options)
+    file = overrule(own.read(place, options), rate=options.rate)
+    _, doubt = doubted_rate(file.rate) if file.rate else (None, "")
+    return replace(file, notes=(*file.notes, doubt)) if doubt else file
 
 
 def reason(fault: FileError, place: Path) -> str:

@@ -18,7 +18,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 class Source(RecipePart):
     """Unit, axes and rate of the motion files.
 
-    A file that states another one, as USD and glTF do, is an error.
+    They overrule what a file states, as USD and glTF do, with a note.
     """
 
     metres_per_unit: Positive = Field(description="length of one unit of the files, m")
@@ -31,8 +31,8 @@ class Source(RecipePart):
     rate: Annotated[float, Field(ge=1, le=10_000, allow_inf_nan=False)] | None = Field(
         default=None,
         description="frames a second: needed for AMC files, which state none, and for USD and glTF "
-        "files whose keys are not one a frame: their curves are sampled at it; a BVH file of "
-        "another rate is an error",
+        "files whose keys are not one a frame: their curves are sampled at it; it overrules the "
+        "frame time of BVH files, with a note",
     )
 
 
