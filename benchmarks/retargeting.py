@@ -174,7 +174,7 @@ def main(arguments: Sequence[str]) -> None:
         for name, body in bodies.items():
             rig = rig_of(body, Path(folder), name)
             for kind, motions in (("shipped walk", shipped), ("CMU walks", captured)):
-                found = [retarget(own.clip, rig, own.roles).report for own in motions]
+                found = [retarget(own.clip, rig, own.roles)[1] for own in motions]
                 rows += figures(f"{kind} onto {name}", found)
         rows.append(spent(shipped[2], rig))
     print(table(rows))

@@ -162,15 +162,16 @@ def test_value_clips_are_followed(path, tmp_path):
     assert len(found) == FRAMES and np.abs(places(found)[:, 1] - hand()).max() < 1e-6
 
 
-def second_animation(made):
+def two_unbound(made):
     usd_files.animation(made, "/Root/Other", CODES, swing(X), bind_to=None)
+    made.GetPrimAtPath("/Root/Skel").RemoveProperty("skel:animationSource")
 
 
-def test_one_of_several_animations_is_chosen_by_name_or_path(swinging):
+def test_one_of_several_animations_is_chosen_by_name_path_or_number(swinging):
     with pytest.raises(MotionFileError, match="2 animations \\(/Root/Anim, /Root/Other\\)"):
-        swinging(second_animation)
-    for name in ("Other", "/Root/Other"):
-        found = swinging(second_animation, options={"animation": name})
+        swinging(two_unbound)
+    for name in ("Other", "/Root/Other", "2"):
+        found = swinging(two_unbound, options={"animation": name})
         assert np.abs(places(found)[:, 1] - hand(X)).max() < 1e-6
 
 

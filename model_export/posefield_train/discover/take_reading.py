@@ -13,8 +13,7 @@ from posefield.common.array_shapes import Positions
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
-from posefield.rigs.rig import NEEDED
-from posefield.roles.joint_recognition import RoleGuess
+from posefield.roles.joint_recognition import NEEDED, RoleGuess
 from posefield_train.probe import proposals
 from posefield_train.probe.proposals import ADULT_LEG, MOST_WHOLE, OTHER_UNIT, Proposal
 from posefield_train.source import frame_faults, motion_file, motion_readers, take_groups

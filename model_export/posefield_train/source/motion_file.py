@@ -1,6 +1,7 @@
 """Motion of a file in its own unit and axes, its frame rate, and its conversion to a clip."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Literal
 
@@ -90,7 +91,7 @@ class MotionFile:
     second; None if neither file nor recipe states it. evidence: how the rate is known.
     metres_per_unit, up: as the file states them; None if it does not. added_offset: what
     source.root_offset = "add" adds to the root's path; zero for other formats than BVH. notes: on
-    what the reader assumed.
+    what the reader assumed and left out. curves: weights (F,) of blend shapes by name.
     """
 
     source: str
@@ -104,6 +105,7 @@ class MotionFile:
     up: UpAxis | None = None
     added_offset: Vector = ORIGIN
     notes: tuple[str, ...] = ()
+    curves: Mapping[str, Floats] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -131,6 +133,22 @@ class ReadOptions:
 
 AS_STATED = ReadOptions()
 """Nothing told: a file is read by what it states."""
+
+
+def choice(names: Sequence[str], wanted: str) -> int | None:
+    """Return the index of the one of some names that is wanted, by name or number from 1."""
+    if names.count(wanted) == 1:
+        return names.index(wanted)
+    number = int(wanted) if wanted.isdecimal() else 0
+    return number - 1 if 1 <= number <= len(names) else None
+
+
+def curve_notes(curves: Mapping[str, Floats]) -> list[str]:
+    """Return a note on weights of blend shapes, which are no motion of joints."""
+    listed = ", ".join(list(curves)[:20])
+    return [f"{len(curves)} curves ({listed}) left out: [curves] of a recipe reads them"][
+        : len(curves)
+    ]
 
 
 LEAST_RATE = 10.0

@@ -1,5 +1,6 @@
 """Motion of a USD stage: its skeleton, the animation to read, and its unit, up axis and rate."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,12 +8,10 @@ from typing import Any
 import numpy as np
 from pxr import UsdGeom, UsdSkel
 
-from posefield.common.array_shapes import Positions, Rotations
 from posefield.common.units import Floats
-from posefield.motion import quat
 from posefield.rigs import rest_joints, usd_rig
-from posefield.rigs.rest_joints import MAX_JOINTS, PosedJoints
-from posefield.rigs.usd_rig import SkelJoints, SkelStage
+from posefield.rigs.rest_joints import MAX_JOINTS, JointTree, Transform
+from posefield.rigs.usd_rig import SHOWN, SkelJoints, SkelStage
 from posefield_train.source import motion_file
 from posefield_train.source.motion_file import MotionFile, ReadOptions, UnevenKeys
 
@@ -39,73 +38,80 @@ class SkelMotion(SkelJoints):
                 codes |= set(above.GetTimeSamples())
         return np.array(sorted(codes), float)
 
-    def posed_joints(self, codes: Floats) -> PosedJoints:
-        """Return rest pose and motion at time codes (F,), the root's in the stage's world."""
-        names, parents = self.tree()
-        rest_turns, rest_places = self.rest(parents)
-        rotations, translations, scales = self._samples(codes, len(names))
-        moving = bool(self.moving_parents())
-        outer = self.world(codes if moving else codes[:1])
-        turns, places, sizes = (np.broadcast_to(own, (len(codes), own.shape[-1])) for own in outer)
-        translations[:, 0] = places + quat.rotate(turns, sizes * translations[:, 0])
-        rotations[:, 0] = quat.mul(turns, rotations[:, 0])
-        scales[:, 0] *= sizes
-        rest_places[0] = places[0] + quat.rotate(turns[0], sizes[0] * rest_places[0])
-        rest_turns[0] = quat.mul(turns[0], rest_turns[0])
-        return PosedJoints(
-            self.source,
-            names,
-            parents,
-            rest_turns,
-            rest_places,
-            rotations,
-            translations,
-            scales,
-        )
+    def posed_joints(
+        self, codes: Sequence[float]
+    ) -> tuple[JointTree, Transform, Transform, list[str]]:
+        """Return joints at rest and at time codes (F,), the root in the stage's world; notes."""
+        tree = self.tree()
+        world = self.world(codes if self.moving_parents() else codes[:1])
+        first = Transform(*(part[0] for part in world))
+        frame = None
+        if not (self.query.HasRestPose() or self.query.HasBindPose()):
+            frame = Transform(*(part[0] for part in self._samples(codes[:1], None)[0]))
+        local, rest, notes = self.rest(tree.parents, first, frame)
+        motion, lacking = self._samples(codes, local)
+        said = f"{self.path} has no {' and '.join(lacking)}: those at rest were taken"
+        notes += [said] if lacking else []
+        return tree, rest.root_inside(first), motion.root_inside(world), notes
 
-    def _samples(self, codes: Floats, joints: int) -> tuple[Rotations, Positions, Positions]:
-        """Return rotations, translations and scales; joints that it does not name are at rest."""
+    def curves(self, codes: Sequence[float]) -> Mapping[str, Floats]:
+        """Return the weights (F,) of blend shapes by name."""
+        prim = UsdSkel.Animation(self.animation.GetPrim())
+        names = [str(name) for name in prim.GetBlendShapesAttr().Get() or ()]
+        values = [prim.GetBlendShapeWeightsAttr().Get(code) for code in codes]
+        if not names or any(own is None or len(own) != len(names) for own in values):
+            return {}
+        return dict(zip(names, np.array(values, float).T, strict=True))
+
+    def _samples(
+        self, codes: Sequence[float], still: Transform | None
+    ) -> tuple[Transform, list[str]]:
+        """Return transforms (F, J, ...) at time codes, and the parts that the animation lacks.
+
+        still: of joints and parts that it does not have.
+        """
         order = [str(path) for path in self.query.GetJointOrder()]
         own = [str(path) for path in self.animation.GetJointOrder()]
         known = [(order.index(path), column) for column, path in enumerate(own) if path in order]
         if not known:
-            raise self.error(f"{self.path} moves no joint of {self.prim.GetPath()}")
+            raise self.opened.error(f"{self.path} moves no joint of {self.prim.GetPath()}")
         targets, columns = map(list, zip(*known, strict=True))
-        parts = [self._components(code, len(own)) for code in codes.tolist()]
-        moved = [np.stack(part) for part in zip(*parts, strict=True)]
-        rest = np.array(self.query.ComputeJointLocalTransforms(0.0, atRest=True), float)
-        still = [np.stack(part) for part in zip(*map(self.decomposed, rest), strict=True)]
-        full = []
-        for part, one in zip(moved, still, strict=True):
-            values = np.tile(one, (len(codes), 1, 1))
-            values[:, targets] = part[:, columns]
-            full.append(values)
-        rotations, translations, scales = full
-        return rotations, translations, scales
-
-    def _components(self, code: float, joints: int) -> tuple[Floats, Floats, Floats]:
-        """Return rotations w x y z, translations and scales of the animation at a time code."""
-        try:
-            found = self.animation.ComputeJointLocalTransformComponents(code)
-        except RuntimeError as fault:
-            raise self.error(f"{self.path} cannot be read at time code {code:g}") from fault
-        places, turns, scales = (np.array(part, float) for part in found)
-        if len(places) != joints or len(turns) != joints or len(scales) != joints:
-            raise self.error(
-                f"{self.path} has {len(places)} translations, {len(turns)} rotations and "
-                f"{len(scales)} scales at time code {code:g}, expected {joints} of each"
-            )
-        turns = turns[:, [3, 0, 1, 2]]
-        lengths = np.linalg.norm(turns, axis=-1, keepdims=True)
-        if not np.all(np.isfinite(places)) or not np.all(lengths > 0.5):
-            raise self.error(f"{self.path} has broken numbers at time code {code:g}")
-        return turns / lengths, places, scales
+        prim, parts, lacking = UsdSkel.Animation(self.animation.GetPrim()), [], []
+        attributes = {
+            "rotations": prim.GetRotationsAttr(),
+            "translations": prim.GetTranslationsAttr(),
+            "scales": prim.GetScalesAttr(),
+        }
+        for index, (name, attribute) in enumerate(attributes.items()):
+            values = [attribute.Get(code) for code in codes]
+            is_missing = values[0] is None
+            if still is None and (is_missing or len(known) < len(order)):
+                raise self.opened.error(
+                    f"{self.prim.GetPath()} has neither restTransforms nor bindTransforms, "
+                    f"expected one of them: {self.path} leaves out joints or {name}"
+                )
+            width = 4 if name == "rotations" else 3
+            full = np.zeros((len(codes), len(order), width))
+            if still is not None:
+                full[:] = still[index]
+            lacking += [name] if is_missing else []
+            for code, row, value in zip(codes, full, () if is_missing else values, strict=False):
+                if len(value) != len(own):
+                    raise self.opened.error(
+                        f"{self.path} has {len(value)} {name} at time code {code:g}, expected "
+                        f"{len(own)}, one for each joint"
+                    )
+                own_values = np.array(value, float)[columns]
+                row[targets] = own_values[:, [3, 0, 1, 2]] if width == 4 else own_values
+            parts.append(full)
+        lengths = np.linalg.norm(parts[0], axis=-1, keepdims=True)
+        if not np.all(np.isfinite(parts[1])) or not np.all(lengths > 0.5):
+            raise self.opened.error(f"{self.path} has broken numbers")
+        return Transform(parts[0] / lengths, *parts[1:]).unmirrored(), lacking
 
 
 MAX_POSES = 10_000_000
 """Limit of frames times joints, as for BVH."""
-SHOWN = 20
-"""Animations that a message lists."""
 
 
 def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
@@ -123,9 +129,10 @@ def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
 
 def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     opened = usd_rig.open_stage(path, source)
-    motion = _chosen(opened, options.animation)
+    motion, notes = _chosen(opened, options.animation)
+    notes += opened.notes(motion.prim, motion.animation.GetPrim())
     codes = motion.sample_codes()
-    pace, notes = _codes_per_second(opened)
+    pace = _codes_per_second(opened, notes)
     if not len(codes):
         raise opened.error(f"{motion.path} has no samples over time, expected an animation")
     try:
@@ -139,27 +146,35 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
             f"joints and {MAX_POSES} poses of a joint"
         )
     # The samples themselves, where the rate is theirs.
-    exact = codes if options.rate is None else found.times * pace
-    plain = rest_joints.plain_motion(motion.posed_joints(exact))
-    stage = opened.stage
+    exact = (codes if options.rate is None else found.times * pace).tolist()
+    tree, rest, moved, said = motion.posed_joints(exact)
+    skeleton, rotations, places, more = rest_joints.plain_motion(source, tree, rest, moved)
+    curves, stage = motion.curves(exact), opened.stage
+    begin, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    if stage.HasAuthoredTimeCodeRange() and (codes[0] < begin or codes[-1] > end):
+        said.append(
+            f"the stage states the time codes {begin:g} to {end:g}: all samples, {codes[0]:g} to "
+            f"{codes[-1]:g}, were read"
+        )
     has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
     is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
     return MotionFile(
         source,
         "USD",
-        plain.skeleton,
-        plain.rotations,
-        plain.translations,
+        skeleton,
+        rotations,
+        places,
         found.rate,
         found.evidence,
         metres_per_unit=float(UsdGeom.GetStageMetersPerUnit(stage)) if has_unit else None,
         up=("z" if is_z_up else "y") if stage.HasAuthoredMetadata("upAxis") else None,
-        notes=notes,
+        notes=(*notes, *said, *more, *motion_file.curve_notes(curves)),
+        curves=curves,
     )
 
 
-def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
-    """Return the skeleton with the animation that is wanted, or with its only one."""
+def _chosen(opened: SkelStage, wanted: str | None) -> tuple[SkelMotion, list[str]]:
+    """Return the skeleton with the animation that is wanted, or that it is bound to; and notes."""
     skeletons = opened.prims(UsdSkel.Skeleton)
     animations = opened.prims(UsdSkel.Animation)
     if not skeletons:
@@ -169,38 +184,52 @@ def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
         raise opened.error(
             f"found the skeleton {skeletons[0].GetPath()} without a SkelAnimation, expected one"
         )
-    animation = _animation(opened, animations, wanted)
-    bound = [prim for prim in skeletons if _bound_animation(opened, prim) == animation.GetPath()]
-    if len(bound) != 1 and len(skeletons) > 1:
-        paths = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN])
+    bound = {prim: _bound_animation(opened, prim) for prim in skeletons}
+    found = _animations(opened, animations, wanted)
+    if len(found) > 1:
+        found = [own for own in found if own.GetPath() in bound.values()] or found
+    if len(found) > 1:
+        found = [own for own in found if _moves(opened, own)] or found
+    paths = [own.GetPath() for own in found]
+    owners = [prim for prim in skeletons if bound[prim] in paths]
+    if len(found) > 1 and not owners:
+        listed = ", ".join(map(str, paths[:SHOWN]))
         raise opened.error(
-            f"found {len(skeletons)} skeletons ({paths}), expected one that is bound to "
-            f"{animation.GetPath()}: export each character alone"
+            f"found {len(found)} animations ({listed}), expected one: export each to a file of its "
+            "own, or give path or number from 1 of one in the column clips.animation"
         )
-    prim = (bound or skeletons)[0]
-    query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(prim))
-    if not query:
-        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {usd_rig.fault_of(prim)}")
+    tokens = UsdSkel.Animation(found[0]).GetJointsAttr().Get() or ()
+    named = {str(token).rpartition("/")[2] for token in tokens}
+    prim, notes = opened.skeleton(owners or skeletons, set() if owners else named)
+    animation = next((own for own in found if own.GetPath() == bound[prim]), found[0])
+    others = [str(own.GetPath()) for own in animations if own != animation]
+    if wanted is None and others:
+        said = f"{animation.GetPath()} moves {prim.GetPath()}: {', '.join(others[:SHOWN])} left out"
+        notes.append(said)
     own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
     if not own:
         raise opened.error(f"{animation.GetPath()} names no joints, expected those of a skeleton")
-    return SkelMotion(opened.source, prim, query, own)
+    return SkelMotion(opened, prim, opened.query(prim), own), notes
 
 
-def _animation(opened: SkelStage, animations: list[Any], wanted: str | None) -> Any:
-    """Return the animation with a path or name, or the only one."""
-    paths = ", ".join(str(prim.GetPath()) for prim in animations[:SHOWN])
+def _animations(opened: SkelStage, animations: list[Any], wanted: str | None) -> list[Any]:
+    """Return the animation with a path, name or number from 1, or all."""
     if wanted is None:
-        if len(animations) > 1:
-            raise opened.error(
-                f"found {len(animations)} animations ({paths}), expected one: export each to a "
-                "file of its own, or name the path of one in the column clips.animation"
-            )
-        return animations[0]
-    found = [prim for prim in animations if wanted in (str(prim.GetPath()), prim.GetName())]
-    if len(found) != 1:
-        raise opened.error(f"found the animations {paths}, expected one {wanted!r}")
-    return found[0]
+        return animations
+    paths = [str(prim.GetPath()) for prim in animations]
+    is_path = wanted.startswith("/")
+    names = paths if is_path else [prim.GetName() for prim in animations]
+    chosen = motion_file.choice(names, wanted)
+    if chosen is None:
+        listed = ", ".join(paths[:SHOWN])
+        raise opened.error(f"found the animations {listed}, expected one {wanted!r}, or a number")
+    return [animations[chosen]]
+
+
+def _moves(opened: SkelStage, animation: Any) -> bool:
+    """Return whether an animation has samples over time."""
+    query = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
+    return bool(query) and len(query.GetJointTransformTimeSamples()) > 1
 
 
 def _bound_animation(opened: SkelStage, skeleton: Any) -> Any:
@@ -210,13 +239,12 @@ def _bound_animation(opened: SkelStage, skeleton: Any) -> Any:
     return own.GetPrim().GetPath() if own else None
 
 
-def _codes_per_second(opened: SkelStage) -> tuple[float, tuple[str, ...]]:
-    """Return the time codes per second, and a note if it is the format's default."""
+def _codes_per_second(opened: SkelStage, notes: list[str]) -> float:
+    """Return the time codes per second, and add a note if it is the format's default."""
     stage = opened.stage
     pace = float(stage.GetTimeCodesPerSecond())
     if not 0.0 < pace < 1e6:
         raise opened.error(f"states {pace:g} time codes a second, expected a positive number")
-    authored = any(map(stage.HasAuthoredMetadata, ("timeCodesPerSecond", "framesPerSecond")))
-    if authored:
-        return pace, ()
-    return pace, (f"{opened.source}: states no timeCodesPerSecond, {pace:g} is USD's default",)
+    if not any(map(stage.HasAuthoredMetadata, ("timeCodesPerSecond", "framesPerSecond"))):
+        notes.append(f"{opened.source}: states no timeCodesPerSecond, {pace:g} is USD's default")
+    return pace

@@ -19,7 +19,7 @@ from posefield.question.performance_question import PerformanceLayout, Performan
 from posefield.question.performance_report import HeldJoint, PerformanceAnswer, ScriptWarning
 from posefield.question.results import ClipAnswer, FeetResult, SampledClip, StanceResult
 from posefield.retarget import role_map
-from posefield.retarget.retargeting import HandGoal, Retargeted, RetargetSettings, retarget
+from posefield.retarget.retargeting import HandGoal, Travel, retarget
 
 ARM = ("UpperArm", "LowerArm", "Hand")
 CLOSED = 1e-3
@@ -53,15 +53,14 @@ class Delivery:
         """
         trust = answer.trust
         hands, others = _hand_goals(answer.clip, question.targets, self._hands(roles))
-        settings = RetargetSettings(
-            _stances(trust.feet, question), hands, "kept" if question.targets else "scaled"
-        )
-        made, facts, told = self._retargeted(answer.clip, roles, settings)
+        travel: Travel = "kept" if question.targets else "scaled"
+        stances = _stances(trust.feet, question)
+        clip, facts, told = self._retargeted(answer.clip, roles, stances, hands, travel)
         if question.loop:
-            others += _loop_note(made.clip)
-        notes = (*told, *others, *self.character.target.notes(self.form, made.clip))
+            others += _loop_note(clip)
+        notes = (*told, *others, *self.character.target.notes(self.form, clip))
         told_trust = replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
-        return ClipAnswer(made.clip, told_trust)
+        return ClipAnswer(clip, told_trust)
 
     def performance(self, answer: PerformanceAnswer, roles: Mapping[str, str]) -> PerformanceAnswer:
         """Return a performance as one of the character, with the retargeting in its report.
@@ -72,15 +71,13 @@ class Delivery:
         report = answer.trust
         stances = None if report.feet is None else report.feet.stances
         hands, others = _held_hands(answer.held, self._hands(roles))
-        made, facts, told = self._retargeted(
-            answer.clip, roles, RetargetSettings(stances, hands, "kept")
-        )
-        notes = (*told, *others, *self.character.target.notes(self.form, made.clip))
+        clip, facts, told = self._retargeted(answer.clip, roles, stances, hands, "kept")
+        notes = (*told, *others, *self.character.target.notes(self.form, clip))
         warnings = tuple(ScriptWarning(POINTER, sentence) for sentence in notes)
         own = replace(
             report, script_warnings=(*report.script_warnings, *warnings), retargeting=facts
         )
-        return PerformanceAnswer(made.clip, own)
+        return PerformanceAnswer(clip, own)
 
     def check(
         self,
@@ -113,14 +110,19 @@ class Delivery:
         }
 
     def _retargeted(
-        self, clip: Clip, roles: Mapping[str, str], settings: RetargetSettings
-    ) -> tuple[Retargeted, dict[str, Any], tuple[str, ...]]:
+        self,
+        clip: Clip,
+        roles: Mapping[str, str],
+        stances: Sequence[StanceResult] | None,
+        hands: Sequence[HandGoal],
+        travel: Travel,
+    ) -> tuple[Clip, dict[str, Any], tuple[str, ...]]:
         """Return the motion of the character, the facts of the report, and its warnings."""
-        made = retarget(clip, self.character.rig, roles, settings)
         character = self.character
-        facts: dict[str, Any] = {"character": character.name, "file": character.target.file}
-        for name, value in made.report.facts().items():
-            facts[name] = list(value) if isinstance(value, tuple) else value
+        made, report = retarget(
+            clip, character.rig, roles, stances=stances, hands=hands, travel=travel
+        )
+        facts = {"character": character.name, "file": character.target.file, **report.facts()}
         return made, facts, tuple(facts.pop("warnings"))
 
 

@@ -1,5 +1,6 @@
 """Decoding of queries from JSON bodies with msgspec; its errors are converted to FormError."""
 
+import codecs
 import itertools
 import json
 import sys
@@ -25,8 +26,10 @@ _ANY_KEY = "..."
 def decode_question(form: type[Question], content: bytes) -> Question:
     """Return the query of a JSON body.
 
-    Raises FormError for an invalid body, and the errors of the query's own checks.
+    A byte order mark, as of Windows editors, is left out. Raises FormError for an invalid body, and
+    the errors of the query's own checks.
     """
+    content = content.removeprefix(codecs.BOM_UTF8)
     try:
         found: Question = _decoder(cast(Any, form)).decode(content)
         return found

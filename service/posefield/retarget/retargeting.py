@@ -43,22 +43,6 @@ class HandGoal:
 
 
 @dataclass(frozen=True)
-class RetargetSettings:
-    """Settings of retargeting.
-
-    stances: of the motion's feet; None to detect them. hands: exact targets of hands, which are
-    kept. travel: of the root.
-    """
-
-    stances: Sequence[StanceResult] | None = None
-    hands: Sequence[HandGoal] = ()
-    travel: Travel = "scaled"
-
-
-USUAL = RetargetSettings()
-
-
-@dataclass(frozen=True)
 class RetargetReport:
     """Facts about a retargeted motion.
 
@@ -89,7 +73,9 @@ class RetargetReport:
         for name, value in found.items():
             if isinstance(value, float):
                 found[name] = round_micrometres(value)
-        found["hands_missed"] = tuple(map(round_micrometres, self.hands_missed))
+            elif isinstance(value, tuple):
+                found[name] = list(value)
+        found["hands_missed"] = list(map(round_micrometres, self.hands_missed))
         return found
 
 
@@ -225,20 +211,20 @@ MISSED = 1e-3
 """Distance of a hand from its target, m, from which on it is told."""
 
 
-@dataclass(frozen=True)
-class Retargeted:
-    """A clip of a rig's skeleton, and the report on it."""
-
-    clip: Clip
-    report: RetargetReport
-
-
 def retarget(
-    clip: Clip, rig: Rig, roles: Mapping[str, str], settings: RetargetSettings = USUAL
-) -> Retargeted:
-    """Return a clip on the skeleton of a rig.
+    clip: Clip,
+    rig: Rig,
+    roles: Mapping[str, str],
+    *,
+    stances: Sequence[StanceResult] | None = None,
+    hands: Sequence[HandGoal] = (),
+    travel: Travel = "scaled",
+) -> tuple[Clip, RetargetReport]:
+    """Return a clip on the skeleton of a rig, and the report on it.
 
     roles: joint of the clip by role, of the model's card; recognised by names where it has none.
+    stances: of the motion's feet; None to detect them. hands: exact targets of hands, which are
+    kept. travel: of the root.
     The result has the rig's skeleton in metres with Y up, identity rotations at rest, constant bone
     offsets and a moving root, as clips of models have; `Rig.rest` gives the values of the rig's
     file. Curves stay. Raises InvalidField for a motion without hips and two legs.
@@ -254,22 +240,22 @@ def retarget(
     )
     motion = copied_pose.with_upright_rest(motion)
     scale = body.leg_length / source.leg_length
-    motion = _scaled(motion, scale, scale if settings.travel == "scaled" else 1.0)
-    feet = _feet(motion, body, clip, settings)
+    motion = _scaled(motion, scale, scale if travel == "scaled" else 1.0)
+    feet = _feet(motion, body, clip, stances)
     soles, higher, below = _ground(motion, body, feet, scale)
     rotations = copied_pose.copy_orientations(motion.body, body, motion.turns, soles)
     still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
     copied = planted_legs.moved(still, _hips(motion) + higher * UP - _hips(still))
     made = planted_legs.plant(copied, feet, below, clip.rate)
-    check_goals(settings.hands, made.rig, clip.rate)
-    final = meet_goals(made.rig, settings.hands, clip.rate)
+    check_goals(hands, made.rig, clip.rate)
+    final = meet_goals(made.rig, hands, clip.rate)
     found = clips.assemble(joints, final.rotations, final.roots, joints.offsets, clip.rate)
     report = measure(feet, made, scale, clip.rate)
     mapped = tuple(role for role in source.joints if role in body.joints)
     missing = tuple(role for role in source.joints if role not in body.joints)
-    missed = misses(final, settings.hands, clip.rate)
-    warnings = (*rig.notes, *_warnings(missing, settings.hands, missed))
-    return Retargeted(
+    missed = misses(final, hands, clip.rate)
+    warnings = (*rig.notes, *_warnings(missing, hands, missed))
+    return (
         replace(found, curves=clip.curves),
         replace(report, mapped=mapped, missing=missing, hands_missed=missed, warnings=warnings),
     )
@@ -293,13 +279,15 @@ def _hips(rig: PosedRig) -> RootPath:
     return 0.5 * (left + right)
 
 
-def _feet(motion: PosedRig, body: Body, clip: Clip, settings: RetargetSettings) -> SourceFeet:
+def _feet(
+    motion: PosedRig, body: Body, clip: Clip, stances: Sequence[StanceResult] | None
+) -> SourceFeet:
     """Return the feet of a motion in the rig's proportion."""
     roles = planted_legs.contact_roles(motion.body, body)
     left, right = (motion.body.joints[role] for role in roles)
     names = clip.skeleton.names[left], clip.skeleton.names[right]
     paths = motion.places[:, [left, right]]
-    return planted_legs.feet_of(paths, clip.rate, roles, names, settings.stances)
+    return planted_legs.feet_of(paths, clip.rate, roles, names, stances)
 
 
 def _ground(

@@ -12,8 +12,9 @@ from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton, joint_chain
-from posefield.rigs.rig import NEEDED, facing_of
+from posefield.rigs.rig import facing_of
 from posefield.roles import joint_recognition
+from posefield.roles.joint_recognition import NEEDED
 
 SIDES = joint_recognition.SIDES
 FIELD = "character"

@@ -1,13 +1,13 @@
 """glTF document: its JSON as typed objects of pygltflib, and the arrays in its buffers."""
 
-import base64
-import binascii
-import json
 import struct
 import urllib.parse
+import urllib.request
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,12 @@ import pygltflib
 from posefield.common.errors import MotionFileError
 from posefield.common.units import Floats
 
-MAGIC, VERSION = b"glTF", 2
-JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<II")
-READ_EXTENSIONS = {"KHR_mesh_quantization", "KHR_texture_transform"}
-"""Required extensions that change neither nodes nor animations, or that are read."""
-IGNORED_PREFIXES = ("KHR_materials", "KHR_texture", "KHR_lights", "KHR_xmp", "EXT_texture")
-"""Required extensions of materials, textures and lights, which a motion does not need."""
+IGNORED_EXTENSIONS = (
+    *("KHR_mesh_quantization", "KHR_materials", "KHR_texture", "EXT_texture", "KHR_lights"),
+    *("EXT_lights", "KHR_xmp", "KHR_node_", "MSFT_lod", "EXT_mesh_", "KHR_draco", "KHR_audio"),
+    *("KHR_physics", "MSFT_physics", "OMI_", "VRM", "KHR_implicit_shapes"),
+)
+"""Beginnings of required extensions that leave joints and animations as they are, or are read."""
 
 Beside = Callable[[str], bytes]
 """Function that returns the content of a file beside the document; MotionError if there is none."""
@@ -31,21 +30,82 @@ Beside = Callable[[str], bytes]
 
 @dataclass(frozen=True)
 class GltfDocument:
-    """A document. source: the file's name. binary: the chunk of a GLB file. beside: other files."""
+    """A document.
+
+    source: the file's name. beside: other files. unread: required extensions that may change the
+    parts of the document that have them.
+    """
 
     source: str
     parts: Any
-    binary: bytes
     beside: Beside
+    unread: frozenset[str]
 
     def error(self, message: str) -> MotionFileError:
         """Return an error that names the file."""
         return MotionFileError(self.source, message)
 
+    def expect_plain(self, name: str, *parts: Any) -> None:
+        """Raise MotionFileError if a required extension may change parts that are needed."""
+        for part in parts:
+            for extension in sorted(self.unread & (part.extensions or {}).keys()):
+                raise self.error(
+                    f"{name} requires the extension {extension}, which may change the skeleton or "
+                    "its animation: export without it"
+                )
+
+    @cached_property
+    def above(self) -> dict[int, int]:
+        """Return the parent of each node that has one; MotionFileError unless they are trees."""
+        found: dict[int, int] = {}
+        count = len(self.parts.nodes)
+        for parent, node in enumerate(self.parts.nodes):
+            for child in node.children or ():
+                if child in found or not 0 <= child < count:
+                    raise self.error(f"node {child} is no child of one node, expected a tree")
+                found[child] = parent
+        for node in range(count):
+            seen, own = {node}, node
+            while own in found:
+                own = found[own]
+                if own in seen:
+                    raise self.error(f"node {own} is its own ancestor, expected a tree")
+                seen.add(own)
+        return found
+
+    def ancestors(self, node: int) -> list[int]:
+        """Return a node and its ancestors, the scene's root last."""
+        found = [node]
+        while found[-1] in self.above:
+            found.append(self.above[found[-1]])
+        return found
+
+    def below(self, root: int) -> list[int]:
+        """Return a node and its descendants, parents first, in the order of the file."""
+        found, ahead = [], [root]
+        while ahead:
+            node = ahead.pop()
+            found.append(node)
+            ahead += reversed(self.parts.nodes[node].children or [])
+        return found
+
+    def common_ancestor(self, nodes: Iterable[int]) -> int | None:
+        """Return the last node that is each of the nodes or an ancestor of it, if there is one."""
+        chains = [self.ancestors(node)[::-1] for node in nodes]
+        levels = takewhile(lambda level: len(set(level)) == 1, zip(*chains, strict=False))
+        return next((level[0] for level in reversed(list(levels))), None)
+
+    def node_name(self, node: int) -> str:
+        """Return the name of a node for messages."""
+        return str(self.parts.nodes[node].name or node)
+
     def buffer(self, index: int) -> bytes:
         """Return the bytes of a buffer; MotionFileError if they are missing or too few."""
         own = self.parts.buffers[index]
-        content = self.binary if own.uri is None else self._resource(own.uri)
+        if own.uri is None and index > 0:
+            raise self.error(f"buffer {index} has no content, expected a URI: export uncompressed")
+        content = self.parts.binary_blob() if own.uri is None else self._resource(own.uri)
+        content = content or b""
         if len(content) < own.byteLength:
             raise self.error(
                 f"buffer {index} has {len(content)} bytes, expected {own.byteLength}: the file is "
@@ -56,68 +116,32 @@ class GltfDocument:
     def _resource(self, uri: str) -> bytes:
         if not uri.startswith("data:"):
             return self.beside(urllib.parse.unquote(uri))
-        head, _, text = uri.partition(",")
-        if not head.endswith(";base64"):
-            raise self.error("found a data URI without base64, expected base64")
-        try:
-            return base64.b64decode(text, validate=True)
-        except binascii.Error as fault:
-            raise self.error(f"found a data URI that is no base64: {fault}") from fault
+        with urllib.request.urlopen(uri) as data:
+            content: bytes = data.read()
+            return content
 
 
 def load(content: bytes, source: str, beside: Beside) -> GltfDocument:
     """Return the document of a .glb or .gltf file.
 
-    Raises MotionFileError for a broken container, JSON that is no glTF 2.0, and a required
-    extension that may change the motion.
+    Raises MotionFileError for a broken container, and for JSON that is no glTF 2.0.
     """
-    text, binary = _chunks(content, source) if content[:4] == MAGIC else (content, b"")
-    try:
-        facts = json.loads(text)
-    except (ValueError, RecursionError) as fault:
-        raise MotionFileError(source, f"not glTF: {fault}") from fault
-    version = facts.get("asset", {}).get("version") if isinstance(facts, dict) else None
-    if not isinstance(version, str) or version.partition(".")[0] != str(VERSION):
-        raise MotionFileError(source, f"found version {version!r} of glTF, expected 2.0")
-    unread = [
-        name
-        for name in facts.get("extensionsRequired", [])
-        if name not in READ_EXTENSIONS and not str(name).startswith(IGNORED_PREFIXES)
-    ]
-    if unread:
-        raise MotionFileError(
-            source,
-            f"requires the extensions {', '.join(map(str, unread))}, expected none that compress "
-            "or replace animations: export it without",
-        )
+    form = pygltflib.GLTF2
     with warnings.catch_warnings():
         # It warns of what it fills in for fields that are null or missing.
         warnings.simplefilter("ignore")
-        parts = pygltflib.GLTF2.gltf_from_json(text.decode())
-    return GltfDocument(source, parts, binary, beside)
-
-
-def _chunks(content: bytes, source: str) -> tuple[bytes, bytes]:
-    """Return JSON and binary chunk of a GLB file."""
-    if len(content) < HEADER.size:
-        raise MotionFileError(source, f"found {len(content)} bytes, expected a GLB file")
-    _, version, length = HEADER.unpack_from(content)
-    if version != VERSION or length > len(content):
-        raise MotionFileError(
-            source,
-            f"found version {version} and {len(content)} of {length} bytes, expected a whole file "
-            f"of version {VERSION}",
-        )
-    found: dict[int, bytes] = {}
-    place = HEADER.size
-    while place + CHUNK.size <= length:
-        size, kind = CHUNK.unpack_from(content, place)
-        place += CHUNK.size
-        found.setdefault(kind, content[place : place + size])
-        place += size
-    if JSON_CHUNK not in found:
-        raise MotionFileError(source, "found no JSON chunk, expected one")
-    return found[JSON_CHUNK], found.get(BINARY_CHUNK, b"")
+        try:
+            is_binary = content[:4] == b"glTF"
+            read = form.load_from_bytes if is_binary else form.gltf_from_json
+            parts = read(content if is_binary else content.decode())
+        except (ValueError, RecursionError, OSError, struct.error) as fault:
+            raise MotionFileError(source, f"not glTF: {fault}") from fault
+    version = str(parts.asset.version)
+    if version.partition(".")[0] != "2":
+        raise MotionFileError(source, f"found version {version!r} of glTF, expected 2.0")
+    required = map(str, parts.extensionsRequired or ())
+    unread = frozenset(name for name in required if not name.startswith(IGNORED_EXTENSIONS))
+    return GltfDocument(source, parts, beside, unread)
 
 
 COMPONENTS: dict[int, npt.DTypeLike] = {
@@ -141,6 +165,7 @@ def numbers(document: GltfDocument, index: int, kind: str) -> Floats:
     their buffer, and for numbers that are not finite.
     """
     accessor = _item(document, document.parts.accessors, index, "accessor")
+    document.expect_plain(f"accessor {index}", accessor)
     if accessor.type != kind or accessor.componentType not in COMPONENTS:
         raise document.error(
             f"accessor {index} has type {accessor.type} of {accessor.componentType}, "
@@ -177,6 +202,7 @@ def _view(
     """Return (count, width) numbers from a place in a buffer view."""
     view = _item(document, document.parts.bufferViews, index, "buffer view")
     _item(document, document.parts.buffers, view.buffer, "buffer")
+    document.expect_plain(f"buffer view {index}", view, document.parts.buffers[view.buffer])
     content = document.buffer(view.buffer)
     count, width = shape
     size = width * dtype.itemsize

@@ -7,10 +7,11 @@ s P t, with s for the metres of the parent's unit: every joint stays where it is
 rest pose keep their directions.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from posefield.common.errors import MotionFileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
+from posefield.roles import joint_recognition
 
 
 @contextmanager
@@ -31,77 +33,171 @@ def naming_faults(source: str, *faults: type[Exception]) -> Iterator[None]:
         raise MotionFileError(source, f"breaks its format: {said}") from fault
 
 
+class Transform(NamedTuple):
+    """Scale, rotation and translation of a node or joints, or from a root to the world.
+
+    rotation (..., 4): unit quaternions. translation, scale (..., 3).
+    """
+
+    rotation: Floats
+    translation: Floats
+    scale: Floats
+
+    def inside(self, other: "Transform") -> "Transform":
+        """Return this transform followed by another one."""
+        return Transform(
+            quat.mul(other.rotation, self.rotation),
+            other.translation + quat.rotate(other.rotation, other.scale * self.translation),
+            other.scale * self.scale,
+        )
+
+    def below(self, other: "Transform") -> "Transform":
+        """Return the transform that is this one when followed by another one."""
+        back = quat.conj(other.rotation)
+        place = quat.rotate(back, self.translation - other.translation) / other.scale
+        return Transform(quat.mul(back, self.rotation), place, self.scale / other.scale)
+
+    def root_inside(self, other: "Transform") -> "Transform":
+        """Return transforms of joints of which the first one is followed by another one."""
+        found = Transform(*(own.copy() for own in self))
+        root = Transform(*(own[..., 0, :] for own in self)).inside(other)
+        for own, value in zip(found, root, strict=True):
+            own[..., 0, :] = value
+        return found
+
+    def unmirrored(self) -> "Transform":
+        """Return the transform with half a turn in place of two negative scales."""
+        negative = self.scale < 0.0
+        pair = negative.sum(axis=-1, keepdims=True) == 2
+        half = np.concatenate([np.zeros_like(self.scale[..., :1]), ~negative], axis=-1)
+        return Transform(
+            np.where(pair, quat.mul(self.rotation, half), self.rotation),
+            self.translation,
+            np.where(pair, np.abs(self.scale), self.scale),
+        )
+
+
+WORLD = Transform(quat.IDENTITY, np.zeros(3), np.ones(3))
+"""Transform of what lies in the world."""
+
+
+def of_matrix(matrix: Floats, label: object, skew: float = 1e-3) -> Transform:
+    """Return a matrix (4, 4) for row vectors as a transform.
+
+    label: in messages. skew: largest cosine between axes that are perpendicular. Raises ValueError
+    for axes that skew or mirror.
+    """
+    sizes = np.linalg.norm(matrix[:3, :3], axis=1)
+    axes = matrix[:3, :3] / np.maximum(sizes, 1e-30)[:, None]
+    if np.abs(axes @ axes.T - np.eye(3)).max() > skew or np.linalg.det(axes) < 0.0:
+        raise ValueError(f"a transform of {label} skews or mirrors, expected neither")
+    return Transform(quat.from_matrix(axes.T), matrix[3, :3], sizes)
+
+
+def stacked(transforms: Sequence[Transform]) -> Transform:
+    """Return transforms (J, ...) of joints."""
+    return Transform(*map(np.stack, zip(*transforms, strict=True)))
+
+
+EIGHTH, POSED = float(np.cos(np.pi / 8)), 0.9999
+"""Products of two quaternions that are turned against each other by 45 and by 1.6 degrees."""
+NEAR = 0.25
+"""Largest distance between the roots of bind and rest pose, as a share of the length of bones."""
+
+
+def bound_rest(
+    local: Transform, parents: Sequence[int], outer: Transform, bind: Mapping[int, Transform]
+) -> Transform:
+    """Return the transforms (J, ...) at rest, with turns and root of the bind pose.
+
+    local: of the nodes, each to its parent, the first to `outer`. bind: orientations and places of
+    joints in the frame of the exporter: exporters differ on it, but not on turns between joints.
+    """
+    world = local.root_inside(outer).rotation
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            world[joint] = quat.mul(world[parent], local.rotation[joint])
+        world[joint] = bind[joint].rotation if joint in bind else world[joint]
+    turns, places = local.rotation.copy(), local.translation.copy()
+    turns[1:] = quat.mul(quat.conj(world[list(parents[1:])]), world[1:])
+    roots = [bind[0].below(outer), bind[0]] if 0 in bind else []
+    root = max(roots, key=lambda own: abs(float(own.rotation @ turns[0])), default=None)
+    if root is not None and abs(float(root.rotation @ turns[0])) >= EIGHTH:
+        # A file that was exported in a pose of its motion has the root of that pose.
+        is_posed = np.abs(np.sum(turns * local.rotation, axis=-1)).min() < POSED
+        bones = np.linalg.norm(places[1:], axis=-1).sum()
+        turns[0] = root.rotation
+        if is_posed and np.linalg.norm(root.translation - places[0]) <= NEAR * bones:
+            places[0] = root.translation
+    return Transform(turns, places, local.scale)
+
+
 SCALE_TOLERANCE = 2e-3
 """Largest relative change of a scale that is rounding: USD stores scales in half precision."""
 
 
-@dataclass(frozen=True)
-class PosedJoints:
-    """Joints of a file with their rest pose, parents first, and their motion.
+class JointTree(NamedTuple):
+    """A skeleton of a file. label: in messages. names, parents: of its joints, parents first."""
 
-    names, parents: as in a skeleton. rest_rotations (J, 4), rest_translations (J, 3): local to the
-    parent at rest. rotations (F, J, 4), translations (F, J, 3), scales (F, J, 3): local to the
-    parent in the motion. Those of the root are in the file's world.
-    """
-
-    source: str
+    label: str
     names: tuple[str, ...]
     parents: tuple[int, ...]
-    rest_rotations: Floats
-    rest_translations: Bones
-    rotations: Rotations
-    translations: Positions
-    scales: Positions
 
 
-@dataclass(frozen=True)
-class PlainMotion:
-    """A skeleton at rest with identity rotations, and its motion, as in a MotionFile."""
+def plain_motion(
+    source: str, joints: JointTree, rest: Transform, motion: Transform
+) -> tuple[Skeleton, Rotations, Positions, tuple[str, ...]]:
+    """Return joints at rest with identity rotations and without scale, their motion, and notes.
 
-    skeleton: Skeleton
-    rotations: Rotations
-    translations: Positions
-
-
-def plain_motion(joints: PosedJoints) -> PlainMotion:
-    """Return the joints at rest with identity rotations and without scale.
-
-    Raises MotionFileError for a scale that is animated, uneven or mirrored.
+    rest (J, ...), motion (F, J, ...): local to the parent, those of the root in the file's world.
+    Raises MotionFileError for a scale that is animated, uneven or mirrored, but at the end of a
+    chain, where no joint follows it.
     """
-    sizes = _constant_scales(joints)
+    sizes, notes = _constant_scales(source, joints, motion.scale)
     # Products (J,) of the scales of each joint's ancestors.
     above = np.ones(len(sizes))
     for joint, parent in enumerate(joints.parents[1:], start=1):
         above[joint] = above[parent] * sizes[parent]
-    # Orientations (J, 4) of the joints at rest in the file's world.
-    turns = quat.normalize(joints.rest_rotations)
-    for joint, parent in enumerate(joints.parents[1:], start=1):
-        turns[joint] = quat.normalize(quat.mul(turns[parent], turns[joint]))
+    turns = _in_world(rest.rotation, joints.parents)
     parents = np.array(joints.parents)
     outer = np.concatenate([quat.IDENTITY[None], turns[parents[1:]]])
-    rotations = quat.mul(quat.mul(outer, quat.normalize(joints.rotations)), quat.conj(turns))
-    translations = quat.rotate(outer, above[:, None] * joints.translations)
-    offsets = quat.rotate(outer, above[:, None] * joints.rest_translations)
+    rotations = quat.mul(quat.mul(outer, quat.normalize(motion.rotation)), quat.conj(turns))
+    translations = quat.rotate(outer, above[:, None] * motion.translation)
+    offsets = quat.rotate(outer, above[:, None] * rest.translation)
     skeleton = Skeleton(joints.names, joints.parents, offsets, (), np.zeros((0, 3)))
-    return PlainMotion(skeleton, rotations, translations)
+    return skeleton, rotations, translations, notes
 
 
-def _constant_scales(joints: PosedJoints) -> Floats:
-    """Return the scale (J,) of each joint; MotionFileError if it is not constant and even."""
-    scales = joints.scales
+def _in_world(turns: JointRotations, parents: Sequence[int]) -> JointRotations:
+    """Return orientations (J, 4) in the world of joints with rotations local to the parent."""
+    found = quat.normalize(turns)
+    for joint, parent in enumerate(parents[1:], start=1):
+        found[joint] = quat.normalize(quat.mul(found[parent], found[joint]))
+    return found
+
+
+def _constant_scales(
+    source: str, joints: JointTree, scales: Floats
+) -> tuple[Floats, tuple[str, ...]]:
+    """Return the scale (J,) of each joint, and a note on those that are left out.
+
+    Raises MotionFileError for one that is not constant and even, unless no joint is below it.
+    """
     usual = scales[0].mean(axis=-1)
     apart = np.abs(scales - usual[:, None]).max(axis=(0, 2))
-    odd = np.flatnonzero(~(apart <= SCALE_TOLERANCE * np.abs(usual)) | (usual <= 0.0))
-    if len(odd):
-        joint = int(odd[0])
+    odd = ~(apart <= SCALE_TOLERANCE * np.abs(usual)) | (usual <= 0.0)
+    inner = np.isin(np.arange(len(odd)), joints.parents)
+    for joint in np.flatnonzero(odd & inner)[:1].tolist():
         low, high = scales[:, joint].min(), scales[:, joint].max()
         raise MotionFileError(
-            joints.source,
+            source,
             f"joint {joints.names[joint]!r} has scales from {low:.4g} to {high:.4g}, expected one "
             "positive scale along all axes in all frames: bake the scale into the bones",
         )
+    ends = ", ".join(joints.names[joint] for joint in np.flatnonzero(odd)[:10])
+    notes = (f"the scale of {ends} left out: no joint follows it",) if ends else ()
     # Scales of 1 in half precision, or of rounded matrices, are 1.
-    return np.where(np.abs(usual - 1.0) <= SCALE_TOLERANCE, 1.0, usual)
+    return np.where(odd | (np.abs(usual - 1.0) <= SCALE_TOLERANCE), 1.0, usual), notes
 
 
 Z_UP = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(-0.5 * np.pi))
@@ -111,21 +207,21 @@ MAX_JOINTS = 1000
 """Limit of joints, several times those of any character."""
 
 
-@dataclass(frozen=True)
-class OuterTransform:
-    """Scale, rotation and translation of a node, or from the root's parent to the file's world."""
-
-    rotation: Floats
-    translation: Floats
-    scale: Floats
-
-    def inside(self, other: "OuterTransform") -> "OuterTransform":
-        """Return this transform followed by another one."""
-        return OuterTransform(
-            quat.mul(other.rotation, self.rotation),
-            other.translation + quat.rotate(other.rotation, other.scale * self.translation),
-            other.scale * self.scale,
+def one_skeleton(source: str, trees: Sequence[JointTree], named: Set[str]) -> int:
+    """Return the index of the skeleton with named joints or legs; MotionFileError for several."""
+    found = list(range(len(trees)))
+    if len(found) > 1:
+        found = [own for own in found if not named.isdisjoint(trees[own].names)] or found
+    if len(found) > 1:
+        is_person = joint_recognition.is_person
+        found = [own for own in found if is_person(*trees[own][1:])] or found
+    if len(found) > 1:
+        labels = ", ".join(trees[index].label for index in found[:20])
+        raise MotionFileError(
+            source,
+            f"found {len(found)} skeletons ({labels}), expected one: export each character alone",
         )
+    return found[0]
 
 
 @dataclass(frozen=True)
@@ -142,16 +238,15 @@ class RestJoints:
     rotations: JointRotations
     translations: Bones
     scales: Bones
-    outer: OuterTransform
+    outer: Transform
     metres_per_unit: float
     up: UpAxis
 
     @cached_property
-    def _upright(self) -> OuterTransform:
+    def _upright(self) -> Transform:
         """Return the outer transform to metres with Y up."""
         turn = Z_UP if self.up == "z" else quat.IDENTITY
-        size = np.full(3, self.metres_per_unit)
-        return self.outer.inside(OuterTransform(turn, np.zeros(3), size))
+        return self.outer.inside(Transform(turn, np.zeros(3), np.full(3, self.metres_per_unit)))
 
     @cached_property
     def skeleton(self) -> Skeleton:
@@ -159,23 +254,15 @@ class RestJoints:
 
         Raises MotionFileError for a scale that is uneven or mirrored.
         """
-        outer = self._upright
-        turns, places, sizes = self.rotations.copy(), self.translations.copy(), self.scales.copy()
-        turns[0] = quat.mul(outer.rotation, turns[0])
-        places[0] = outer.translation + quat.rotate(outer.rotation, outer.scale * places[0])
-        sizes[0] *= outer.scale
-        moved = (turns[None], places[None], sizes[None])
-        own = PosedJoints(self.source, self.names, self.parents, turns, places, *moved)
-        return plain_motion(own).skeleton
+        rest = Transform(self.rotations, self.translations, self.scales).root_inside(self._upright)
+        still = Transform(*(part[None] for part in rest))
+        return plain_motion(self.source, JointTree("", self.names, self.parents), rest, still)[0]
 
     @cached_property
     def orientations(self) -> JointRotations:
         """Return the orientations (J, 4) at rest in the world with Y up."""
-        found = quat.normalize(self.rotations)
-        found[0] = quat.mul(self._upright.rotation, found[0])
-        for joint, parent in enumerate(self.parents[1:], start=1):
-            found[joint] = quat.mul(found[parent], found[joint])
-        return found
+        own = Transform(self.rotations, self.translations, self.scales).root_inside(self._upright)
+        return _in_world(own.rotation, self.parents)
 
     @cached_property
     def _outer_orientations(self) -> JointRotations:

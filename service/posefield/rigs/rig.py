@@ -20,11 +20,9 @@ from posefield.motion.skeleton import Skeleton, joint_chain
 from posefield.rigs import rest_joints
 from posefield.rigs.rest_joints import RestJoints
 from posefield.roles import joint_recognition
-from posefield.roles.joint_recognition import LOWEST_CONFIDENCE, SIDES, RoleGuess
+from posefield.roles.joint_recognition import LOWEST_CONFIDENCE, NEEDED, SIDES, RoleGuess
 
 LEG = ("UpperLeg", "LowerLeg", "Foot")
-NEEDED = ("hips", *(side + part for side in SIDES for part in LEG))
-"""Roles without which nothing is retargeted."""
 ARM = ("UpperArm", "LowerArm", "Hand")
 CHAINS = tuple(
     tuple(side + part for part in parts) for side in SIDES for parts in ((*LEG, "Toes"), ARM)
@@ -166,7 +164,7 @@ class Rig:
 
     path: of the file. joint_paths (J,): of USD the tokens of the Skeleton's `joints`, such as
     "Hips/Spine"; of glTF the indices of the nodes as text. skeleton_path: of USD the path of the
-    Skeleton; of glTF "". skins: of glTF the indices of the skins. rest: joints as the file has
+    Skeleton; of glTF "". rest: joints as the file has
     them at rest. roles: joint by role, with the confidence 1 for those that were stated. facing:
     direction of the body at rest, rad, to the left of +Z. notes: on what the reader assumed.
     """
@@ -175,7 +173,6 @@ class Rig:
     format: Literal["USD", "glTF"]
     joint_paths: tuple[str, ...]
     skeleton_path: str
-    skins: tuple[int, ...]
     rest: RestJoints
     roles: Mapping[str, RoleGuess]
     facing: float
@@ -217,18 +214,19 @@ def read_rig(path: Path, roles: Mapping[str, str] = NONE_STATED) -> Rig:
         path.open("rb").close()
     except OSError as fault:
         raise MotionFileError(path, f"cannot be read: {fault.strerror}") from fault
-    if suffix in USD_SUFFIXES:
-        with rest_joints.naming_faults(source, RuntimeError, ValueError, TypeError):
-            # usd-core takes 0.12 s to import.
+    named, prim = {name.rpartition("/")[2] for name in roles.values()}, ""
+    with rest_joints.naming_faults(
+        source, RuntimeError, TypeError, AttributeError, LookupError, ValueError
+    ):
+        # usd-core takes 0.12 s to import, pygltflib 0.1 s.
+        if suffix in USD_SUFFIXES:
             from posefield.rigs import usd_rig
 
-            rest, paths, prim, notes = usd_rig.read(path, source)
-            guesses, facing, said = find_roles(source, rest.skeleton, paths, roles)
-            return Rig(path, "USD", paths, prim, (), rest, guesses, facing, notes + said)
-    with rest_joints.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
-        # pygltflib takes 0.1 s to import.
-        from posefield.rigs import gltf_rig
+            rest, joints, prim, notes = usd_rig.read(path, source, named)
+        else:
+            from posefield.rigs import gltf_rig
 
-        rest, paths, skins, notes = gltf_rig.read(path, source)
-        guesses, facing, said = find_roles(source, rest.skeleton, paths, roles)
-        return Rig(path, "glTF", paths, "", skins, rest, guesses, facing, notes + said)
+            rest, joints, notes = gltf_rig.read(path, source, named)
+        guesses, facing, said = find_roles(source, rest.skeleton, joints, roles)
+    form: Literal["USD", "glTF"] = "USD" if suffix in USD_SUFFIXES else "glTF"
+    return Rig(path, form, joints, prim, rest, guesses, facing, notes + said)

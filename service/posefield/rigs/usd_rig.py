@@ -1,119 +1,192 @@
 """Skeletons of a USD stage: their joints, poses at rest and transforms; and the one of a rig."""
 
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom, UsdSkel
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom, UsdSkel, UsdUtils
 
 from posefield.common.errors import MotionFileError
-from posefield.common.units import Floats, UpAxis
-from posefield.motion import quat
-from posefield.rigs.rest_joints import MAX_JOINTS, OuterTransform, RestJoints
+from posefield.common.units import UpAxis
+from posefield.rigs import rest_joints
+from posefield.rigs.rest_joints import MAX_JOINTS, JointTree, RestJoints, Transform
 
 
 @dataclass(frozen=True)
 class SkelStage:
-    """An open stage. cache: of UsdSkel, with the bindings of all its skeletons."""
+    """An open stage. cache: of UsdSkel. quiet: keeps warnings, which are notes, from stderr."""
 
     source: str
     stage: Any
     cache: Any
+    quiet: Any
 
     def error(self, message: str) -> MotionFileError:
         """Return an error that names the file."""
         return MotionFileError(self.source, message)
 
     def prims(self, schema: Any) -> list[Any]:
-        """Return the prims of a schema, those within instances too."""
-        seen = Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies())
-        return [prim for prim in seen if prim.IsA(schema)]
+        """Return the prims of a schema, of several instances the first."""
+        found: dict[Any, Any] = {}
+        for prim in Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()):
+            if prim.IsA(schema):
+                shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+                found.setdefault(shared.GetPath(), prim)
+        return list(found.values())
+
+    def notes(self, *prims: Any) -> list[str]:
+        """Return notes on what the stage lacks; MotionFileError where it may be part of prims.
+
+        prims: skeleton and animation that are read.
+        """
+        found, needed = [], [prim.GetPath() for prim in prims]
+        for fault in self.stage.GetCompositionErrors():
+            site, said = fault.rootSite.path, " ".join(str(fault).split())[:200]
+            if any(path.HasPrefix(site) or site.HasPrefix(path) for path in needed):
+                raise self.error(f"refers to what cannot be read: {said}")
+            found.append(f"{site} refers to what cannot be read, which was left out: {said}")
+        return found
+
+    def skeleton(self, prims: Sequence[Any], named: Set[str]) -> tuple[Any, list[str]]:
+        """Return the one of some skeletons that has named joints or roles, and a note on others."""
+        trees = list(map(joint_tree, prims))
+        own = prims[rest_joints.one_skeleton(self.source, trees, named)]
+        others = ", ".join(str(prim.GetPath()) for prim in prims[:SHOWN] if prim != own)
+        said = f"skeleton {own.GetPath()} was read: {others} left out"
+        return own, [said] if others else []
+
+    def query(self, skeleton: Any) -> Any:
+        """Return the query of UsdSkel for a skeleton; MotionFileError if it is not valid."""
+        own = UsdSkel.Skeleton(skeleton)
+        query = self.cache.GetSkelQuery(own)
+        if query:
+            return query
+        joints = own.GetJointsAttr().Get()
+        valid, reason = UsdSkel.Topology(joints).Validate() if joints else (False, "no joints")
+        said = "its transforms are not one for each joint" if valid else reason
+        raise self.error(f"skeleton {skeleton.GetPath()} is not valid: {said}")
+
+
+SHOWN = 20
+"""Prims that a message lists."""
+
+
+def joint_tree(skeleton: Any) -> JointTree:
+    """Return the last names of the joints of a Skeleton, those that USD calls illegal too."""
+    tokens = [str(token) for token in UsdSkel.Skeleton(skeleton).GetJointsAttr().Get() or ()]
+    places = {token: joint for joint, token in enumerate(tokens)}
+    parents = []
+    for token in tokens:
+        above = token.rpartition("/")[0]
+        while above and above not in places:
+            above = above.rpartition("/")[0]
+        parents.append(places.get(above, -1))
+    names = tuple(token.rpartition("/")[2] for token in tokens)
+    return JointTree(str(skeleton.GetPath()), names, tuple(parents))
+
+
+def expect_inside(path: Path, source: str) -> None:
+    """Raise MotionFileError for a file that is composed of layers out of its folder."""
+    own = path.resolve()
+    places = [str(own)]
+    for place in places:  # It grows.
+        try:
+            layer = Sdf.Layer.FindOrOpen(place)
+            names = [*set().union(*UsdUtils.ExtractExternalReferences(place))]
+        except Tf.ErrorException:
+            continue  # It has no part in the stage.
+        for name in sorted(names):
+            further = layer.ComputeAbsolutePath(name)
+            file = Ar.SplitPackageRelativePathOuter(Sdf.Layer.SplitIdentifier(further)[0])[0]
+            if not Sdf.FileFormat.FindByExtension(Path(file).suffix[1:]):
+                continue  # Textures and other files are not read.
+            if not Path(file).resolve().is_relative_to(own.parent):
+                raise MotionFileError(
+                    source, f"refers to {name!r}, expected a path below its folder"
+                )
+            places += [further] if further not in places else []
 
 
 def open_stage(path: Path, source: str) -> SkelStage:
-    """Return the stage of a file; MotionFileError if it does not open whole.
+    """Return the stage of a file; MotionFileError if it does not open.
 
     source: name of the file in messages.
     """
+    quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as fault:
         said = str(fault).rpartition(" : ")[2].strip().strip("'")[:200]
         raise MotionFileError(source, f"does not open as USD: {said}") from fault
-    faults = stage.GetCompositionErrors()
-    if faults:
-        said = " ".join(str(faults[0]).split())[:200]
-        raise MotionFileError(source, f"refers to what cannot be read: {said}")
     cache = UsdSkel.Cache()
-    opened = SkelStage(source, stage, cache)
+    opened = SkelStage(source, stage, cache, quiet)
     for prim in opened.prims(UsdSkel.Root):
         cache.Populate(UsdSkel.Root(prim), Usd.TraverseInstanceProxies())
     return opened
-
-
-def fault_of(skeleton: Any) -> str:
-    """Return why a skeleton has no query."""
-    joints = UsdSkel.Skeleton(skeleton).GetJointsAttr().Get()
-    if not joints:
-        return "it names no joints"
-    valid, reason = UsdSkel.Topology(joints).Validate()
-    return "its transforms are not one for each joint" if valid else reason
-
-
-SKEW = 1e-3
-"""Largest cosine between axes of a matrix that are perpendicular."""
 
 
 @dataclass(frozen=True)
 class SkelJoints:
     """A skeleton. prim: its own. query: of UsdSkel."""
 
-    source: str
+    opened: SkelStage
     prim: Any
     query: Any
 
-    def error(self, message: str) -> MotionFileError:
-        """Return an error that names the file."""
-        return MotionFileError(self.source, message)
-
-    def tree(self) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    def tree(self) -> JointTree:
         """Return names and parents of the joints; MotionFileError unless they are one tree."""
-        paths = [str(path) for path in self.query.GetJointOrder()]
-        valid, reason = self.query.GetTopology().Validate()
-        parents = tuple(self.query.GetTopology().GetParentIndices())
-        if not valid or not paths or parents[0] != -1:
-            raise self.error(f"skeleton {self.prim.GetPath()}: {reason or 'no joints'}")
+        paths = tuple(str(path) for path in self.query.GetJointOrder())
+        label, names, parents = joint_tree(self.prim)
         roots = [path for path, parent in zip(paths, parents, strict=True) if parent < 0]
-        if len(roots) > 1:
-            raise self.error(f"found the root joints {', '.join(roots[:5])}, expected one")
-        stated = self.query.GetSkeleton().GetJointNamesAttr().Get()
-        for names in (stated or (), [path.rpartition("/")[2] for path in paths]):
-            if len(names) == len(paths) == len(set(names)):
-                return tuple(map(str, names)), parents
-        return tuple(paths), parents
+        if len(roots) != 1 or any(parent >= joint for joint, parent in enumerate(parents)):
+            listed = ", ".join(roots[:5]) or "no joints"
+            raise self.opened.error(
+                f"skeleton {self.prim.GetPath()} has the root joints {listed}, expected one before "
+                "all others"
+            )
+        stated = tuple(self.query.GetSkeleton().GetJointNamesAttr().Get() or ())
+        own = next(own for own in (stated, names, paths) if len({*own}) == len(own) == len(paths))
+        return JointTree(label, tuple(map(str, own)), parents)
 
-    def rest(self, parents: tuple[int, ...]) -> tuple[Floats, Floats]:
-        """Return local rotations of the bind pose, and local translations of the rest pose."""
-        rest = np.array(self.query.ComputeJointLocalTransforms(0.0, atRest=True), float)
-        bind = np.array(self.query.GetJointWorldBindTransforms(), float)
-        if len(rest) != len(parents):
-            raise self.error(f"found {len(rest)} restTransforms, expected {len(parents)}")
-        turns = np.stack([self.decomposed(matrix)[0] for matrix in rest])
-        if len(bind) == len(parents):
-            world = np.stack([self.decomposed(matrix)[0] for matrix in bind])
-            turns[0] = world[0]
-            turns[1:] = quat.mul(quat.conj(world[list(parents[1:])]), world[1:])
-        return turns, rest[:, 3, :3].copy()
+    def rest(
+        self, parents: Sequence[int], outer: Transform, frame: Transform | None = None
+    ) -> tuple[Transform, Transform, list[str]]:
+        """Return the transforms (J, ...) that the file states, and those of the bind pose; notes.
 
-    def world(self, codes: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return rotations, translations and scales (F, ...) of the skeleton in the world."""
-        found = []
-        for code in codes.tolist():
-            matrix = UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(self.prim)
-            found.append(self.decomposed(np.array(matrix, float)))
-        turns, places, sizes = (np.stack(part) for part in zip(*found, strict=True))
-        return turns, places, sizes
+        outer: from the skeleton to the world. frame: of the motion, for a file without poses.
+        """
+        count, path, notes = len(parents), self.prim.GetPath(), list[str]()
+        local = self.query.ComputeJointLocalTransforms(0.0, atRest=True)
+        world = np.array(self.query.GetJointWorldBindTransforms(), float)
+        bind = {}
+        if len(world) == count:
+            bind = {joint: rest_joints.of_matrix(own, path) for joint, own in enumerate(world)}
+        if len(local) == count:
+            frame = self._transforms(local)
+        elif bind:
+            above = np.array(UsdGeom.XformCache(0.0).GetLocalToWorldTransform(self.prim), float)
+            above = np.concatenate([above[None], world[list(parents[1:])]])
+            frame = self._transforms(world @ np.linalg.inv(above))
+            notes = [f"{path} has no restTransforms: the bindTransforms were taken"]
+        elif frame is not None:
+            notes = [f"{path} has no restTransforms: the first frame was taken"]
+        else:
+            raise self.opened.error(
+                f"{path} has neither restTransforms nor bindTransforms, expected one"
+            )
+        return frame, rest_joints.bound_rest(frame, parents, outer, bind), notes
+
+    def world(self, codes: Sequence[float]) -> Transform:
+        """Return transforms (F, ...) of the skeleton in the world."""
+        caches = (UsdGeom.XformCache(Usd.TimeCode(code)) for code in codes)
+        return self._transforms(own.GetLocalToWorldTransform(self.prim) for own in caches)
+
+    def _transforms(self, matrices: Iterable[Any]) -> Transform:
+        path = self.prim.GetPath()
+        found = [rest_joints.of_matrix(np.array(own, float), path) for own in matrices]
+        return rest_joints.stacked(found)
 
     def moving_parents(self) -> list[Any]:
         """Return the transforms of the skeleton and its ancestors that change over time."""
@@ -125,65 +198,41 @@ class SkelJoints:
             prim = prim.GetParent()
         return found
 
-    def decomposed(self, matrix: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return rotation, translation and scale of a matrix (4, 4) for row vectors."""
-        sizes = np.linalg.norm(matrix[:3, :3], axis=1)
-        axes = matrix[:3, :3] / np.maximum(sizes, 1e-30)[:, None]
-        if np.abs(axes @ axes.T - np.eye(3)).max() > SKEW or np.linalg.det(axes) < 0.0:
-            raise self.error(
-                f"a transform of {self.prim.GetPath()} skews or mirrors, expected neither"
-            )
-        return quat.from_matrix(axes.T), matrix[3, :3], sizes
 
-
-SHOWN = 20
-"""Skeletons that a message lists."""
-
-
-def read(path: Path, source: str) -> tuple[RestJoints, tuple[str, ...], str, tuple[str, ...]]:
+def read(
+    path: Path, source: str, named: Set[str]
+) -> tuple[RestJoints, tuple[str, ...], str, tuple[str, ...]]:
     """Return the joints of a .usd, .usda, .usdc or .usdz file.
 
     Further the tokens of its `joints`, the path of its Skeleton, and notes. source: name of the
-    file in messages. Raises MotionFileError for a file without a skeleton or
-    with several, and for a skeleton whose prim moves over time.
+    file in messages. named: joints of the skeleton that is meant. Raises MotionFileError for a file
+    without a skeleton or with several, for a skeleton whose prim moves over time, and for layers
+    out of the file's folder.
     """
+    expect_inside(path, source)
     opened = open_stage(path, source)
-    joints = _only_skeleton(opened)
+    skeletons = opened.prims(UsdSkel.Skeleton)
+    if not skeletons:
+        raise opened.error("found no Skeleton, expected a SkelRoot with one")
+    prim, notes = opened.skeleton(skeletons, named)
+    joints = SkelJoints(opened, prim, opened.query(prim))
+    notes += opened.notes(prim)
     moving = joints.moving_parents()
     if moving:
         raise opened.error(
             f"{moving[0].GetPath()} moves over time, expected a skeleton that stands still: its "
             "joints move it"
         )
-    names, parents = joints.tree()
+    _, names, parents = joints.tree()
     if len(names) > MAX_JOINTS:
         raise opened.error(f"found {len(names)} joints, expected at most {MAX_JOINTS}")
-    turns, places = joints.rest(parents)
-    local = np.array(joints.query.ComputeJointLocalTransforms(0.0, atRest=True), float)
-    sizes = np.stack([joints.decomposed(matrix)[2] for matrix in local])
-    outer = OuterTransform(*(part[0] for part in joints.world(np.zeros(1))))
+    outer = Transform(*(part[0] for part in joints.world([0.0])))
+    _, bound, said = joints.rest(parents, outer)
     stage = opened.stage
     up: UpAxis = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
     unit = float(UsdGeom.GetStageMetersPerUnit(stage))
-    rest = RestJoints(source, names, parents, turns, places, sizes, outer, unit, up)
+    rest = RestJoints(source, names, parents, *bound, outer, unit, up)
     paths = tuple(str(own) for own in joints.query.GetJointOrder())
-    notes: tuple[str, ...] = ()
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
-        notes = (f"the file states no metersPerUnit, {unit:g} is USD's default",)
-    return rest, paths, str(joints.prim.GetPath()), notes
-
-
-def _only_skeleton(opened: SkelStage) -> SkelJoints:
-    skeletons = opened.prims(UsdSkel.Skeleton)
-    if not skeletons:
-        raise opened.error("found no Skeleton, expected a SkelRoot with one")
-    if len(skeletons) > 1:
-        paths = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN])
-        raise opened.error(
-            f"found {len(skeletons)} skeletons ({paths}), expected one: export each character alone"
-        )
-    (prim,) = skeletons
-    query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(prim))
-    if not query:
-        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {fault_of(prim)}")
-    return SkelJoints(opened.source, prim, query)
+        notes.append(f"the file states no metersPerUnit, {unit:g} is USD's default")
+    return rest, paths, str(prim.GetPath()), (*notes, *said)

@@ -165,9 +165,11 @@ def _spine(tree: Tree, hips: LimbJoint, top: int | None, last: int | None) -> di
     }
 
 
+SIDES = ("left", "right")
+NEEDED = ("hips", *(side + part for side in SIDES for part in ("UpperLeg", "LowerLeg", "Foot")))
+"""Roles of a person without which nothing is retargeted."""
 LOWEST_CONFIDENCE = 0.8
 """Confidence below which a role has to be confirmed in the recipe."""
-SIDES = ("left", "right")
 ONE_SIDE, OTHER_WORDS = 0.7, 0.75
 """Factors of the confidence of a role on one side only, and of two that are named differently."""
 
@@ -223,6 +225,11 @@ def recognise(names: Sequence[str], parents: Sequence[int]) -> dict[str, RoleGue
     trunk = trunk_roles(tree, legs, arms)
     guesses = {role: _guess(names, one) for role, one in (trunk | limbs).items()}
     return {role: _compared(role, guesses[role], limbs, tree) for role in ROLES if role in guesses}
+
+
+def is_person(names: Sequence[str], parents: Sequence[int]) -> bool:
+    """Return whether joints seem to have hips and two legs."""
+    return recognise(names, parents).keys() >= set(NEEDED)
 
 
 def _limbs(tree: Tree, side: str) -> dict[str, LimbJoint]:

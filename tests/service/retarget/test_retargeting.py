@@ -1,6 +1,7 @@
 """Tests of retargeting: equal bodies, rest poses, proportions, feet and hands."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
 from posefield.retarget import planted_legs
-from posefield.retarget.retargeting import HandGoal, RetargetSettings, retarget
+from posefield.retarget.retargeting import HandGoal, RetargetReport, retarget
 from posefield.rigs.rig import read_rig
 
 ROUNDING = 1e-5
@@ -22,13 +23,18 @@ LEGS = (*SHINS, "LeftLeg", "RightLeg")
 FEET = ("LeftToeBase", "RightToeBase")
 
 
+class Retargeted(NamedTuple):
+    clip: Clip
+    report: RetargetReport
+
+
 @pytest.fixture
 def onto(walk, roles, tmp_path):
     """Function that retargets the walk to a figure."""
 
-    def made(figure, settings=None, clip=walk, own_roles=roles):
+    def made(figure, clip=walk, own_roles=roles, **settings):
         rig = read_rig(rig_files.write_glb(tmp_path / "rig.glb", figure))
-        return retarget(clip, rig, own_roles, settings or RetargetSettings())
+        return Retargeted(*retarget(clip, rig, own_roles, **settings))
 
     return made
 
@@ -116,10 +122,10 @@ def test_told_stances_are_kept(walk, figure, onto):
     """A foot that is told to stand in frames in which it does not moves as the motion's does."""
     tall = figure.longer(1.25, *SHINS)
     told = StanceResult("LeftToeBase", 0.7, 1.0, (0.0, 0.0, 0.0))
-    found = onto(tall, RetargetSettings(stances=[told])).report
+    found = onto(tall, stances=[told]).report
     assert found.skate_source > 0.1 and found.skate == pytest.approx(found.skate_source, rel=0.01)
     # Without stances there is no skate to measure.
-    assert onto(tall, RetargetSettings(stances=[])).report.skate == 0.0
+    assert onto(tall, stances=[]).report.skate == 0.0
 
 
 def test_soles_are_lifted_beyond_seven_millimetres():
@@ -133,7 +139,7 @@ def test_the_root_travels_in_proportion_or_as_the_motion(walk, figure, onto):
     tall = figure.longer(1.2, *LEGS)
     way = walk.root_path[-1] - walk.root_path[0]
     for travel, factor in (("scaled", 1.2), ("kept", 1.0)):
-        made = onto(tall, RetargetSettings(travel=travel))
+        made = onto(tall, travel=travel)
         own = made.clip.root_path[-1] - made.clip.root_path[0]
         assert np.abs(own - factor * way)[[0, 2]].max() < 0.01
         assert made.report.skate < 1e-3
@@ -218,7 +224,7 @@ def tilted(one, other):
 def test_hands_meet_their_goals(walk, figure, onto):
     tall = figure.longer(1.15, *LEGS)
     goal = place(onto(tall).clip, "LeftHand")[30] + np.array([0.1, 0.1, 0.05])
-    made = onto(tall, RetargetSettings(hands=(HandGoal("leftHand", 0.5, goal),)))
+    made = onto(tall, hands=(HandGoal("leftHand", 0.5, goal),))
     assert np.linalg.norm(place(made.clip, "LeftHand")[30] - goal) < 1e-3
     assert made.report.hands_missed[0] < 1e-3 and made.report.warnings == ()
     # Without the goal it is elsewhere; the other hand and the feet are as without it.
@@ -226,7 +232,7 @@ def test_hands_meet_their_goals(walk, figure, onto):
     for name in ("RightHand", "LeftFoot"):
         assert np.array_equal(place(made.clip, name), place(onto(tall).clip, name))
     far = goal + np.array([0.0, 5.0, 0.0])
-    missed = onto(tall, RetargetSettings(hands=(HandGoal("leftHand", 0.5, far),))).report
+    missed = onto(tall, hands=(HandGoal("leftHand", 0.5, far),)).report
     assert missed.hands_missed[0] > 4.0
     assert "leftHand at 0.5 s" in missed.warnings[0] and "out of reach" in missed.warnings[0]
 
@@ -236,15 +242,15 @@ def test_hands_stay_at_goals_that_last(walk, figure, onto):
     free = place(onto(tall).clip, "LeftHand")
     goal = free[30] + np.array([0.05, 0.05, 0.0])
     lasting = HandGoal("leftHand", 0.45, goal, 0.55)
-    made = onto(tall, RetargetSettings(hands=(lasting,)))
+    made = onto(tall, hands=(lasting,))
     away = np.linalg.norm(place(made.clip, "LeftHand") - goal, axis=-1)[27:34]
     assert away.max() < 1e-3 and made.report.hands_missed[0] < 1e-3
     # Negative control: a hand that meets the goal at its ends alone moves between them.
     ends = tuple(HandGoal("leftHand", time, goal) for time in (0.45, 0.55))
-    other = place(onto(tall, RetargetSettings(hands=ends)).clip, "LeftHand")
+    other = place(onto(tall, hands=ends).clip, "LeftHand")
     assert np.linalg.norm(other - goal, axis=-1)[27:34].max() > 3e-3
     far = HandGoal("leftHand", 0.45, goal + np.array([0.0, 0.0, 5.0]), 0.55)
-    missing = onto(tall, RetargetSettings(hands=(far,)))
+    missing = onto(tall, hands=(far,))
     away = np.linalg.norm(place(missing.clip, "LeftHand") - far.position, axis=-1)[27:34]
     assert missing.report.hands_missed[0] == pytest.approx(away.max(), abs=1e-4)
     assert np.ptp(away) > 1e-3
@@ -259,7 +265,7 @@ def test_hands_stay_at_goals_that_last(walk, figure, onto):
 )
 def test_goals_of_no_hand_or_no_time_are_refused(figure, onto, goal, said):
     with pytest.raises(InvalidField, match=said):
-        onto(figure, RetargetSettings(hands=(goal,)))
+        onto(figure, hands=(goal,))
 
 
 def test_missing_roles_are_told(walk, figure, onto):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import rig_files
+from pxr import Gf, Usd, UsdSkel, Vt
 
 from posefield.common.errors import MotionFileError
 from posefield.motion import quat, skeleton
@@ -92,16 +93,12 @@ def test_wrong_statements_are_refused(figure, tmp_path, stated, said):
 
 
 def test_files_that_are_no_rig_are_refused(figure, tmp_path):
-    scaled = {"path": "scale", "node": 3}
-    moved = {"animations": [{"channels": [{"sampler": 0, "target": scaled}], "samplers": [{}]}]}
-    animated = rig_files.write_glb(tmp_path / "a.glb", figure, **moved)
     cases = {
         tmp_path / "a.fbx": "suffix '.fbx', expected one of .usd",
         tmp_path / "none.glb": "cannot be read",
         rig_files.write_empty_usd(tmp_path / "empty.usda"): "found no Skeleton",
         rig_files.write_usd(tmp_path / "two.usda", figure, skeletons=2): "found 2 skeletons",
         rig_files.write_glb(tmp_path / "b.glb", figure, skins=[]): "found no skin",
-        animated: "changes the scale of .*no animated scale",
     }
     for path, said in cases.items():
         with pytest.raises(MotionFileError, match=said):
@@ -112,3 +109,49 @@ def test_an_unusual_size_is_told(figure, tmp_path):
     path = rig_files.write_usd(tmp_path / "a.usda", figure.longer(100.0, *figure.names))
     (note,) = read_rig(path).notes
     assert "is the unit of the file right?" in note
+
+
+def test_a_file_in_a_pose_of_its_motion_stands_as_in_its_bind_pose(figure, tmp_path):
+    """Exporters write the pose of the current frame as the rest pose: here a crouch."""
+    upright = read_rig(rig_files.write_usd(tmp_path / "a.usda", figure)).skeleton
+    path = rig_files.write_usd(tmp_path / "b.usda", figure)
+    stage = Usd.Stage.Open(str(path))
+    own = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character0/Skel"))
+    rest = list(own.GetRestTransformsAttr().Get())
+    rest[0] = rest[0] * Gf.Matrix4d().SetTranslate((0.02, -0.07, 0.3))
+    knee = figure.index("LeftLeg")
+    rest[knee] = Gf.Matrix4d().SetRotate(Gf.Rotation((1, 0, 0), 30)) * rest[knee]
+    own.GetRestTransformsAttr().Set(Vt.Matrix4dArray(rest))
+    stage.GetRootLayer().Save()
+    assert np.abs(read_rig(path).skeleton.offsets - upright.offsets).max() < 1e-6
+
+
+@pytest.mark.parametrize("place", ["../out.usda", "{outside}/out.usda", "sub/../../out.usda"])
+def test_a_character_reads_no_file_out_of_its_folder(figure, tmp_path, place):
+    """Through sublayers, references, payloads, value clips and buffers, though the files exist."""
+    folder = tmp_path / "characters"
+    (folder / "sub").mkdir(parents=True)
+    rig_files.write_usd(tmp_path / "out.usda", figure)
+    (tmp_path / "out.bin").write_bytes(bytes(4))
+    name = place.format(outside=tmp_path)
+    changes = {
+        "sublayer": lambda made: made.GetRootLayer().subLayerPaths.append(name),
+        "reference": lambda made: made.DefinePrim("/Look").GetReferences().AddReference(name),
+        "payload": lambda made: made.DefinePrim("/Look").GetPayloads().AddPayload(name),
+        "clips": lambda made: Usd.ClipsAPI(made.DefinePrim("/Look")).SetClipAssetPaths([name]),
+    }
+    for kind, change in changes.items():
+        path = rig_files.write_usd(folder / f"{kind}.usda", figure)
+        made = Usd.Stage.Open(str(path))
+        change(made)
+        made.GetRootLayer().Save()
+        with pytest.raises(MotionFileError, match=r"refers to '.*out.usda', expected a path below"):
+            read_rig(path)
+    uri = name.replace("usda", "bin").replace("..", "%2e%2e")
+    bind = {"accessors": [{"bufferView": 0, "componentType": 5126, "count": 21, "type": "MAT4"}]}
+    buffers = {"buffers": [{"uri": uri, "byteLength": 4}]}
+    views = {"bufferViews": [{"buffer": 0, "byteLength": 4}], **bind, **buffers}
+    skin = {"joints": list(range(len(figure.names))), "inverseBindMatrices": 0}
+    path = rig_files.write_glb(folder / "a.glb", figure, skins=[skin], **views)
+    with pytest.raises(MotionFileError, match=r"refers to '.*out.bin', expected a path below"):
+        read_rig(path)

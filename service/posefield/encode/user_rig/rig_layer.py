@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from posefield.common.errors import UsdError
 from posefield.common.units import Floats, Singles
@@ -26,6 +26,7 @@ from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion import quat
 from posefield.question.results import SampledClip
+from posefield.rigs import usd_rig
 from posefield.rigs.rest_joints import RestJoints
 
 ANIMATION = "Anim"
@@ -38,10 +39,8 @@ def read_stage(path: Path, skeleton: str, joints: tuple[str, ...]) -> RigStage:
     skeleton: path of the prim. joints: its tokens in the order of the rig. Raises UsdError for a
     skeleton to which no layer can bind an animation.
     """
-    try:
-        stage = Usd.Stage.Open(str(path))
-    except Tf.ErrorException as fault:
-        raise UsdError(path, f"does not open as USD: {fault.args[0].commentary}") from fault
+    opened = usd_rig.open_stage(path, str(path))
+    stage = opened.stage
     prim = stage.GetPrimAtPath(skeleton)
     if prim.IsInstanceProxy() or prim.IsInstance():
         raise UsdError(

@@ -8,9 +8,7 @@ import numpy as np
 from posefield.common.array_shapes import JointWeights, Positions, Rotations
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield.rigs.rest_joints import OuterTransform, RestJoints
-
-WORLD = OuterTransform(quat.IDENTITY, np.zeros(3), np.ones(3))
+from posefield.rigs.rest_joints import WORLD, RestJoints
 
 
 def in_metres(rest: RestJoints) -> RestJoints:
