@@ -64,8 +64,7 @@ def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path):
     examples, notes = ingest.ingest(recipe, write_clips(tmp_path, clips))
     trained = train.train(recipe, examples, lambda _: None)
     exported = onnx_export.export_model(recipe, trained, notes)
-    others = levels_of_detail.build_alternatives(recipe, trained, exported.card)
-    levels = levels_of_detail.time_levels(exported, others)
+    levels = levels_of_detail.time_levels(exported)
     facts = json.loads(training_report.render(trained, exported, levels, []).json)
     assert [level["effector_m"] for level in facts["levels"]["levels"]] == [None] * 4
     assert "travel" in facts["fields"]

@@ -117,8 +117,7 @@ def _write_report(
     from posefield_train.report.training_report import TrainingStep
 
     progress("measuring levels of detail")
-    others = levels_of_detail.build_alternatives(recipe, trained, exported.card)
-    levels = levels_of_detail.time_levels(exported, others)
+    levels = levels_of_detail.time_levels(exported)
     progress("drawing the report")
     steps = [TrainingStep(name, seconds) for name, seconds in progress.finished]
     rendered = training_report.render(trained, exported, levels, steps)

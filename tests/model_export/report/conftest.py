@@ -27,22 +27,12 @@ def exported(exported, note):
 
 
 @pytest.fixture(scope="session")
-def alternatives(small_recipe, trained, exported):
-    """Alternatives to the small model's levels of detail."""
-    from posefield_train.report import levels_of_detail
-
-    return levels_of_detail.build_alternatives(small_recipe, trained, exported.card)
-
-
-@pytest.fixture(scope="session")
 def levels(exported):
-    """The small model's levels of detail with made times, themselves as alternatives."""
-    from posefield_train.report.levels_of_detail import LevelCosts, TimedLevels
+    """The small model's levels of detail with made times."""
+    from posefield_train.report.levels_of_detail import LevelCosts
 
-    chosen = exported.card.levels
-    seconds = tuple(8e-6 / (1 + number) for number in range(len(chosen)))
-    timed = TimedLevels(chosen, seconds)
-    return LevelCosts(timed, timed, tuple(2.0**number for number in range(len(chosen))))
+    levels = exported.card.levels
+    return LevelCosts(levels, tuple(8e-6 / (1 + number) for number in range(len(levels))))
 
 
 @pytest.fixture(scope="session")

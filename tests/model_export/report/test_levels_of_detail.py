@@ -1,9 +1,8 @@
-"""Tests of levels of detail in the report: the card's levels with times, and alternatives."""
+"""Tests of levels of detail in the report: the card's levels with times."""
 
 import json
 import math
 from html import unescape
-from itertools import pairwise
 
 import pytest
 
@@ -46,25 +45,6 @@ def test_every_level_is_said_what_it_is_for(page, levels):
     assert f"from {first} " not in page
 
 
-@pytest.mark.system
-def test_alternatives_go_from_fine_to_coarse(exported, alternatives, small_recipe):
-    facts = levels_of_detail.time_levels(exported, alternatives).chapter().facts
-    others = facts["others"]
-    for levels in (facts["levels"], others):
-        seconds = [level["seconds_per_pose"] for level in levels]
-        assert min(seconds) > 0.0 and seconds == sorted(seconds, reverse=True)
-    assert [own["times_budget"] for own in others][:: len(others) - 1] == [
-        1.0,
-        levels_of_detail.FARTHEST,
-    ]
-    for finer, coarser in pairwise(others):
-        assert finer["times_budget"] < coarser["times_budget"]
-        # Levels of nearly one size may change places: their samples are chosen anew.
-        assert finer["rms_m"] <= 1.02 * coarser["rms_m"] and finer["numbers"] >= coarser["numbers"]
-    assert others[0]["rms_m"] < 0.1 * others[-1]["rms_m"], "and not all are the same"
-    budget = small_recipe.size.budgets["rms"]
-    # Levels are tried with some questions, and measured with others.
-    kept = [own["rms_m"] <= 1.05 * own["times_budget"] * budget for own in others]
-    assert all(kept)
-    # Negative control: a finer level's budget would not do.
-    assert not any(own["rms_m"] <= 0.5 * own["times_budget"] * budget for own in others[:5])
+def test_times_fall_from_fine_to_coarse(exported):
+    seconds = levels_of_detail.time_levels(exported).seconds
+    assert min(seconds) > 0.0 and [*seconds] == sorted(seconds, reverse=True)

@@ -25,7 +25,7 @@ ACTIVE = {"script", "link", "iframe", "object", "embed", "base"}
 SVG, PNG = "data:image/svg+xml;base64,", "data:image/png;base64,"
 # Characters with a meaning in HTML, in SVG, in CSS, in templates or in matplotlib's labels.
 MARKUP = """<script>'&" {{7}} $x^2$"""
-CHARTS = 10
+CHARTS = 9
 
 
 class Parsed(HTMLParser):
