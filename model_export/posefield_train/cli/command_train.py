@@ -84,7 +84,8 @@ def _train(
         clips = len(examples)
         share = min(max((clips - SMALL) / (LARGE - SMALL), 0.0), 1.0)
         pairs = zip(STEP_SECONDS_PER_CLIP[SMALL], STEP_SECONDS_PER_CLIP[LARGE], strict=True)
-        progress.expect([clips * ((1.0 - share) * few + share * many) for few, many in pairs])
+        seconds = [clips * ((1.0 - share) * few + share * many) for few, many in pairs]
+        progress.expect([*seconds, *(REPORT_SECONDS if report else ())])
         ingest.check_presets(own, examples)
         trained = train.train(own, examples, progress, jobs)
         progress("writing the graph and comparing it with the reference")
@@ -103,6 +104,8 @@ STEP_SECONDS_PER_CLIP = {
     SMALL: (0.017, 0.014, 0.001, 0.012, 0.027),
     LARGE: (0.022, 0.018, 0.003, 0.030, 0.022),
 }
+# Of measuring the levels and drawing the report, of any number of clips.
+REPORT_SECONDS = (0.2, 3.0)
 
 
 def _write_report(
