@@ -93,6 +93,12 @@ class GraphParts:
         return _Part(session, tuple(port.name for port in ports))
 
 
+TRIED_CLIPS, TRIED_TIMES = 16, 5
+"""Captured clips and times, evenly spaced, whose answers are checked at opening."""
+LENGTHENED = 4.0
+"""Factor between the duration of such an answer and the captured ones."""
+FASTEST, UNIT_TOLERANCE = 20.0, 1e-3
+"""Largest speed of a root, m/s, and deviation of a quaternion's length from 1."""
 LABELS, LEVEL = "labels", "level"
 OUTPUTS = {
     "rotations": 4,
@@ -135,9 +141,12 @@ def default_controls(card: ModelCard) -> Annotated[Floats, "1 controls"]:
 
 
 def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> None:
-    """Check poses at three times of two clips; two rows and three times reveal mixed-up axes."""
-    points = np.vstack([default_controls(card), card.examples[0]]).astype(np.float32)
-    times = np.tile(np.linspace(0.0, card.durations[0], 3, dtype=np.float32), (2, 1))
+    """Check poses at some times of some clips; more than one of each reveals mixed-up axes."""
+    some = np.unique(np.linspace(0, len(card.examples) - 1, TRIED_CLIPS, dtype=int))
+    points = np.vstack([default_controls(card), np.array(card.examples)[some]]).astype(np.float32)
+    times = np.tile(
+        np.linspace(0.0, card.durations[0], TRIED_TIMES, dtype=np.float32), (len(points), 1)
+    )
     feed = {"controls": points, "time": times, LEVEL: np.array(level)}
     if card.labels:
         feed[LABELS] = np.eye(1, sum(card.label_counts), dtype=np.float32)
@@ -153,8 +162,33 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
             raise ModelError(source, f"its {name} are not finite numbers")
     if card.contacts and not ((answers[CONTACTS] >= 0.0) & (answers[CONTACTS] <= 1.0)).all():
         raise ModelError(source, f"its {CONTACTS} are not probabilities, expected 0 to 1")
-    if not (answers["duration"] > 0.0).all():
-        raise ModelError(source, f"its duration is {answers['duration'].min()} s, expected above 0")
+    _check_bounds(answers, card, source)
+
+
+def _check_bounds(answers: Mapping[str, Singles], card: ModelCard, source: str) -> None:
+    """Raise ModelError for answers at captured clips that no motion of this skeleton has."""
+    short, long = card.durations
+    size = float(np.linalg.norm(card.skeleton.offsets, axis=1).sum())
+    far = size + FASTEST * long
+    bounds = {
+        "duration": (short / LENGTHENED, long * LENGTHENED, "s"),
+        "sigma": (0.0, far, "m"),
+        "root_position": (-far, far, "m"),
+        "travel": (-far, far, "m"),
+        "bone_offsets": (-size, size, "m"),
+    }
+    for name, (low, high, unit) in bounds.items():
+        found = answers[name]
+        if not ((found >= low) & (found <= high)).all():
+            worst = found.flat[np.argmax(np.maximum(low - found, found - high))]
+            raise ModelError(
+                source, f"its {name} is {worst:.3g} {unit}, expected {low:.3g} to {high:.3g} {unit}"
+            )
+    if not answers["sigma"].any():
+        raise ModelError(source, "its sigma is 0 at all captured clips, expected more")
+    sizes = np.linalg.norm(answers["rotations"], axis=-1)
+    if not (np.abs(sizes - 1.0) < UNIT_TOLERANCE).all():
+        raise ModelError(source, "its rotations are not of length 1, expected unit quaternions")
 
 
 def _shapes(rows: int, times: int, card: ModelCard) -> dict[str, tuple[int, ...]]:

@@ -110,6 +110,9 @@ OPERATORS = frozenset(
     " Unsqueeze".split()
 )
 
+MAX_CONSTANT = 1e9
+"""Largest size of a float constant; those of trained models are below 1e5."""
+
 AllowedFields = Mapping[int, Any]
 """Fields that a message may have, each with the fields of its nested message; empty for other
 values.
@@ -149,7 +152,11 @@ def check(content: bytes) -> CheckedGraph:
     if others := used - OPERATORS:
         operator = min(others)[:40]
         raise ValueError(f"its graph has an operator {operator!r}, which posefield does not use")
-    shapes = {name: array.shape for name, array in initializers(content).items()}
+    constants = initializers(content)
+    for name, array in constants.items():
+        if array.dtype == DTYPES[FLOAT] and not (np.abs(array) <= MAX_CONSTANT).all():
+            raise ValueError(f"its {name} are not all numbers up to {MAX_CONSTANT:g} in size")
+    shapes = {name: array.shape for name, array in constants.items()}
     values = frozenset(field.content.decode() for field in fields_at(content, 7, 1, 2))
     return CheckedGraph(_metadata(content), shapes, values)
 
