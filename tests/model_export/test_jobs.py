@@ -1,13 +1,15 @@
 """Tests of jobs in local processes, and of kept results."""
 
+import hashlib
 import os
+import pickle
 import time
 from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
-from posefield.common.errors import TrainingError
+from posefield.common.errors import FileError, TrainingError
 from posefield_train.parallel.finished_jobs import FinishedJobs
 from posefield_train.parallel.jobs import ProcessJobs
 
@@ -116,3 +118,25 @@ def test_a_result_that_was_cut_short_is_computed_anew(tmp_path):
     again = HereJobs()
     assert totals(again, tmp_path) == [6.0, 12.0, 18.0]
     assert len(again.ran) == 1
+
+
+class Hostile:
+    """An object whose pickle makes a file when it is read."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.mark),)
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_a_result_that_would_run_code_is_refused(tmp_path, nested):
+    folder, mark = tmp_path / "kept", tmp_path / "ran"
+    totals(HereJobs(), folder)
+    held = pickle.dumps([np.ones(2), Hostile(mark)] if nested else Hostile(mark))
+    for file in folder.iterdir():
+        file.write_bytes(hashlib.sha256(held).digest() + held)
+    with pytest.raises(FileError, match=r"names (posix|nt)\.mkdir, expected arrays"):
+        totals(HereJobs(), folder)
+    assert not mark.exists()

@@ -58,7 +58,7 @@ class EvaluateOptions:
         Path | None,
         typer.Option(
             help="folder of finished folds: those of equal data, code and settings are read "
-            "instead of computed, and new ones are kept; it holds pickles, use your own only",
+            "instead of computed, and new ones are kept",
             metavar="FOLDER",
         ),
     ] = None

@@ -43,8 +43,7 @@ class ExecutorOptions:
         Path | None,
         typer.Option(
             help="folder of finished parts of a training that was stopped: those of equal data, "
-            "code and settings are read instead of computed, and new ones are kept; it holds "
-            "pickles, use your own only",
+            "code and settings are read instead of computed, and new ones are kept",
             metavar="FOLDER",
         ),
     ] = None
