@@ -119,7 +119,7 @@ test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, st
 	$(BIN)/python tests/interop/run.py
 
 .PHONY: test-all
-test-all: test test-system ## both rings, the older Blender, and the engines MLServer and Triton
+test-all: test test-system ## both rings and the older Blender
 	$(BIN)/python tests/interop/run.py --others
 
 .PHONY: fuzz

@@ -4,6 +4,7 @@ import csv
 import functools
 import re
 import tomllib
+import zlib
 from pathlib import Path
 
 import fixture_cache
@@ -16,7 +17,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.sample import sample_files
-from posefield_train.source import ingest, recipe
+from posefield_train.source import data_folder, ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
@@ -128,6 +129,19 @@ def exported(model: str) -> ExportedModel:
     return fixture_cache.value(
         f"{model}-exported", lambda: onnx_export.export_model(RECIPES[model](), trained(model), [])
     )
+
+
+def captured(name: str, data: Path) -> tuple[Recipe, TrainedModel, ExportedModel]:
+    """Return a shipped recipe, and what its training makes of motion capture in a folder."""
+    own = recipe.read(data_folder.RECIPES / f"{name}.toml")
+
+    def build() -> tuple[TrainedModel, ExportedModel]:
+        found, notes = ingest.ingest(own, data)
+        made = train.train(own, found, lambda _: None)
+        return made, onnx_export.export_model(own, made, notes)
+
+    place = zlib.crc32(str(data.resolve()).encode())
+    return own, *fixture_cache.value(f"{name}-{place}", build)
 
 
 def styled_folder() -> Path:

@@ -9,13 +9,9 @@ import pytest
 from posefield.mcp import Toolbox
 from posefield.motion import skeleton
 from posefield.registry import model_registry
-from posefield_train import train
-from posefield_train.graph import onnx_export
-from posefield_train.source import ingest, recipe
 
 pytestmark = pytest.mark.system
 
-RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 SCRIPTS = Path(__file__).parents[1] / "docs/scripts"
 TRAINED = ("hdm05_grab_high", "hdm05_grab_return")
 KINDS = {
@@ -28,15 +24,12 @@ MOST_PEAK, MOST_MISS = 2.5, 1e-3
 
 
 @pytest.fixture(scope="module")
-def trained_folder(real_data, tmp_path_factory):
+def trained_folder(real_data, models_trained, tmp_path_factory):
     """Folder with the models of the scripts that do not ship."""
     folder = tmp_path_factory.mktemp("acts")
     for name in TRAINED:
-        own = recipe.read(RECIPES / f"{name}.toml")
-        examples, notes = ingest.ingest(own, real_data)
-        trained = train.train(own, examples, lambda _: None)
-        exported = onnx_export.export_model(own, trained, notes)
-        (folder / f"{name}.onnx").write_bytes(exported.content)
+        content = models_trained.captured(name, real_data)[2].content
+        (folder / f"{name}.onnx").write_bytes(content)
     return folder
 
 

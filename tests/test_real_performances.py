@@ -22,13 +22,9 @@ from posefield.question.performance_question import PerformanceQuestion
 from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
-from posefield_train.graph import onnx_export
-from posefield_train.source import ingest, recipe
 
 pytestmark = pytest.mark.system
 
-RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 TARGET = [1.0, 1.65, 5.0]
 # Peak accelerations of captured walking, m/s², and skate, m/s, that performances stay below.
 PEAK, SKATE = 16.0, 0.08
@@ -50,14 +46,11 @@ def segments(**walk):
 
 
 @pytest.fixture(scope="module")
-def library(real_data):
+def library(real_data, models_trained):
     """The shipped models, and those of the reach, its return, and a kick."""
     found = dict(model_registry.load([model_registry.SHIPPED_FOLDER]).models)
     for name in ("hdm05_grab_high", "hdm05_grab_return", "hdm05_kick"):
-        own = recipe.read(RECIPES / f"{name}.toml")
-        examples, notes = ingest.ingest(own, real_data)
-        trained = train.train(own, examples, lambda _: None)
-        content = onnx_export.export_model(own, trained, notes).content
+        content = models_trained.captured(name, real_data)[2].content
         found[name] = Synthesizer(name, session.open_bytes(content, name))
     return ModelRegistry(found)
 
@@ -192,6 +185,6 @@ def test_an_arm_goes_smoothly_to_a_target_far_out_of_reach(library, place):
 def test_random_scripts_with_acts_have_no_fault(library):
     names = ("cmu_walk", "hdm05_grab_high", "hdm05_grab_return", "hdm05_kick")
     cast = random_scripts.cast({name: library.find(name) for name in names})
-    found = [random_scripts.check(own, cast.find) for own in random_scripts.scripts(cast, 24, 3)]
+    found = [random_scripts.check(own, cast.find) for own in random_scripts.scripts(cast, 12, 3)]
     assert [fault for own in found for fault in own.faults] == []
-    assert sum(own.answer is not None for own in found) > 12
+    assert sum(own.answer is not None for own in found) > 5

@@ -1,7 +1,5 @@
 """Tests of the recipes of returns: what goes on where a captured reach ends."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,13 +8,9 @@ from posefield.motion import skeleton
 from posefield.performance import act_motion, holds
 from posefield.question.motion_question import MotionQuestion, Target
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
-from posefield_train.graph import onnx_export
-from posefield_train.source import ingest, recipe
 
 pytestmark = pytest.mark.system
 
-RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 CLIPS = {"hdm05_grab_return": 29, "hdm05_deposit_return": 32}
 # How far a clip left out with its take may lie from its prediction, m; 14.8, 17.4 cm measured.
 MISSED = {"hdm05_grab_return": 0.155, "hdm05_deposit_return": 0.18}
@@ -24,13 +18,11 @@ CONTROLS = ("target_height", "target_forward", "target_left")
 
 
 @pytest.fixture(scope="module", params=CLIPS)
-def made(request, real_data):
+def made(request, real_data, models_trained):
     """A recipe's name, its clips and the model."""
-    own = recipe.read(RECIPES / f"{request.param}.toml")
-    examples, notes = ingest.ingest(own, real_data)
-    trained = train.train(own, examples, lambda _: None)
-    content = onnx_export.export_model(own, trained, notes).content
-    return own.name, examples, Synthesizer(own.name, session.open_bytes(content, own.name))
+    own, trained, exported = models_trained.captured(request.param, real_data)
+    opened = session.open_bytes(exported.content, own.name)
+    return own.name, trained.examples, Synthesizer(own.name, opened)
 
 
 def test_a_return_lasts_at_most_1_2_seconds(made):

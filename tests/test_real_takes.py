@@ -1,7 +1,5 @@
 """Tests of takes and detail of the models of real motion capture."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,14 +9,10 @@ from posefield.motion import contact_detection, skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
 from posefield_train.align import time_alignment
-from posefield_train.graph import onnx_export
-from posefield_train.source import ingest, recipe
 
 pytestmark = pytest.mark.system
 
-RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 RATE = 30.0
 """Frames a second of the clips, as by default. Faster ones show the noise of the capture."""
 SEEDS, FIELDS, POINTS = 200, 8, 30
@@ -27,13 +21,11 @@ ACCELERATED = {"cmu_walk": (0.8, 1.2), "hdm05_grab_high": (0.7, 1.3)}
 
 
 @pytest.fixture(scope="module", params=ACCELERATED)
-def made(request, real_data):
+def made(request, real_data, models_trained):
     """A recipe's examples and the model that training makes of them."""
-    own = recipe.read(RECIPES / f"{request.param}.toml")
-    examples, notes = ingest.ingest(own, real_data)
-    trained = train.train(own, examples, lambda _: None)
-    content = onnx_export.export_model(own, trained, notes).content
-    return trained.examples, Synthesizer(own.name, session.open_bytes(content, own.name))
+    own, trained, exported = models_trained.captured(request.param, real_data)
+    opened = session.open_bytes(exported.content, own.name)
+    return trained.examples, Synthesizer(own.name, opened)
 
 
 def captured(example):

@@ -63,29 +63,12 @@ def test_lines_are_reproduced_by_those_with_a_linear_part(name, points, queries)
     )
 
 
-@pytest.mark.parametrize("name", ["linear_rbf", "linear_coefficients"])
-def test_interpolators_meet_their_samples(name, points):
-    found = predicted(name, laid(points), curved(points), points)
-    assert np.abs(found - curved(points)).max() < EXACT
-
-
 def test_thin_plates_are_scipys_own(points, queries):
     values = curved(points)
     own = RBFInterpolator(points, values, kernel="thin_plate_spline", degree=1)(queries)
     found = predicted("thin_plate", laid(points), values, queries)
     assert np.abs(found - own).max() < EXACT
     assert np.abs(predicted("cubic_rbf", laid(points), values, queries) - own).max() > 1e-3
-
-
-def test_equal_controls_are_trials_of_one_motion(points, queries):
-    values = curved(points)
-    twice = laid(np.vstack([points, points]))
-    apart = np.vstack([values + 0.2, values - 0.2])
-    for name in ("thin_plate", "linear_rbf", "cubic_rbf", "thin_plate_smoothed"):
-        found = predicted(name, twice, apart, queries)
-        assert np.isfinite(found).all()
-    found = predicted("thin_plate", twice, apart, queries)
-    assert np.abs(found - predicted("thin_plate", laid(points), values, queries)).max() < EXACT
 
 
 def test_the_nearest_of_the_same_performer_is_taken(points):
@@ -115,15 +98,3 @@ def test_every_peer_has_a_use_for_the_performer(two, queries):
             for end in ("", methods.OPEN)
         )
         assert named < 0.75 * unnamed, name
-
-
-def test_left_out_weights_are_those_of_a_peer_without_the_part(two):
-    samples, values = two
-    own = linear_smoothers.smoother(peers.thin_plate(0.0), samples, samples.points)
-    parts = linear_smoothers.left_out_parts(samples)
-    assert len(parts) == linear_smoothers.MOST_PARTS
-    assert np.sum(parts, axis=0).tolist() == [1] * 24
-    out = parts[3]
-    known, asked = samples.half_ranges[~out], samples.half_ranges[out]
-    expected = RBFInterpolator(known, values[~out], kernel="thin_plate_spline", degree=1)(asked)
-    assert np.abs((own.left_out @ values)[out] - expected).max() < EXACT

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper import errors, markdown, measurement
+from paper import errors, measurement
 
 from posefield_train.graph import truncation_cost
 from posefield_train.tensor import truncation_error
@@ -64,13 +64,3 @@ def test_every_size_says_what_it_costs(measured, made):
         assert (size.core, size.stored) == (compression.core, compression.stored)
     assert named["500 cm"].core < named["1000 cm"].core
     assert all(size.from_naive > 0.5 * measured.full_from_naive for size in measured.sizes)
-
-
-def test_text_holds_the_papers_figures_and_every_definition(measured):
-    said = markdown.text(measured)
-    for figure in ("119.8 s", "2.76 ms", "22 × 6 × 24 | 267 | 106", "18 × 6 × 28 | 280 |"):
-        assert figure in said
-    for one in (*measured.precompute, *measured.pose):
-        assert one.words in said
-    assert "thresholds have no unit" in said
-    assert said.count("core alone at 500") == 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from paper import kernels, poses, precomputation
+from paper import poses, precomputation
 
 from posefield_train.tensor.decoder import Decoder
 
@@ -51,11 +51,3 @@ def test_compiled_naive_poses_are_those_of_naive_kriging(made, question, field, 
     # Solved, inverted, multiplied: a system of condition 1e4.
     assert np.abs(found - expected).max() < EXACT
     assert np.abs(found - frames[each, before + 1]).max() > 1e-4
-
-
-def test_solve_is_what_the_system_says(rng):
-    system, b = rng.normal(size=(9, 9)), rng.normal(size=9)
-    (columns, order, inverse), out = poses.lu_factors(system[None]), np.zeros(9)
-    kernels.solve(np.ascontiguousarray(columns[0]), order[0], inverse[0], b, out)
-    assert np.abs(system @ out - b).max() < 1e-12
-    assert len(set(order[0])) == 9 and list(order[0]) != list(range(9)), "rows change places"

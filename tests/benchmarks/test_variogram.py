@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from paper import variogram
 from paper.variogram import (
-    BATCH_NUMBERS,
     FEWEST_PAIRS,
     LAGS,
     LARGEST_LAG,
     RANGES,
     ExperimentalVariogram,
 )
-from scipy.optimize import nnls
 
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.tensor import hosvd
@@ -59,22 +57,6 @@ def test_lags_hold_the_pairs_of_their_distance(samples, values):
     assert np.max(np.abs(rows[1:, 1] - np.array(expected)[:-1, 1])) > 1e-2
 
 
-def test_batches_of_pairs_do_not_change_a_distance(samples, rng):
-    # Three pairs at a time, and one at a time.
-    for width in (BATCH_NUMBERS // 3, BATCH_NUMBERS + 1):
-        wide = np.zeros((40, width))
-        wide[:, [0, -1]] = rng.normal(size=(40, 2))
-        found = variogram.experimental_variogram(samples, wide)
-        narrow = variogram.experimental_variogram(samples, wide[:, [0, -1]])
-        assert np.max(np.abs(found.values - narrow.values)) < TOLERANCE
-        assert (
-            np.max(
-                np.abs(found.values - variogram.experimental_variogram(samples, wide[:, :1]).values)
-            )
-            > 0.1
-        )
-
-
 def test_dissimilarity_is_the_distance_of_slices_of_the_core_tensor(samples, rng):
     tensor = rng.normal(size=(6, 5, 40))
     full = hosvd.decompose(tensor)
@@ -117,41 +99,3 @@ def test_fit_finds_the_model_that_was_put_in(covariance, reach):
         )
         > 1e-3
     )
-
-
-@pytest.mark.parametrize("count", [3, 40])
-def test_without_a_lag_of_pairs_enough_there_is_no_sill(count, rng):
-    """As with a control of two values: pairs are at no distance or at the largest."""
-    samples = np.repeat([[-1.0], [1.0]], [1, count - 1], axis=0)
-    data = variogram.experimental_variogram(samples, rng.normal(size=(count, 2)))
-    assert len(data.pairs) == 0
-    found = variogram.fit_by_grid(data, "matern52")
-    assert (found.nugget, found.sill, found.range) == (0.0, 0.0, RANGES[-1])
-
-
-def misfit(fit, data, covariance):
-    gap = model(covariance, fit.nugget, fit.sill, fit.range, data.distances) - data.values
-    return np.sum(data.pairs / data.values**2 * gap**2)
-
-
-@pytest.mark.parametrize("shape", ["rising", "falling", "steep", "even"])
-def test_fit_is_the_least_weighted_square_over_the_ranges(shape, rng):
-    distances = np.linspace(0.1, 2.0, 15)
-    values = {
-        "rising": 0.5 + distances,
-        "falling": 3.0 - distances,
-        "steep": distances**3,
-        "even": np.ones(15),
-    }[shape] * rng.uniform(0.8, 1.2, 15)
-    data = seen(values, distances, rng.integers(3, 60, 15).astype(float))
-    roots = np.sqrt(data.pairs) / data.values
-    least = min(
-        nnls(np.stack([np.ones(15), rising], axis=1) * roots[:, None], values * roots)[1] ** 2
-        for rising in 1.0 - COVARIANCES["matern52"].numpy(np.square(distances / RANGES[:, None]))
-    )
-    found = variogram.fit_by_grid(data, "matern52")
-    assert found.nugget >= 0.0
-    assert found.sill >= 0.0
-    assert abs(misfit(found, data, "matern52") - least) < 1e-8 * max(least, 1.0)
-    unweighted = variogram.fit_by_grid(seen(values, distances, data.values**2), "matern52")
-    assert misfit(unweighted, data, "matern52") > least * (1.0 + 1e-6)

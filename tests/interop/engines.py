@@ -1,23 +1,17 @@
 """Comparison of the same model file in other inference engines with onnxruntime's results.
 
-MLServer and Triton are called over the Open Inference Protocol with Triton's client; OpenVINO and
-onnxruntime-web (on Node) run in their own processes.
+OpenVINO and onnxruntime-web (on Node) run in their own processes.
 """
 
 import json
-import os
-import shutil
 import subprocess
 import sys
-import sysconfig
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
 
 import environment
 import numpy as np
-import running
 import trained
 
 from posefield.inference.onnx_runtime import OUTPUTS
@@ -26,13 +20,6 @@ from posefield.inference.session import Session
 HERE = Path(__file__).parent
 VENV = environment.ROOT / ".venv-engines"
 PACKAGES = ("openvino==2026.4.1",)
-SERVERS = (
-    *PACKAGES,
-    "mlserver==1.7.1",
-    "nvidia-pytriton==0.7.0",
-    "onnxruntime==1.31.1",
-    "tritonclient[http]==2.73.0",
-)
 WEB = environment.ROOT / "build/web"
 WEB_PACKAGES = ("onnxruntime-web@1.23.0",)
 # Engines sum in another order, and sigma is the root of a difference: metres, seconds and parts of
@@ -42,9 +29,9 @@ CLOSE = 5e-5
 Tensors = Mapping[str, np.ndarray]
 
 
-def faults(node: Path, npm: Path, servers: bool = False) -> list[str]:
-    """Return the faults of OpenVINO and onnxruntime-web, or of the servers, a line each."""
-    python = environment.packages(VENV, SERVERS if servers else PACKAGES)
+def faults(node: Path, npm: Path) -> list[str]:
+    """Return the faults of OpenVINO and onnxruntime-web, a line each."""
+    python = environment.packages(VENV, PACKAGES)
     web = environment.modules(WEB, WEB_PACKAGES, node, npm)
     model, content = trained.family()
     with tempfile.TemporaryDirectory() as name:
@@ -55,11 +42,8 @@ def faults(node: Path, npm: Path, servers: bool = False) -> list[str]:
         asked = question["controls"], question["time"]
         expected = dict(zip(OUTPUTS, model.session.run(*asked, *OUTPUTS), strict=True))
         other = dict(zip(OUTPUTS, model.session.run(*asked, *OUTPUTS, level=1), strict=True))
-        if servers:
-            found = dict(_served(python, folder))
-        else:
-            found = {"openvino": _openvino(python, folder)}
-            found["onnxruntime-web"] = _web(node, web, folder, question)
+        found = {"openvino": _openvino(python, folder)}
+        found["onnxruntime-web"] = _web(node, web, folder, question)
         return [*_compared(found, expected, other)]
 
 
@@ -93,78 +77,6 @@ def _question(session: Session) -> dict[str, np.ndarray]:
     return {"controls": points, "time": times.astype(np.float32)}
 
 
-def _served(python: Path, folder: Path) -> Iterator[tuple[str, Tensors]]:
-    """Answers over the protocol by engine and way to send tensors."""
-    with _mlserver(python, folder) as address:
-        yield "MLServer, JSON", _asked(python, folder, address, "--json")
-    if not sysconfig.get_config_var("Py_ENABLE_SHARED"):
-        print("not asked: Triton, which needs Python as a shared library")
-        return
-    with _triton(folder) as address:
-        yield "Triton", _asked(python, folder, address)
-        yield "Triton, JSON", _asked(python, folder, address, "--json")
-
-
-def _asked(python: Path, folder: Path, address: str, *options: str) -> Tensors:
-    result, client = folder / "answer.npz", HERE / "inference_client.py"
-    command = (python, client, address, "reaching", folder / "question.npz", result, *options)
-    _call(*command)
-    return _loaded(result)
-
-
-@contextmanager
-def _mlserver(python: Path, folder: Path) -> Iterator[str]:
-    ports, own = running.ports(3), folder / "mlserver"
-    own.mkdir()
-    names = ("http_port", "grpc_port", "metrics_port")
-    told = dict(zip(names, ports, strict=True)) | {"host": "127.0.0.1", "parallel_workers": 0}
-    (own / "settings.json").write_text(json.dumps(told))
-    model = {"uri": str(folder / "reaching.onnx")}
-    settings = {
-        "name": "reaching",
-        "implementation": "mlserver_onnx.OnnxRuntime",
-        "parameters": model,
-    }
-    (own / "model-settings.json").write_text(json.dumps(settings))
-    command = [python.with_name("mlserver"), "start", own]
-    with running.started(command, own / "said.txt", PYTHONPATH=str(HERE)):
-        yield f"127.0.0.1:{ports[0]}"
-
-
-@contextmanager
-def _triton(folder: Path) -> Iterator[str]:
-    """Triton itself, out of PyTriton's package, whose own way to start it is not needed."""
-    (packages,) = VENV.glob("lib/python*/site-packages")
-    server, version = packages / "pytriton/tritonserver", f"{sys.version_info.minor}"
-    stub = f"python_backend_stubs/3.{version}/triton_python_backend_stub"
-    shutil.copy(server / stub, server / "backends/python")
-    own = folder / "triton/reaching/1"
-    own.mkdir(parents=True)
-    shutil.copy(folder / "reaching.onnx", own)
-    shutil.copy(HERE / "triton_onnx.py", own / "model.py")
-    (own.parent / "config.pbtxt").write_text(
-        'name: "reaching"\nbackend: "python"\ninstance_group [{kind: KIND_CPU}]\n'
-    )
-    port, libraries = (
-        running.ports(1)[0],
-        (sysconfig.get_config_var("LIBDIR"), packages / "nvidia_pytriton.libs"),
-    )
-    command = [
-        server / "bin/tritonserver",
-        f"--model-repository={folder / 'triton'}",
-        f"--backend-directory={server / 'backends'}",
-        f"--http-port={port}",
-        "--http-address=127.0.0.1",
-        "--allow-grpc=false",
-        "--allow-metrics=false",
-    ]
-    path = os.pathsep.join(map(str, libraries))
-    with running.started(
-        command, folder / "said.txt", LD_LIBRARY_PATH=path, PACKAGES=str(packages)
-    ):
-        yield f"127.0.0.1:{port}"
-
-
 def _openvino(python: Path, folder: Path) -> Tensors:
     result = folder / "openvino.npz"
     model, question = folder / "reaching.onnx", folder / "question.npz"
@@ -193,6 +105,6 @@ def _call(*command: str | Path) -> None:
 
 
 if __name__ == "__main__":
-    found = faults(*environment.node()) + faults(*environment.node(), servers=True)
+    found = faults(*environment.node())
     print("\n".join(found) or "no fault in any engine")
     sys.exit(bool(found))

@@ -7,7 +7,7 @@ number of frames, and if a deliberately damaged or known unsupported file passes
 pass the Khronos validator without errors and warnings, and the contract must pass Redocly. Then it
 builds and queries the image, and checks a cache before the service, the model in other engines, the
 page in a browser, glTF files in Godot and the Blender add-on. `--others` runs what CI does not: the
-add-on in the older Blender, and the model in MLServer and Triton.
+add-on in the older Blender.
 """
 
 import json
@@ -77,10 +77,7 @@ def khronos(node: Path, folder: Path) -> list[Row]:
 def main() -> int:
     """Exit code: 1 if a row is not as it should be or a part has a fault."""
     if sys.argv[1:] == ["--others"]:
-        return _print_faults(
-            addon=lambda: addon.faults(environment.OLDER),
-            servers=lambda: engines.faults(*environment.node(), servers=True),
-        )
+        return _print_faults(addon=lambda: addon.faults(environment.OLDER))
     python, node = environment.prepare()
     # Two threads would train the same models twice.
     page.models()

@@ -5,16 +5,18 @@ import json
 import newcomers
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from posefield import cli
 from posefield.inference import session
 from posefield.model_file import checked_file
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
+from posefield_train.cli import commands
 from posefield_train.graph import onnx_export
 from posefield_train.source import canonical, ingest
-from posefield_train.source.recipe import Recipe
 
 SHOWN = (2.0, 7.0, 12.5)
 SAID = ("--performer", "cy", "--unit", "1", "--up", "y", "--licence", "CC0-1.0")
@@ -39,12 +41,15 @@ def table(tmp_path_factory):
     return newcomers.write_newcomer(tmp_path_factory.mktemp("cy") / "cy", SHOWN)
 
 
-@pytest.fixture
-def adapted(posefield, base, table, tmp_path):
-    path = tmp_path / "new.onnx"
-    code, out, _ = posefield("adapt", base, "--table", table, "-o", path, *SAID, "--json")
-    assert code == 0
-    return path, json.loads(out)
+@pytest.fixture(scope="module")
+def adapted(base, table):
+    """The file of one adaptation, and what the command says of it."""
+    path = base.with_name("new.onnx")
+    commands(cli.app)
+    words = ("adapt", base, "--table", table, "-o", path, *SAID, "--json")
+    done = CliRunner().invoke(cli.app, [*map(str, words)])
+    assert done.exit_code == 0, done.output
+    return path, json.loads(done.stdout)
 
 
 def test_the_new_file_says_who_it_knows_and_where_that_comes_from(base, adapted):
@@ -154,16 +159,3 @@ def test_files_that_cannot_be_used(posefield, base, table, tmp_path):
 def test_a_model_that_tells_nobody_apart_is_refused(posefield, model_path, table, tmp_path):
     words = (model_path, "--table", table, "-o", tmp_path / "x.onnx", *SAID)
     assert refused(posefield, "tells no performers apart", *words) == 2
-
-
-@pytest.fixture(scope="module")
-def measuring(folder):
-    """A model whose one control is measured."""
-    height = {"quantity": "height", "joint": "LeftHand", "at": "start"}
-    asked = [{"name": "hand", "description": "hand", "auto": height}]
-    plain = newcomers.recipe().model_dump(exclude_none=True, by_alias=True)
-    recipe = Recipe.model_validate({**plain, "controls": asked})
-    trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
-    path = folder / "measuring.onnx"
-    path.write_bytes(onnx_export.export_model(recipe, trained, []).content)
-    return path

@@ -198,7 +198,6 @@ def test_takes_without_motion_are_refused(posefield, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "expected a folder of recipes"),
         (("--strides", "--like", "a.bvh:1-2"), "expected either --strides or --like"),
         (("--like", "c.bvh:1-2"), "file 'c.bvh', expected a take of the folder, such as a.bvh"),
         (("--like", "a.bvh:5-7"), "5 to 7 s, expected 0.6 s or more between 0 and 6.00 s"),
@@ -234,7 +233,6 @@ def test_roles_that_names_do_not_tell_are_asked_and_can_be_stated(posefield, odd
     [
         ("[roles]\nleftFoot = 3", "no table [roles] of joints by role"),
         ('[roles]\nleftPaw = "a"', "unknown roles ['leftPaw'], expected some of hips, spine"),
-        ('[roles]\nleftFoot = "a"\nrightFoot = "a"', "a joint with two roles, expected one each"),
     ],
 )
 def test_roles_that_cannot_be_are_refused(posefield, odd, text, said):

@@ -84,7 +84,7 @@ CASES = {
     **{
         f"{name}, drifts {drifts}": {"covariance": name, "drifts": drifts}
         for name in COVARIANCES
-        for drifts in ((0,), (1,), (0, 1))
+        for drifts in (((0,), (1,), (0, 1)) if name == "matern52" else ((1,),))
     },
     "one performer": {"names": ("ada",)},
     "a constant field": {"constant": ("offsets",)},
@@ -205,17 +205,6 @@ def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_pat
         given = {**feed, "labels": np.zeros((batch, 3), "f4")}
         assert apart(runtime.run(None, feed), runtime.run(None, given)) == 0.0
     assert capfd.readouterr().err == ""
-
-
-def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, labelled_path):
-    again = onnx_export.export_model(labelled_recipe, labelled, []).content
-    assert again == labelled_path.read_bytes()
-    others = {"performer": ("anna", *labelled.model.bank.labels["performer"][1:])}
-    renamed = replace(labelled.model, bank=replace(labelled.model.bank, labels=others))
-    assert (
-        onnx_export.export_model(labelled_recipe, replace(labelled, model=renamed), []).content
-        != again
-    )
 
 
 # --- files that do not fit ------------------------------------------------------------------------

@@ -203,12 +203,10 @@ def left_out_error(labels, examples):
     return float(np.sqrt(made.left_out_errors.mean()))
 
 
-def test_both_labels_are_better_than_one_and_one_is_better_than_none(strides):
+def test_both_labels_are_better_than_one(strides):
     both = left_out_error(["performer", "style"], strides)
-    performer, style = (left_out_error([name], strides) for name in ("performer", "style"))
-    none = left_out_error([], strides)
-    assert both < 0.5 * min(performer, style)
-    assert max(performer, style) < 0.9 * none
+    performer = left_out_error(["performer"], strides)
+    assert both < 0.5 * performer
     # Negative control: styles of other clips tell nothing.
     order = np.random.Generator(np.random.PCG64(5)).permutation(len(strides))
     shuffled = [

@@ -113,12 +113,6 @@ def test_variance_is_nearer_to_that_of_all_samples_and_grows_away_from_them(hype
     assert grown[2] > 1.0 > grown[0]
 
 
-@pytest.mark.parametrize("wrong", [{"drifts": (0, 1)}, {"nugget": 0.0}])
-def test_other_parameters_are_refused(hyper, samples, wrong):
-    with pytest.raises(ValueError, match="expected one drift and a nugget above zero"):
-        ProjectedProcess(replace(hyper, **wrong), samples, samples[:9])
-
-
 # --- choice of clips ------------------------------------------------------------------------------
 
 
@@ -169,20 +163,6 @@ def test_two_draws_for_tuning_share_no_clip(family):
     for points in (family[:500], family[:601], family, large_family):
         count = sample_points.tuned_count(len(points))
         assert len(sample_points.choose_tuned(points, 3, (2,), 0)) == count
-
-
-def test_a_draw_keeps_inner_products_and_the_coordinates_of_the_effector(family, rng):
-    samples = SamplePoints(family, 3, np.arange(700), (2,))
-    values, effector = rng.normal(size=(700, 900)), rng.normal(size=(700, 3, 15))
-    drawn = TuningProblem(samples, values, None, effector).drawn(1)
-    rows = sample_points.choose_tuned(family, 3, (2,), 1)
-    assert drawn.values.shape == (len(rows), 15 + len(rows))
-    assert (drawn.values[:, :15] == values[rows, :15]).all()
-    assert (drawn.effector == effector[rows]).all()
-    gram = drawn.values @ drawn.values.T
-    assert np.abs(gram - values[rows] @ values[rows].T).max() < 1e-9
-    small = TuningProblem(samples.subset(np.arange(500)), values[:500], None)
-    assert small.drawn(0) is small
 
 
 def _mean_square(residuals):

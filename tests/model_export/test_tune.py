@@ -233,30 +233,3 @@ def test_quantities_beside_share_scales_and_correlation(samples, people, rng):
     assert all(own[name[0]] != value_of(LABELLED, name) for name in BESIDE)
     without = kriging_tuning.tune_beside(problem, replace(LABELLED, drifts=(1,), trend=0.0)).hyper
     assert without.trend == 0.0 and without.drifts == (1,)
-
-
-def test_tuning_twice_gives_the_same_bits(samples, people, rng):
-    values = own_ways(samples, people, rng, 0.5)
-    a, b = (tuned_for(samples, people, values) for _ in range(2))
-    assert np.array_equal(a.residuals, b.residuals)
-    assert (a.hyper.labels, a.hyper.nugget) == (b.hyper.labels, b.hyper.nugget)
-
-
-def alike(a, b):
-    """Compare two fields: the search stops when the loss hardly falls."""
-    near = np.max(np.abs(np.log(a.hyper.scales / b.hyper.scales))) < 0.05
-    return near and abs(a.unexplained - b.unexplained) < 1e-4
-
-
-def test_order_of_labelled_and_grouped_samples_does_not_matter(samples, people, rng):
-    values = own_ways(samples, people, rng, 0.5)
-    order = rng.permutation(50)
-    who, takes = people
-    first = tuned_for(samples, people, values)
-    second = tuned_for(samples[order], (who[order], takes[order]), values[order])
-    assert alike(first, second)
-    assert abs(np.log(first.hyper.labels[0].offset / second.hyper.labels[0].offset)) < 0.05
-    # Who is called first, and which take, is nothing either.
-    renamed = (who + 1) % PEOPLE, (7 * takes) % TAKES
-    assert alike(first, tuned_for(samples, renamed, values))
-    assert not alike(first, tuned_for(samples, (who[order], takes[order]), values))

@@ -5,7 +5,6 @@ import json
 import re
 from collections import Counter
 from dataclasses import replace
-from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,7 +16,6 @@ import pytest
 from posefield_train.report import clip_errors, training_report
 from posefield_train.report import controls as control_chapters
 from posefield_train.report.drawing import svg_chart
-from posefield_train.report.drawing.html_page import Page, Section
 from posefield_train.report.training_report import TrainingStep
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
@@ -74,16 +72,9 @@ def test_the_page_and_its_charts_load_nothing(page):
         assert not ACTIVE & set(part.tags)
 
 
-@pytest.mark.parametrize(
-    "planted",
-    [
-        '<img src="http://example.com/x.png">',
-        "<style>@import 'x.css';</style>",
-        '<p style="background: url(x.png)">x</p>',
-    ],
-)
-def test_a_planted_load_is_found(rendered, page, planted):
+def test_a_planted_load_is_found(rendered, page):
     """Negative control of the test above."""
+    planted = '<p style="background: url(x.png)">x</p>'
     assert Parsed(rendered.html.replace(b"</main>", f"{planted}</main>".encode())).loads
     assert Parsed(page.charts[0].replace(b"</svg>", f"{planted}</svg>".encode())).loads
 
@@ -155,13 +146,6 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
         replace(trained, examples=tuple(examples)), exported.card.controls
     )
     assert "a…" in bars.section.charts[0].svg.decode()
-
-
-def test_unescaped_text_would_be_found():
-    """Negative control of the tests above."""
-    page = Page("", "", "", (), [Section("a", "", (MARKUP,))]).html()
-    assert Parsed(page).tags["script"] == 0
-    assert Parsed(unescape(page.decode()).encode()).tags["script"] > 0
 
 
 def test_charts_do_not_depend_on_the_users_matplotlib_settings():

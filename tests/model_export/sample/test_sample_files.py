@@ -20,10 +20,8 @@ def samples():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    output = tmp_path_factory.mktemp("sample") / "new" / "reaching"
-    assert sample_files.write_family(output) == output / "recipe.toml"
-    return output
+def folder(reaching_folder):
+    return reaching_folder
 
 
 @pytest.fixture(scope="module")
@@ -99,17 +97,17 @@ def test_noise_has_the_size_it_claims_and_keeps_hinges_and_feet(samples):
             assert np.linalg.norm(foot - foot.mean(axis=0), axis=-1).max() < 0.02
 
 
-def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    assert sample_files.write_family(folder) == folder / "recipe.toml"
-    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
-
-
 @pytest.fixture
 def small(tmp_path, samples):
     """A family of one clip in a folder that was empty."""
     (tmp_path / "small").mkdir()
     return sample_files.write_family(tmp_path / "small", samples[:1]).parent
+
+
+def test_a_folder_that_holds_the_family_is_left_as_it_is(small, samples):
+    before = {path: path.stat().st_mtime_ns for path in small.rglob("*")}
+    assert sample_files.write_family(small, samples[:1]) == small / "recipe.toml"
+    assert {path: path.stat().st_mtime_ns for path in small.rglob("*")} == before
 
 
 def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
