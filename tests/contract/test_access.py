@@ -194,9 +194,7 @@ def test_each_refusal_is_one_line_without_secrets(guarded, as_, issued, caplog):
         assert secret not in everything
 
 
-@pytest.mark.parametrize(
-    "host", ["0.0.0.0", "::", "192.0.2.1", "service.example", "localhost.evil"]
-)
+@pytest.mark.parametrize("host", ["0.0.0.0", "localhost.evil"])
 def test_an_open_service_on_an_open_address_does_not_start(host, lines):
     with pytest.raises(InvalidField, match=r"POSEFIELD_HOST: .*POSEFIELD_OPEN=1"):
         create_app(ModelRegistry({}), Settings(host=host))

@@ -50,16 +50,6 @@ def test_each_control_outside_the_samples_gives_a_warning(ask, controls, loaded)
     assert pose["trust"]["warnings"] == [json.loads(line) for line in lines]
 
 
-def test_every_performer_of_the_card_can_be_asked_for(ask, controls):
-    names = ask("GET", "/v1/models/reach").json()["performers"]
-    assert names == ["middle", "short", "tall"]
-    asked = [url(f"{CLIP}.json", controls, performer=name) for name in names]
-    answers = [ask("GET", each).json() for each in (*asked, url(f"{CLIP}.json", controls))]
-    assert [answer["trust"]["performer"] for answer in answers] == [*names, None]
-    for i, one in enumerate(answers):
-        assert all(one["rotations"] != other["rotations"] for other in answers[:i])
-
-
 @pytest.mark.parametrize("given", ["abc-1.2_X", "a" * 64])
 def test_a_request_keeps_its_id(given, ask):
     answer = ask("GET", "/nowhere", headers={"x-request-id": given})
@@ -91,9 +81,3 @@ def test_a_failure_shows_its_id_and_nothing_else(caplog):
     assert problem["instance"] == answer.headers["x-request-id"] == "id-1"
     assert "secret" not in answer.text and "RuntimeError" not in answer.text
     assert "id-1" in caplog.text and "secret" in caplog.text
-
-
-def test_the_same_question_gives_the_same_bytes(ask, controls):
-    for extension in FORMATS:
-        asked = url(f"{CLIP}.{extension}", controls)
-        assert ask("GET", asked).content == ask("GET", asked).content

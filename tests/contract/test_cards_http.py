@@ -1,8 +1,5 @@
 """Cards over HTTP: measured controls, contacts and accelerations of captured clips."""
 
-from dataclasses import replace
-
-import bad_scripts
 import jsonschema
 import pytest
 from asking import asker
@@ -56,19 +53,3 @@ def test_a_card_has_the_swings_of_feet_and_the_accelerations_of_clips(opened, va
     for wrong in ({"contacts": [{"joint": 3}]}, {"captured_acceleration": {"median": 1.0}}):
         with pytest.raises(jsonschema.ValidationError):
             valid("ModelCard", {**card, **wrong})
-
-
-def test_joins_tell_what_they_are_compared_with(opened, valid):
-    """A file that was trained before cards had accelerations is compared with its own clips."""
-    earlier = replace(opened, card=replace(opened.card, captured_acceleration=None))
-    walks = {"segments": [bad_scripts.WALK, bad_scripts.HOLD, bad_scripts.WALK]}
-    found = [
-        served("walk", each)("POST", "/v1/performances.json", json=walks).json()["trust"]
-        for each in (opened, earlier)
-    ]
-    for report in found:
-        valid("PerformanceReport", report)
-    joins = [report["joins"][0] for report in found]
-    assert [join["reference"] for join in joins] == ["captured", "synthesised"]
-    assert joins[0]["usual"] == pytest.approx(opened.card.captured_acceleration.p99, abs=1e-6)
-    assert joins[1]["usual"] != joins[0]["usual"]

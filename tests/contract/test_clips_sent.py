@@ -70,15 +70,6 @@ def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, l
 
 
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
-def test_work_goes_on_for_a_client_that_stays(kind, loaded, controls):
-    """Negative control of the test above."""
-    encoder, made = counting()
-    with listening(served(loaded, encoder)) as base:
-        answer = httpx.post(f"{base}{PATH}.{kind}", json=asked(controls, MANY), timeout=60)
-    assert len(made) == MANY and b"manifest.jsonl" in answer.content
-
-
-@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_an_archive_that_cannot_be_finished_breaks_off(kind, loaded, controls, caplog):
     encoder, _ = counting(most=2 * CLIPS)
     got = bytearray()

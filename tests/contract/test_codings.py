@@ -49,12 +49,6 @@ def test_text_shrinks_and_comes_out_the_same(rest, coding, app, ask, controls):
     assert sent(app, url, coding)["body"] == packed["body"]
 
 
-@pytest.mark.parametrize("rest", ["clip.usdc", "clip.usdz", "clip.glb", "clip.npz"])
-def test_binary_files_are_sent_as_they_are(rest, app, controls):
-    answer = sent(app, f"/v1/models/reach/{rest}?{urlencode(controls)}", "zstd, gzip")
-    assert not answer["headers"].keys() & {b"content-encoding", b"vary"}
-
-
 @pytest.mark.parametrize("coding", ["zstd", "gzip"])
 def test_a_crowd_is_one_stream(coding, app, ask):
     url = "/v1/models/walk/crowd.usda?count=3&seconds=0.5"

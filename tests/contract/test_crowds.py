@@ -43,29 +43,6 @@ def test_all_formats_hold_the_same_poses(ask, controls):
     assert plain["model"].startswith("reach@")
 
 
-REFUSED = {
-    "zero characters": ({"time": []}, 422, "/time"),
-    "lengths that differ": ({"heading": [0.0, 1.0]}, 422, "/heading"),
-    "a number that is none": ({"time": [0.0, 1e999, 0.0]}, 400, "/time/1"),
-    "an unknown performer": ({"performer": ["tall", "tall", "nobody"]}, 422, "/performer/2"),
-    "no camera": ({"level": "auto"}, 422, "/camera"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_a_crowd_that_cannot_be_is_refused_where_it_fails(ask, controls, name):
-    given, status, pointer = REFUSED[name]
-    asked = question(controls, **given)
-    # JSON has no infinity, but 1e999 reads as one.
-    body = json.dumps(asked).replace("Infinity", "1e999")
-    headers = {"content-type": "application/json"}
-    answer = ask("POST", f"{CROWD}.arrow", content=body.encode(), headers=headers)
-    assert answer.status_code == status, answer.text
-    problem = answer.json()
-    assert problem["errors"][0]["pointer"] == pointer, problem
-    assert "Traceback" not in answer.text
-
-
 def test_more_characters_than_the_service_takes_are_refused(loaded, controls):
     small = asker(create_app(loaded, Settings(crowd_limit=2, crowd_poses=100)))
     answer = small("POST", f"{CROWD}.arrow", json=question(controls))
@@ -89,20 +66,6 @@ def test_a_body_of_more_values_than_any_crowd_has_is_refused_before_it_is_decode
     assert answer.status_code == 413 and f"expected at most {most}" in answer.json()["detail"]
     # Negative control: with fewer the decoder finds the fault at the end.
     assert refused(1000).status_code == 400
-
-
-@pytest.mark.parametrize(
-    "query",
-    [
-        "count=50&motions=1&seconds=1&instancing=flatten",
-        "count=2&seconds=40&fps=1",
-        "count=200&seconds=1e-9",
-    ],
-)
-def test_what_a_crowd_takes_is_counted_before_it_is_made(loaded, query):
-    small = asker(create_app(loaded, Settings(crowd_poses=100)))
-    answer = small("GET", f"{WALK}.usdc?{query}")
-    assert answer.status_code == 422 and "expected at most 100" in answer.text
 
 
 @pytest.mark.parametrize(
@@ -147,25 +110,6 @@ def test_a_walk_opens_and_everybody_moves(ask, tmp_path, ending, instancing):
     for query in moving:
         first, last = (np.array(query.ComputeJointSkelTransforms(code)) for code in (0, 15))
         assert np.abs(last[:, 3, 2] - first[:, 3, 2]).max() > 0.2
-
-
-def test_the_same_seed_is_the_same_crowd(ask):
-    once, again, other = (
-        ask("GET", f"{WALK}.usdz?count=3&seconds=0.3&seed={seed}").content for seed in (5, 5, 6)
-    )
-    assert once == again != other
-
-
-def test_a_walk_has_the_labels_that_are_asked_for(ask):
-    path = f"{WALK}.usda?count=4&seconds=0.3"
-    free, ann, ben, mixed = (
-        ask("GET", path + more).content
-        for more in ("", *(f"&label=performer={who}" for who in ("ann", "ben", "ann:0.5,ben:0.5")))
-    )
-    assert len({free, ann, ben, mixed}) == 4
-    # Layers name the labels, so that a mixture of one name differs there alone.
-    alone = ask("GET", f"{path}&label=performer=ann:1").content
-    assert alone.split(b"def ", 1)[1] == ann.split(b"def ", 1)[1] != ben.split(b"def ", 1)[1]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import json
 
-import msgspec
 import numpy as np
 import pytest
 from asking import asker
@@ -44,25 +43,6 @@ def test_pose_and_clip_have_equal_curves(face, valid):
     found, expected = np.array(pose["curves"]), np.array(clip["curves"])
     assert np.abs(found - expected).max() < SINGLE
     assert np.abs(found[1:] - expected[:-1]).max() > 0.1
-
-
-def test_a_crowd_has_the_curves_of_its_poses(face, valid):
-    times = [0.2, 0.6]
-    asked = {"controls": CONTROLS, "time": times, "position": [[0, 0, 0], [1, 0, 0]]}
-    found = face("POST", "/v1/models/face/crowd.json", json=asked).json()
-    valid("CrowdPoses", found)
-    pose = face("POST", "/v1/models/face/pose", json={"controls": CONTROLS, "times": times}).json()
-    assert (
-        found["curve_names"]
-        == face("GET", f"/v1/models/face/clip.json?{QUERY}").json()["curve_names"]
-    )
-    assert np.abs(np.array(found["curves"]) - pose["curves"]).max() < SINGLE
-    assert np.abs(np.array(found["curves"][::-1]) - pose["curves"]).max() > 0.1
-    packed = msgspec.msgpack.decode(
-        face("POST", "/v1/models/face/crowd.msgpack", json=asked).content
-    )
-    assert packed["curves"]["shape"] == [2, 11]
-    assert b"curve_names" in face("POST", "/v1/models/face/crowd.arrow", json=asked).content
 
 
 @pytest.mark.parametrize("path", ["", "/clip.json?fps=5", "/pose?time=0.5"])

@@ -64,20 +64,3 @@ def test_a_wish_for_http_2_is_not_heeded_and_its_body_not_taken_for_empty(place)
     (answer,) = exchange(place, POST + wish + b"Content-Length: 2\r\n\r\n{}")
     assert answer.status == 400
     assert "send HTTP/1.1 without `Upgrade`" in json.loads(answer.body)["detail"]
-
-
-def test_a_trailer_is_no_header(models):
-    """It comes after a proxy has looked at the headers."""
-    line = f"a {'0' * 64} read:*"
-    with process(models, POSEFIELD_KEYS=line) as served:
-        head = POST + CHUNKED + b"X-Request-Id: first\r\n\r\n"
-        chunks = b"2\r\n{}\r\n0\r\nX-Request-Id: second\r\nAuthorization: Bearer pf_x\r\n\r\n"
-        (answer,) = exchange(served.place, head + chunks)
-        assert answer.headers["x-request-id"] == "first"
-        assert answer.headers["www-authenticate"] == 'Bearer realm="posefield"'
-
-
-def test_requests_sent_ahead_are_answered_in_turn(place):
-    asked = [LIVE, LIVE.replace(b"/livez", b"/nowhere"), POST + b"Content-Length: 2\r\n\r\n{}"]
-    answers = exchange(place, b"".join(asked * 20), answers=60)
-    assert [answer.status for answer in answers] == [200, 404, 400] * 20

@@ -38,15 +38,10 @@ def test_a_long_detail_is_cut_and_keeps_both_ends(ask):
     assert all(len(error["detail"]) <= MAX_DETAIL_LENGTH for error in answer.json()["errors"])
 
 
-LOCAL = [
-    *("localhost", "localhost:8000", "LOCALHOST", "localhost."),
-    *("127.0.0.1", "127.0.0.1:80", "10.0.0.7:8000", "[::1]", "[::1]:8000", "[fe80::1]:1"),
-]
-FOREIGN = ["evil.example", "evil.example:8000", "localhost.evil.example", "127.0.0.1.evil.example"]
-FOREIGN += ["evil.example.", "[evil]", "[", ":8000", "1.2.3", "a b", "é"]
+FOREIGN = ["evil.example:8000", "127.0.0.1.evil.example", "[evil]", "[", ":8000", "a b", "é"]
 
 
-@pytest.mark.parametrize("host", LOCAL)
+@pytest.mark.parametrize("host", ["localhost:8000", "LOCALHOST.", "10.0.0.7:8000", "[::1]:8000"])
 def test_addresses_and_localhost_are_answered(host, ask):
     assert ask("GET", "/livez", headers={"host": host}).status_code == 200
 
@@ -67,8 +62,7 @@ def answers(hosts, host):
     ("hosts", "host", "expected"),
     [
         ("poses.example.com", "localhost", False),
-        ("a.example, B.example", "b.example", True),
-        ("*.example.com", "poses.example.com", True),
+        ("a.example, *.B.example", "c.b.example", True),
         ("*.example.com", "evilexample.com", False),
         ("*", "anything.example", True),
         ("poses.example.com", "10.1.2.3", True),
@@ -78,7 +72,7 @@ def test_the_operator_lists_names(hosts, host, expected):
     assert answers(hosts, host) is expected
 
 
-@pytest.mark.parametrize("hosts", ["https://a.example", "a.example:80", "a b", "*a.example", "a/"])
+@pytest.mark.parametrize("hosts", ["https://a.example", "a.example:80", "*a.example"])
 def test_what_is_no_name_stops_the_start(hosts):
     with pytest.raises(InvalidField, match="POSEFIELD_HOSTS"):
         create_app(ModelRegistry({}), Settings(hosts=hosts))

@@ -5,7 +5,6 @@ import threading
 
 import httpx
 import pytest
-from pxr import Usd
 from serving import address, host_and_port, process, within
 
 pytestmark = pytest.mark.system
@@ -15,21 +14,6 @@ pytestmark = pytest.mark.system
 def base(models):
     with process(models) as child:
         yield address(child)
-
-
-@pytest.fixture
-def client(base):
-    with httpx.Client(base_url=base, timeout=30) as client:
-        yield client
-
-
-def test_a_clip_over_the_wire_opens_in_usd(client, controls, tmp_path):
-    answer = client.post("/v1/models/reach/clip.usdc", json={"controls": controls, "fps": 25})
-    file = tmp_path / "clip.usdc"
-    file.write_bytes(answer.content)
-    stage = Usd.Stage.Open(str(file))
-    assert stage.GetTimeCodesPerSecond() == 25
-    assert stage.GetEndTimeCode() == int(float(answer.headers["posefield-duration"]) * 25)
 
 
 def test_requests_at_the_same_time_do_not_disturb_each_other(base, controls):

@@ -6,7 +6,6 @@ import json
 import msgpack
 import numpy as np
 import pyarrow as pa
-import pytest
 from asking import asker
 
 from posefield.http.api.settings import Settings
@@ -46,37 +45,6 @@ def test_every_format_holds_the_same_grid(ask):
         "turn",
         plain["controls"],
     )
-
-
-def test_support_is_what_poses_at_the_same_points_say(ask):
-    found = ask("GET", f"{SIGMA}?{ASKED}").json()
-    told = [
-        [supported(ask, found, across, along) for across in found["across_values"]]
-        for along in found["along_values"]
-    ]
-    assert found["supported"] == told
-    # Negative control: the outermost lie half a range beyond, the innermost among clips.
-    assert not told[0][0] and told[1][2]
-
-
-def supported(ask, found, across, along):
-    controls = {**found["controls"], "turn": across, "target_height": along}
-    body = {"controls": controls, "times": [0]}
-    return ask("POST", "/v1/models/reach/pose", json=body).json()["trust"]["supported"]
-
-
-REFUSED = [
-    ("across=turn&along=turn", 422, "along"),
-    (f"{ASKED}&rows=3", 400, "rows"),
-    ("across=turn&along=stature&turn=3", 422, "turn"),
-]
-
-
-@pytest.mark.parametrize(("query", "status", "parameter"), REFUSED)
-def test_a_wrong_parameter_is_named(query, status, parameter, ask):
-    answer = ask("GET", f"{SIGMA}?{query}")
-    assert answer.status_code == status, answer.text
-    assert answer.json()["errors"][0]["parameter"] == parameter
 
 
 def test_how_large_a_grid_may_be_is_a_setting(loaded):

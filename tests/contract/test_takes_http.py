@@ -33,28 +33,6 @@ def test_a_take_is_another_clip_and_has_an_entity_tag_of_its_own(clip):
     assert take.json()["trust"]["take"] == said and "take" not in mean.json()["trust"]
 
 
-def test_a_pose_of_a_take_is_that_of_its_clip(ask, clip):
-    pose = ask("GET", f"{MODEL}/pose.json", params={"time": 0.2, "take": 7}).json()
-    frame = clip(take=7, feet="as_predicted").json()["rotations"][4]
-    assert np.abs(np.array(pose["rotations"][0]) - frame).max() < 1e-6
-    plain = ask("GET", f"{MODEL}/pose.json", params={"time": 0.2}).json()
-    assert np.abs(np.array(plain["rotations"][0]) - frame).max() > 1e-3
-
-
-@pytest.mark.parametrize(
-    ("name", "words", "status", "said"),
-    [
-        ("take", "-1", 400, "'-1', expected a whole number"),
-        ("variety", "1.01", 422, "1.01, expected 0 to 1"),
-        ("detail", "yes", 400, "'yes', expected one of true, false"),
-    ],
-)
-def test_bad_words_are_refused(clip, name, words, status, said):
-    answer = clip(**{name: words})
-    assert answer.status_code == status and said in answer.json()["detail"]
-    assert answer.json()["errors"][0]["parameter"] == name
-
-
 def crowd_body(**more):
     return {"controls": {"haste": 3.96, "veer": [-200, -200]}, "time": 0.2, **more}
 

@@ -17,19 +17,3 @@ def test_the_nearest_and_all_others_add_up_to_one(ask, controls, loaded):
     assert abs(sum(weights) + found["others"]["weight"] - 1.0) < 1e-7
     assert found["others"]["count"] == model.session.card.samples - 4
     assert {clip["source"] for clip in found["nearest"]} <= set(model.session.card.sources)
-
-
-def test_who_is_asked_for_is_made_more_of_his_own_clips(ask, controls):
-    weights = {}
-    for who in ("tall", None):
-        body = {"controls": controls, "performer": who, "nearest": 1000}
-        clips = ask("POST", WHY, json=body).json()["nearest"]
-        weights[who] = sum(clip["weight"] for clip in clips if clip["performer"] == "tall")
-    assert weights["tall"] > weights[None] + 0.01
-
-
-def test_what_lies_outside_is_warned_of_or_refused(ask, controls):
-    body = {"controls": {**controls, "turn": 1e3}}
-    assert "turn: asked 1000 deg, given" in ask("POST", WHY, json=body).json()["warnings"][0]
-    refused = ask("POST", WHY, json={**body, "extrapolate": "refuse"})
-    assert refused.json()["type"] == "urn:posefield:problem:outside-samples"

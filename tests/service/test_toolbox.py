@@ -57,14 +57,6 @@ def test_a_file_has_the_report_of_its_plan(box, tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["walks.usdc"]
 
 
-def test_the_same_script_gives_the_same_bytes(box, tmp_path):
-    for name in ("a.bvh", "b.bvh"):
-        called(box, "perform", {"script": WALKS, "file": name})
-    assert (tmp_path / "a.bvh").read_bytes() == (tmp_path / "b.bvh").read_bytes()
-    called(box, "perform", {"script": {**WALKS, "fps": 60}, "file": "b.bvh"})
-    assert (tmp_path / "a.bvh").read_bytes() != (tmp_path / "b.bvh").read_bytes()
-
-
 def test_only_performing_writes(box, tmp_path):
     assert [tool.name for tool in box.tools.values() if tool.writes] == ["perform"]
     called(box, "list_models", {})
@@ -87,14 +79,6 @@ def test_only_performing_writes(box, tmp_path):
             QueryError,
             "script/take: Expected `int` <=",
         ),
-        ("list_models", {"all": True}, QueryError, "all: Object contains unknown field `all`"),
-        ("plan_performance", {}, QueryError, "script: Object missing required field"),
-        (
-            "plan_performance",
-            {"script": {"segments": [{"kind": "walk", "model": "walk", "sped": 1}]}},
-            QueryError,
-            "script/segments/0/sped: Object contains unknown field `sped` (did you mean 'speed'",
-        ),
         (
             "plan_performance",
             {"script": {"segments": [*WALKS["segments"], {"kind": "act", "model": "reech"}]}},
@@ -102,18 +86,11 @@ def test_only_performing_writes(box, tmp_path):
             "script/segments/2/model: no model 'reech' (did you mean 'reach'?)",
         ),
         (
-            "plan_performance",
-            {"script": {"segments": [{"kind": "walk", "model": "walk"}]}},
-            InvalidField,
-            "script/segments/0: a walk without along, to or seconds",
-        ),
-        (
             "perform",
             {"script": WALKS, "file": "../walks.usdc"},
             InvalidField,
             "file: '../walks.usdc', expected a name without folders",
         ),
-        ("perform", {"script": WALKS, "file": ".usdc"}, InvalidField, "file: '.usdc', expected a"),
         (
             "perform",
             {"script": WALKS, "file": "walks.usd"},

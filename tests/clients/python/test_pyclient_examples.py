@@ -93,46 +93,24 @@ def value(text):
         return text
 
 
-def clip(ending):
-    return lambda client, r: model(client, r).clip(**words(r)).content(ending)
+def asking(name):
+    """A call of a method of a model."""
+    return lambda client, r: getattr(model(client, r), name)(**words(r))
 
 
-def walk(ending):
-    def ask(client, r):
-        given = words(r)
-        if "camera" in given:
-            given["camera"] = [float(each) for each in given["camera"].split(",")]
-        return model(client, r).crowd_walk(**given).content(ending)
-
-    return ask
+def walk(client, r):
+    given = words(r)
+    if "camera" in given:
+        given["camera"] = [float(each) for each in given["camera"].split(",")]
+    return model(client, r).crowd_walk(**given)
 
 
-def pose(client, r):
-    return model(client, r).pose(**words(r))
-
-
-def why(client, r):
-    return model(client, r).why(**words(r))
-
-
-def sigma(client, r):
-    return model(client, r).sigma(**words(r))
-
-
-def crowd(ending):
-    return lambda client, r: model(client, r).crowd(**words(r)).content(ending)
-
-
-def clips(ending):
-    return lambda client, r: model(client, r).clips(**words(r)).content(ending)
-
-
-def performance(ending):
-    return lambda client, r: client.performance(r["body"]).content(ending)
-
-
-def performances(ending):
-    return lambda client, r: client.performances(**r["body"]).content(ending)
+def files(operation, formats, ask):
+    """Calls that get the files of an operation, of each format."""
+    return {
+        (operation, form): lambda client, r, form=form: ask(client, r).content(form)
+        for form in formats
+    }
 
 
 CALLS = {
@@ -142,21 +120,18 @@ CALLS = {
     ("getReadiness", None): lambda client, r: client.ready(),
     ("getModel", None): lambda client, r: model(client, r).card,
     ("getCharacter", None): lambda client, r: model(client, r).character(),
-    ("getPoseInFormat", "msgpack"): pose,
-    ("queryPoseInFormat", "msgpack"): pose,
-    ("getWhy", None): why,
-    ("queryWhy", None): why,
-    ("getSuggestions", None): lambda client, r: model(client, r).suggest(**words(r)),
-    ("getSigmaInFormat", "msgpack"): sigma,
-    ("querySigmaInFormat", "msgpack"): sigma,
-    **{("getClipInFormat", form): clip(form) for form in CLIP},
-    **{("queryClipInFormat", form): clip(form) for form in CLIP},
-    **{("getCrowdInFormat", form): walk(form) for form in WALK},
-    **{("queryCrowdInFormat", form): crowd(form) for form in CROWD},
-    **{("queryClipsInFormat", form): clips(form) for form in CLIPS},
+    **{(f"{way}PoseInFormat", "msgpack"): asking("pose") for way in ("get", "query")},
+    **{(f"{way}Why", None): asking("why") for way in ("get", "query")},
+    ("getSuggestions", None): asking("suggest"),
+    **{(f"{way}SigmaInFormat", "msgpack"): asking("sigma") for way in ("get", "query")},
+    **files("getClipInFormat", CLIP, asking("clip")),
+    **files("queryClipInFormat", CLIP, asking("clip")),
+    **files("getCrowdInFormat", WALK, walk),
+    **files("queryCrowdInFormat", CROWD, asking("crowd")),
+    **files("queryClipsInFormat", CLIPS, asking("clips")),
     ("queryPerformance", None): lambda client, r: client.plan(r["body"]),
-    **{("queryPerformanceInFormat", form): performance(form) for form in PERFORMANCE},
-    **{("queryPerformancesInFormat", form): performances(form) for form in ARCHIVES},
+    **files("queryPerformanceInFormat", PERFORMANCE, lambda c, r: c.performance(r["body"])),
+    **files("queryPerformancesInFormat", ARCHIVES, lambda c, r: c.performances(**r["body"])),
     ("queryPerformanceInFormat", "msgpack"): (
         lambda client, r: client.performance(r["body"]).numbers
     ),

@@ -213,47 +213,17 @@ def test_a_crowd_that_no_archive_can_hold_is_refused_at_once(many, said, clip, t
     assert list(tmp_path.iterdir()) == []
 
 
-ON_A_FULL_DISK = """
-import resource, sys
-sys.path.insert(0, sys.argv[1])
-import test_crowd_files
-test_crowd_files.write_and_say(*sys.argv[2:])
-"""
-
-
-def write_and_say(path, instancing):
-    person = conftest.person()
-    given = crowds.crowd(person, crowds.motions(person, 5, 30), MOTION)
-    # The disk takes 5 kB of a file and no more.
-    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, 5_000))
-    try:
-        crowd_writer.write(given, Path(path), instancing)
-    except FileError as fault:
-        print(fault)  # noqa: T201
-
-
-@pytest.mark.system
-@pytest.mark.parametrize(
-    ("ending", "instancing", "in_between"),
-    [
-        ("usda", "references", False),
-        # Their layers are in a temporary file first.
-        ("usdz", "references", True),
-    ],
-)
-def test_a_full_disk_is_named_and_keeps_the_previous_file(
-    ending, instancing, in_between, temporary, tmp_path
-):
-    path = tmp_path / f"crowd.{ending}"
-    path.write_bytes(b"old")
-    command = [sys.executable, "-c", ON_A_FULL_DISK, str(FOLDER), str(path), instancing]
-    environment = {**os.environ, "TMPDIR": str(temporary)}
-    said = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-    expected = (
-        f"{temporary}: a temporary file of usd-core cannot be written: "
-        if in_between
-        else f"{path}: cannot be written: "
-    )
-    assert said.stdout.startswith(expected)
-    assert said.stdout.endswith("File too large\n")
-    assert contents(tmp_path) == {path.name: b"old"}
+def test_a_full_disk_is_named_and_keeps_the_previous_file(clip, temporary, tmp_path):
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for ending, place in (("usda", f"{tmp_path / 'crowd.usda'}: "), ("usdz", f"{temporary}: ")):
+        path = tmp_path / f"crowd.{ending}"
+        path.write_bytes(b"old")
+        # The disk takes 5 kB of a file and no more.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, most[1]))
+        try:
+            with pytest.raises(FileError, match="File too large") as fault:
+                crowd_writer.write(clip, path)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, most)
+        assert str(fault.value).startswith(place)
+        assert contents(tmp_path)[path.name] == b"old" and contents(temporary) == {}

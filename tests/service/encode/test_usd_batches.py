@@ -67,13 +67,6 @@ def both(given, convention=METRES):
     )
 
 
-def moved(answer, translations=None, rotations=None):
-    clip = answer.clip
-    translations = clip.translations if translations is None else translations
-    rotations = clip.rotations if rotations is None else rotations
-    return replace(answer, clip=replace(clip, translations=translations, rotations=rotations))
-
-
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_a_batch_is_written_as_usd_writes_it(convention):
     assert both(answers(5), convention)
@@ -89,48 +82,10 @@ def test_a_clip_is_the_same_alone_and_among_others(extension):
     assert write([], METRES) == []
 
 
-def closed(answer):
-    turns, moves = answer.clip.rotations.copy(), answer.clip.translations.copy()
-    turns[-1], moves[-1] = turns[0], moves[0]
-    return moved(answer, moves, turns)
-
-
-def in_place(answer):
-    moves = answer.clip.translations.copy()
-    moves[:, 0] = moves[0, 0]
-    return moved(answer, moves)
-
-
-def still(answer):
-    turns = np.broadcast_to(answer.clip.rotations[:1], answer.clip.rotations.shape)
-    return in_place(moved(answer, rotations=turns))
-
-
-def signed(answer):
-    """Signs that jump, and zeros of both signs."""
-    rng = np.random.default_rng(3)
-    turns = answer.clip.rotations * rng.choice([-1.0, 1.0], (len(answer.clip), 20, 1))
-    turns[:, 4] = [1, 0, 0, 0] * rng.choice([-1.0, 1.0], (len(answer.clip), 4))
-    moves = answer.clip.translations.copy()
-    moves[:, 0, 1] = 0.0 * rng.choice([-1.0, 1.0], len(answer.clip))
-    return moved(answer, moves, turns)
-
-
-@pytest.mark.parametrize("change", [closed, in_place, still, signed])
-@pytest.mark.parametrize("convention", [METRES, INCHES])
-def test_equal_samples_are_written_as_usd_does(change, convention):
-    given = [change(one) for one in answers(4)]
-    assert both(given, convention)
-    assert (len(written(given)[0]) < len(written(answers(1))[0])) == (change is not signed)
-
-
 FACTS = [
     {"warnings": ("speed 3 is beyond 2",)},
-    {"performer": None},
     {"performer": 'quo"ted 左腕'},
     {"sigma": math.nan},
-    {"controls": {"a": 0.1, "b": 0.1, "c": 0.0254, "d": 0.3, "e": 0.3}},
-    {"inferred": ("speed", "turn rate"), "measured": {"speed": 1.25, "turn rate": 0.1}},
     {
         "targets": (
             ConstraintResult("LeftHand at end", 1e-9, "m", True),
@@ -143,8 +98,7 @@ FACTS = [
 @pytest.mark.parametrize("said", FACTS)
 def test_any_facts_are_written_as_usd_does(said):
     given = [*answers(2), *answers(3, seed=4, **said)]
-    for convention in (METRES, INCHES):
-        assert both(given, convention)
+    assert both(given, INCHES)
 
 
 def chain(joints):
@@ -153,7 +107,7 @@ def chain(joints):
     return Skeleton(names, tuple(range(-1, joints - 1)), offsets, (), np.empty((0, 3)))
 
 
-@pytest.mark.parametrize("joints", [1, 2, 3, 10, 40])
+@pytest.mark.parametrize("joints", [1, 3, 40])
 def test_skeletons_whose_arrays_are_as_large_as_others_will_do(joints):
     given = answers(4, person=chain(joints))
     assert both(given)

@@ -39,12 +39,6 @@ def foot_rows(paths, foot):
     )
 
 
-def tidy(down, rate, cyclic):
-    """Return the stances of one foot."""
-    rows = frame_rows([down], rate, cyclic)
-    return list(stance_rows.tidy(down, rows).by_row(1)[0])
-
-
 def discipline(stances, path, foot):
     """Return the stances of one foot whose swings are as captured ones."""
     found = stance_rows.discipline(stance_rows.from_intervals([stances]), foot_rows([path], foot))

@@ -1,9 +1,8 @@
-"""Stances of many feet at once: the same as those of each foot alone, by loops."""
+"""Stances of many feet at once: the same as those of each foot alone."""
 
 from dataclasses import replace
 
 import numpy as np
-import one_foot
 from few_feet import discipline, foot_rows, frame_rows
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,30 +53,46 @@ def test_runs_are_those_of_each_row(down, cyclic):
 
 
 @given(st.one_of(FLICKERS, CONTACTS), CYCLIC)
-def test_contacts_are_tidied_as_those_of_one_foot(down, cyclic):
-    expected = [one_foot.tidy(own, RATE, cyclic) for own in each(down)]
-    assert listed(stance_rows.tidy(down, rows(cyclic))) == expected
+def test_no_stance_and_no_gap_within_a_motion_is_short(down, cyclic):
+    found = stance_rows.tidy(down, rows(cyclic))
+    gaps = stance_rows.runs(~found.mask(rows(cyclic)), rows(cyclic))
+    for own, least in ((found, stances.SHORTEST_CONTACT), (gaps, stances.SHORTEST_GAP)):
+        assert (own.lengths[own.inner(rows(cyclic))] >= least * RATE).all()
+    before = stance_rows.runs(down, rows(cyclic))
+    long = before.select(before.lengths >= stance_rows.shortest(rows(cyclic))[before.rows])
+    assert found.mask(rows(cyclic))[long.mask(rows(cyclic))].all()
 
 
-@given(CONTACTS, st.integers(0, 99), CYCLIC)
-def test_swings_become_as_captured_ones_as_those_of_one_foot(down, seed, cyclic):
+@given(CONTACTS, FLICKERS, st.integers(0, 99), CYCLIC)
+def test_a_row_has_the_stances_that_it_has_alone(down, beyond, seed, cyclic):
+    def planned(down, beyond, paths):
+        own = foot_rows(paths, FOOT)
+        found = stance_rows.discipline(stance_rows.tidy(down, own.rows), own)
+        shorter = stance_rows.shortened(found, beyond, own.rows)
+        assert (shorter.begins < own.rows.counts[shorter.rows]).all()
+        return [[*found.by_row(len(paths))], [*shorter.by_row(len(paths))]]
+
     paths = feet(seed, cyclic)
-    found = stance_rows.discipline(stance_rows.tidy(down, rows(cyclic)), foot_rows(paths, FOOT))
-    expected = [
-        one_foot.discipline(one_foot.tidy(own, RATE, cyclic), path, FOOT)
-        for own, path in zip(each(down), paths, strict=True)
-    ]
-    assert listed(found) == expected
+    together = zip(*planned(down, beyond, paths), strict=True)
+    for own, far, path, found in zip(each(down), each(beyond), paths, together, strict=True):
+        assert planned(own, far, [path]) == [[runs] for runs in found]
 
 
-@given(CONTACTS, FLICKERS, CYCLIC)
-def test_of_a_stance_out_of_reach_the_longest_part_stays(down, beyond, cyclic):
-    found = stance_rows.shortened(stance_rows.runs(down, rows(cyclic)), beyond, rows(cyclic))
-    expected = [
-        one_foot.shortened(stances.runs(own, cyclic), far, path)
-        for own, far, path in zip(each(down), each(beyond), feet(0, cyclic), strict=True)
-    ]
-    assert listed(found) == expected
+def test_gaps_are_closed_first_and_of_a_stance_out_of_reach_the_longest_part_stays():
+    down = np.ones(60, bool)
+    down[[10, 11, 40, 41, 42, 43, 44, 45, 47, 48, 49, 50, 51, 52]] = False
+    one = frame_rows([down], RATE, False)
+    found = stance_rows.tidy(down, one)
+    assert found.by_row(1) == [(Interval(0, 40), Interval(53, 60))]
+    beyond = np.isin(np.arange(60), (9, 33, 55, 57))
+    assert stance_rows.shortened(found, beyond, one).by_row(1) == [(Interval(10, 33),)]
+
+
+def test_a_swing_that_goes_nowhere_is_none_unless_the_foot_is_in_the_air():
+    held = [Interval(0, 40), Interval(60, 100)]
+    assert discipline(held, path_of(np.zeros(100)), FOOT) == [Interval(0, 100)]
+    lifted = np.where((np.arange(100) >= 40) & (np.arange(100) < 60), 0.3, 0.04)
+    assert discipline(held, path_of(np.zeros(100), lifted), FOOT) == held
 
 
 FOOT_RATE = 60.0

@@ -1,7 +1,5 @@
 """Tests of cancellation: its scope, and the cost of a check."""
 
-import sys
-import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import anyio
@@ -42,33 +40,3 @@ def test_threads_of_a_pool_see_it_where_it_is_carried(cancellation):
             pool.submit(carried).result()
         # Negative control: a pool's threads have contexts of their own.
         pool.submit(cancel.check).result()
-
-
-LOOKS = 3_000_000
-
-
-@pytest.mark.parametrize(("turns", "check"), [(True, cancel.check), (False, cancel.current.get)])
-def test_other_threads_run_beside_a_loop_that_checks(cancellation, turns, check):
-    """Keep the interpreter from switching threads: the running one must release the lock."""
-    began, done, looks = threading.Event(), [], []
-
-    def loop() -> None:
-        found = 0
-        began.set()
-        while not done and found < LOOKS:
-            check()
-            found += 1
-        looks.append(found)
-
-    thread = threading.Thread(target=cancel.bind_context(loop))
-    usual = sys.getswitchinterval()
-    sys.setswitchinterval(1000.0)
-    try:
-        thread.start()
-        assert began.wait(60)
-        done.append(True)
-        thread.join()
-    finally:
-        sys.setswitchinterval(usual)
-    # Negative control: without a check the loop runs to its end first.
-    assert (looks[0] < LOOKS) == turns

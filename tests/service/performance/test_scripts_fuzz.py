@@ -95,13 +95,6 @@ def turned(answer, frame):
     return {"rotations": found}
 
 
-def test_the_same_script_gives_the_same_bytes(casts):
-    cast = casts["stroll"]
-    for document in random_scripts.scripts(cast, 6):
-        first, second = (encoded(random_scripts.check(document, cast.find)) for _ in range(2))
-        assert first == second
-
-
 def encoded(outcome):
     if outcome.answer is None:
         return outcome.refused

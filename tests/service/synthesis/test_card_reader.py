@@ -10,7 +10,7 @@ import pytest
 from model_cards import CARD
 
 from posefield.model_file import checked_file, model_card, onnx_file
-from posefield.model_file.model_card import Preset, TrainingParameters
+from posefield.model_file.model_card import Preset
 
 WRITTEN = {key: text.encode() for key, text in model_card.dump(CARD).items()}
 
@@ -167,22 +167,6 @@ def test_making_is_in_the_file_and_not_sent_to_clients():
         "detail": base64.b64encode(CARD.making.detail).decode(),
     }
     assert "making" not in model_card.plain_values(CARD)
-
-
-def test_parameters_at_their_default_take_no_bytes():
-    few = model_card.dump(replace(CARD, making=TrainingParameters({"warp": (0.25, 1)})))
-    assert few["posefield.making"] == '{"fields": {"warp": [0.25, 1]}}'
-    assert model_card.dump(replace(CARD, making=TrainingParameters()))["posefield.making"] == "{}"
-    controls = json.loads(few["posefield.controls"])
-    assert controls[0]["measure"] == {"quantity": "stature"}
-    assert "measure" not in controls[1]
-
-
-def test_equal_cards_give_equal_text_in_equal_order():
-    shuffled = replace(CARD, diagnostics=dict(reversed(list(CARD.diagnostics.items()))))
-    assert list(model_card.dump(shuffled).items()) == list(model_card.dump(CARD).items())
-    assert list(model_card.dump(CARD)) == sorted(model_card.dump(CARD))
-    assert model_card.dump(replace(CARD, rate=30.0)) != model_card.dump(CARD)
 
 
 def test_bones_are_written_to_the_micrometre():

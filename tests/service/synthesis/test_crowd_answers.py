@@ -127,16 +127,6 @@ def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
     assert np.abs(of(model, whole)[rows[::-1]] - of(model, part)).max() > 1.0
 
 
-def test_the_same_crowd_is_the_same_bytes(model):
-    question = asked(model, 2_000)
-    once, again = (
-        crowd_synthesis.synthesize_crowd(model, question),
-        crowd_synthesis.synthesize_crowd(model, question),
-    )
-    for name in ("rotations", "root_position", "bone_offsets", "sigma"):
-        assert getattr(once, name).tobytes() == getattr(again, name).tobytes()
-
-
 def test_in_place_a_cycle_goes_nowhere(walk):
     card = walk.session.card
     count = 20

@@ -83,12 +83,6 @@ def test_a_standing_foot_stays_in_one_place_on_the_floor(model, own):
     assert 0.3 < still.mean() < 0.8 and (slow < 2e-6).mean() < 0.02
 
 
-def test_the_same_crowd_has_the_same_bytes(model, own):
-    _, once, _ = built(model, own)
-    _, again, _ = built(model, own)
-    assert all(once[name].tobytes() == again[name].tobytes() for name in PARTS)
-
-
 def with_card(model, **changed):
     card = replace(model.session.card, **changed)
     return Synthesizer(model.name, replace(model.session, card=card))

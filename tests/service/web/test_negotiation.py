@@ -18,25 +18,20 @@ CLIP = (
     ("accept", "expected"),
     [
         ("*/*", "usdc"),
-        ("application/json", "json"),
         ("application/json; charset=utf-8", "json"),
         ("model/*;q=0.5, application/x-bvh;q=0.6", "bvh"),
-        ("model/vnd.usda;q=0.2, application/json;q=0.3", "json"),
         # What is named counts more than what any wildcard lets in.
         # The closest range gives the weight, wherever it stands and however small it is.
         ("*/*, model/*;q=0.1, model/vnd.usda;q=0", "json"),
         ("model/vnd.usda;q=0.1, */*;q=0.5, model/*;q=0.2", "json"),
         # Members that nobody can read, or that ask for more than there is, count for nothing.
         ("json, application/x-bvh;q=0.1", "bvh"),
-        ("application/json;q=high, application/x-bvh;q=0.1", "bvh"),
         ("application/json;q=-1, application/x-bvh;q=0.1", "bvh"),
         ('text/plain;a="x, application/json", application/x-bvh', "bvh"),
         # Nothing is left.
         ("text/html", None),
         ("*/json", None),
-        ("*/*;q=0", None),
         ("application/json;q=0.000", None),
-        ("application", None),
     ],
 )
 def test_the_header_decides(accept, expected):
@@ -77,9 +72,7 @@ def test_nothing_that_is_sent_is_a_failure(accept):
     assert preferred_format(accept, CLIP) in {None, *(name for name, _ in CLIP)}
 
 
-@pytest.mark.parametrize(
-    "piece", ['"', "a/b;", ' ;q="', "a/b;a=\\", ";;;;", ",", "a/", 'a/b;c="', "a/b "]
-)
+@pytest.mark.parametrize("piece", ['"', ' ;q="', "a/b;a=\\", 'a/b;c="'])
 def test_a_long_header_takes_no_long_time(piece):
     # A search that goes back on itself would not come to an end.
     assert preferred_format(piece * 20_000 + ",*/*", CLIP) in ("usdc", None)
