@@ -39,14 +39,6 @@ def large(content: bytes, numbers: int = 1_500_000_000) -> bytes:
     return _with_sigma(content, [numbers], products=0)
 
 
-def many(content: bytes) -> bytes:
-    """Return a model with millions of empty nodes, which take long to read."""
-    model = onnx.ModelProto(graph=onnx.GraphProto(node=[onnx.NodeProto()] * 10_000_000))
-    return checked_file.append_checksum(
-        content[: -checked_file.CHECKSUM_SIZE] + model.SerializeToString()
-    )
-
-
 def _with_sigma(content: bytes, shape: list[int], products: int) -> bytes:
     """Make sigma depend on an array of ones multiplied with itself, by posefield's operators."""
     model = onnx.load_from_string(content)
@@ -76,20 +68,4 @@ def loop(content: bytes) -> bytes:
     body = helper.make_graph([step], "body", [counter, flag], [going])
     model.graph.initializer.append(numpy_helper.from_array(np.array(10**12), "rounds"))
     model.graph.node.append(helper.make_node("Loop", ["rounds", ""], [], body=body))
-    return written(model)
-
-
-def fill(content: bytes) -> bytes:
-    """Return a model with a constant of 6 GB, of which the file holds the shape."""
-    model = onnx.load_from_string(content)
-    model.graph.initializer.append(numpy_helper.from_array(np.array([1_500_000_000]), "six_gb"))
-    model.graph.node.append(helper.make_node("ConstantOfShape", ["six_gb"], ["filled"]))
-    return written(model)
-
-
-def deep(content: bytes) -> bytes:
-    """Return a model with an entry of its card nested 200,000 deep."""
-    model = onnx.load_from_string(content)
-    own = next(one for one in model.metadata_props if one.key == "posefield.diagnostics")
-    own.value = '{"notes": ' + "[" * 200_000 + "]" * 200_000 + "}"
     return written(model)

@@ -4,8 +4,7 @@ Every request that was valid must stay valid. Responses must keep their promised
 and new values of enumerations are allowed, which clients must tolerate.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from posefield.http.api import contract
@@ -14,219 +13,138 @@ Node = Mapping[str, Any]
 
 LEAST = ("minimum", "exclusiveMinimum", "minItems", "minLength", "minProperties")
 MOST = ("maximum", "exclusiveMaximum", "maxItems", "maxLength", "maxProperties")
+KINDS = ("null", "boolean", "integer", "number", "string", "array", "object")
 
 
 def changes(old: Node, new: Node) -> list[str]:
     """Breaking changes from one contract to the next, each once."""
-    return sorted(set(_paths(_expanded(old), _expanded(new))))
+    before, after = _Facts(old), _Facts(new)
+    found = [f"{fact}: gone" for fact in before.kept - after.kept]
+    found += [f"{p} now {w}" for p, w in after.added - before.added if p in before.places]
+    return sorted([*found, *_bounds(before, after)])
 
 
-def _expanded(document: Node) -> Node:
-    """The contract with a path for each format in place of a path that ends in `{format}`."""
-    paths: dict[str, dict[str, Any]] = {}
-    for path, item in document["paths"].items():
-        if not path.endswith("{format}"):
-            paths[path] = item
+def _bounds(before: "_Facts", after: "_Facts") -> Iterator[str]:
+    """What is asked for may not be bounded more, and answers not less."""
+    for place, name in before.bounds.keys() | after.bounds.keys():
+        if place not in before.places & after.places:
             continue
-        for method in (m for m in contract.METHODS if m in item):
-            given = _given(document, path, method)
-            rest = [each for key, each in given.items() if key != ("path", "format")]
-            operation = {**item[method], "parameters": rest}
-            for form in given["path", "format"]["schema"]["enum"]:
-                paths.setdefault(path.replace("{format}", form), {})[method] = operation
-    return {**document, "paths": paths}
-
-
-def _paths(old: Node, new: Node) -> Iterator[str]:
-    for path, item in old["paths"].items():
-        for method in (m for m in contract.METHODS if m in item):
-            where = f"{method.upper()} {path}"
-            if method not in new["paths"].get(path, {}):
-                yield f"{where}: gone"
-            else:
-                yield from _Pair(old, new, where).operation(path, method)
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """Two contracts, and the operation that is looked at."""
-
-    old: Node
-    new: Node
-    where: str
-
-    def at(self, place: str) -> "_Pair":
-        return replace(self, where=f"{self.where} {place}")
-
-    def operation(self, path: str, method: str) -> Iterator[str]:
-        before, after = self.old["paths"][path][method], self.new["paths"][path][method]
-        if before["operationId"] != after["operationId"]:
-            yield f"{self.where}: operationId changed"
-        yield from self._security(_security(self.old, before), _security(self.new, after))
-        yield from self._parameters(path, method)
-        yield from self._body(before.get("requestBody"), after.get("requestBody"))
-        yield from self._responses(before["responses"], after["responses"])
-
-    def _security(self, before: Sequence[Node], after: Sequence[Node]) -> Iterator[str]:
-        if {} not in after and (not before or {} in before) and after:
-            yield f"{self.where}: needs a key"
-        scope = contract.scope_of(before)
-        if scope is not None and contract.scope_of(after) not in (scope, None):
-            yield f"{self.where}: needs another scope"
-
-    def _parameters(self, path: str, method: str) -> Iterator[str]:
-        before, after = _given(self.old, path, method), _given(self.new, path, method)
-        for key, found in after.items():
-            if found.get("required") and not before.get(key, {}).get("required"):
-                yield f"{self.where}: parameter {key[1]} is needed"
-        for key, found in before.items():
-            if key not in after:
-                yield f"{self.where}: parameter {key[1]} is gone"
-                continue
-            ask = _Values(self.old, self.new, f"{self.where} {key[1]}", asked=True)
-            yield from ask.compare(found["schema"], after[key]["schema"])
-
-    def _body(self, before: Node | None, after: Node | None) -> Iterator[str]:
-        if before is None or after is None:
-            if before is not after:
-                yield f"{self.where}: body is {'gone' if after is None else 'needed'}"
-            return
-        old, new = contract.resolve(self.old, before), contract.resolve(self.new, after)
-        if new.get("required") and not old.get("required"):
-            yield f"{self.where}: body is needed"
-        yield from self.at("body").contents(old, new, asked=True)
-
-    def _responses(self, before: Node, after: Node) -> Iterator[str]:
-        for status, node in before.items():
-            if status not in after:
-                yield f"{self.where}: status {status} is gone"
-                continue
-            old, new = contract.resolve(self.old, node), contract.resolve(self.new, after[status])
-            for name in old.get("headers", {}).keys() - new.get("headers", {}).keys():
-                yield f"{self.where} {status}: header {name} is gone"
-            yield from self.at(status).contents(old, new, asked=False)
-
-    def contents(self, old: Node, new: Node, asked: bool) -> Iterator[str]:
-        there = new.get("content", {})
-        for name, content in old.get("content", {}).items():
-            if name not in there:
-                yield f"{self.where}: media type {name} is gone"
-                continue
-            values = _Values(self.old, self.new, self.where, asked)
-            yield from values.compare(content.get("schema", {}), there[name].get("schema", {}))
-
-
-@dataclass(frozen=True)
-class _Values:
-    """Two contracts, and the values that are looked at: those asked with, or those answered."""
-
-    old: Node
-    new: Node
-    where: str
-    asked: bool
-    seen: frozenset[tuple[str, str]] = frozenset()
-
-    def compare(self, before: Node, after: Node) -> Iterator[str]:
-        """Faults of what was allowed and is not, or of what comes and was not promised."""
-        pair = before.get("$ref", ""), after.get("$ref", "")
-        if all(pair) and pair in self.seen:
-            return
-        inner = replace(self, seen=self.seen | {pair})
-        if all(pair) and pair[0] == pair[1]:
-            # Said once of the schema, and not of each operation that has it.
-            name = pair[0].rpartition("/")[2]
-            inner = replace(inner, where=f"{name} ({'asked' if self.asked else 'answered'})")
-        old, new = _alternatives(self.old, before), _alternatives(self.new, after)
-        given, taken = (old, new) if self.asked else (new, old)
-        for each in given:
-            tried = [list(inner.one(*((each, t) if self.asked else (t, each)))) for t in taken]
-            # The alternative that fits best says what is wrong.
-            yield from min(tried, key=len)
-
-    def one(self, before: Node, after: Node) -> Iterator[str]:
-        given, taken = (before, after) if self.asked else (after, before)
-        word = "no longer" if self.asked else "now may be"
-        for kind in _types(given) - _types(taken):
-            if not (kind == "integer" and "number" in _types(taken)) and _types(taken):
-                yield f"{self.where}: {word} {kind}"
-        if not _types(given) and _types(taken):
-            yield f"{self.where}: {word} of any type"
-        if self.asked or not ("enum" in given and "enum" in taken):
-            for value in _left(_enumerated(given), _enumerated(taken)):
-                yield f"{self.where}: {word} {value}"
-        yield from self._bounds(given, taken)
-        yield from self._properties(before, after)
-        if "items" in before and "items" in after:
-            items = replace(self, where=f"{self.where}[]")
-            yield from items.compare(before["items"], after["items"])
-
-    def _bounds(self, given: Node, taken: Node) -> Iterator[str]:
-        """Bounds of what is taken that what is given need not keep."""
-        for name in (n for n in (*LEAST, *MOST) if n in taken):
-            sign = 1 if name in LEAST else -1
-            if name not in given or sign * given[name] < sign * taken[name]:
-                yield f"{self.where}: {name} {taken[name]} was {given.get(name)}"
-        if "pattern" in taken and taken["pattern"] != given.get("pattern"):
-            yield f"{self.where}: pattern changed"
-
-    def _properties(self, before: Node, after: Node) -> Iterator[str]:
-        given, taken = (before, after) if self.asked else (after, before)
-        for name in set(taken.get("required", ())) - set(given.get("required", ())):
-            yield f"{self.where}/{name}: {'is needed' if self.asked else 'may be missing'}"
-        old, new = before.get("properties", {}), after.get("properties", {})
-        closed = after.get("additionalProperties") is False
-        for name in old.keys() - new.keys():
-            if closed or not self.asked:
-                yield f"{self.where}/{name}: gone"
-        if self.asked and closed and before.get("additionalProperties") is not False:
-            yield f"{self.where}: other properties are refused"
-        for name in old.keys() & new.keys():
-            inner = replace(self, where=f"{self.where}/{name}")
-            yield from inner.compare(old[name], new[name])
-
-
-def _given(document: Node, path: str, method: str) -> dict[tuple[str, str], Node]:
-    item = document["paths"][path]
-    nodes = [*item.get("parameters", ()), *item[method].get("parameters", ())]
-    found = [contract.resolve(document, node) for node in nodes]
-    return {(node["in"], node["name"]): node for node in found}
-
-
-def _security(document: Node, operation: Node) -> Sequence[Node]:
-    found: Sequence[Node] = operation.get("security", document.get("security", []))
-    return found
-
-
-def _whole(document: Node, schema: Node) -> Node:
-    """A schema with what its $ref leads to."""
-    if "$ref" not in schema:
-        return schema
-    rest = {name: value for name, value in schema.items() if name != "$ref"}
-    return {**_whole(document, contract.resolve(document, schema)), **rest}
-
-
-def _alternatives(document: Node, schema: Node) -> Sequence[Node]:
-    whole = _whole(document, schema)
-    for name in ("oneOf", "anyOf"):
-        # Beside properties these say which of them go together.
-        if name in whole and "properties" not in whole and "type" not in whole:
-            return [each for part in whole[name] for each in _alternatives(document, part)]
-    return [whole]
-
-
-def _types(schema: Node) -> set[str]:
-    given = schema.get("type", [])
-    return {given} if isinstance(given, str) else set(given)
-
-
-def _enumerated(schema: Node) -> Sequence[Any] | None:
-    found: Sequence[Any] | None = schema.get("enum")
-    return [schema["const"]] if "const" in schema else found
-
-
-def _left(given: Sequence[Any] | None, taken: Sequence[Any] | None) -> Iterator[str]:
-    if taken is not None:
-        if given is None:
-            yield f"anything but {list(taken)}"
+        was, now = (facts.bounds.get((place, name)) for facts in (before, after))
+        loose, tight = (was, now) if "(answered)" not in place else (now, was)
+        if name == "enum":
+            # Clients tolerate other values of an enumeration.
+            wrong = tight and not (loose and (loose <= tight or "(answered)" in place))
         else:
-            yield from (repr(value) for value in given if value not in taken)
+            sign = 1 if name in LEAST else -1
+            wrong = tight is not None and (loose is None or sign * loose < sign * tight)
+        if wrong:
+            yield f"{place}: {name} {now} was {was}"
+
+
+class _Facts:
+    """What a contract promises.
+
+    kept: facts that may not go. added: places, and what may not come there. bounds: limits and
+    enumerations of values at places.
+    """
+
+    def __init__(self, document: Node) -> None:
+        self.document = document
+        self.kept: set[str] = set()
+        self.added: set[tuple[str, str]] = set()
+        self.places: set[str] = set()
+        self.bounds: dict[tuple[str, str], Any] = {}
+        for path, item in document["paths"].items():
+            for method in (m for m in contract.METHODS if m in item):
+                self._operation(path, method, item)
+
+    def _operation(self, path: str, method: str, item: Node) -> None:
+        operation = item[method]
+        nodes = [*item.get("parameters", ()), *operation.get("parameters", ())]
+        nodes = [contract.resolve(self.document, node) for node in nodes]
+        given = {(node["in"], node["name"]): node for node in nodes}
+        forms = given.pop(("path", "format"))["schema"]["enum"] if "{format}" in path else [""]
+        for form in forms:
+            where = f"{method.upper()} {path.replace('{format}', form)}"
+            self.places.add(where)
+            self.kept |= {where, f"{where}: operation {operation['operationId']}"}
+            security = operation.get("security", self.document.get("security", []))
+            if security and {} not in security:
+                self.added |= {(where, "needs a key")}
+                self.added |= {(where, f"needs the scope {contract.scope_of(security)}")}
+            for (_, name), node in given.items():
+                self.kept.add(f"{where}: parameter {name}")
+                if node.get("required"):
+                    self.added.add((where, f"needs parameter {name}"))
+                self._schema(node["schema"], f"{where} {name}", "asked")
+            if body := contract.resolve(self.document, operation.get("requestBody", {})):
+                self.kept.add(f"{where}: a body")
+                if body.get("required"):
+                    self.added.add((where, "needs a body"))
+                self._contents(body, f"{where} body", "asked")
+            for status, node in operation["responses"].items():
+                answer = contract.resolve(self.document, node)
+                self.kept |= {f"{where} {status}: header {h}" for h in answer.get("headers", ())}
+                self.kept.add(f"{where}: status {status}")
+                self._contents(answer, f"{where} {status} (answered)", "answered")
+
+    def _contents(self, node: Node, place: str, use: str) -> None:
+        for media_type, content in node.get("content", {}).items():
+            self.kept.add(f"{place}: media type {media_type}")
+            self._schema(content.get("schema", {}), f"{place} {media_type}", use)
+
+    def _schema(self, node: Node, place: str, use: str) -> None:
+        """Add the facts of a schema; those of one with a name stand under it, once."""
+        self.places.add(place)
+        whole, name = contract.resolve(self.document, node), node.get("$ref", "").rpartition("/")[2]
+        for kind in self._kinds(whole):
+            if use == "asked":
+                self.kept.add(f"{place}: {kind}")
+            else:
+                self.added.add((place, f"may be {kind}"))
+        if name:
+            place = f"{name} ({use})"
+            if place in self.places:
+                return
+            self.places.add(place)
+        # Beside properties these say which of them go together.
+        if "properties" not in whole and "type" not in whole:
+            for part in (*whole.get("oneOf", ()), *whole.get("anyOf", ())):
+                self._schema(part, place, use)
+        self._values(whole, place)
+        required, closed = whole.get("required", ()), whole.get("additionalProperties") is False
+        for key in required:
+            if use == "asked":
+                self.added.add((place, f"needs {key}"))
+            else:
+                self.kept.add(f"{place}/{key} in each answer")
+        if use == "asked" and not closed:
+            self.kept.add(f"{place}: other properties")
+        for key, value in whole.get("properties", {}).items():
+            self.kept.add(f"{place}/{key}")
+            self._schema(value, f"{place}/{key}", use)
+        if "items" in whole:
+            self._schema(whole["items"], f"{place}[]", use)
+
+    def _values(self, schema: Node, place: str) -> None:
+        """Add the bounds of a schema's values."""
+        for name in (n for n in (*LEAST, *MOST) if n in schema):
+            self.bounds[place, name] = schema[name]
+        if "pattern" in schema:
+            if "(answered)" in place:
+                self.kept.add(f"{place}: pattern {schema['pattern']}")
+            else:
+                self.added.add((place, f"has the pattern {schema['pattern']}"))
+        if "enum" in schema or "const" in schema:
+            values = {repr(value) for value in schema.get("enum", [schema.get("const")])}
+            self.bounds[place, "enum"] = self.bounds.get((place, "enum"), set()) | values
+
+    def _kinds(self, schema: Node) -> set[str]:
+        """Types of a schema's values; a number may be whole."""
+        parts = [*schema.get("oneOf", ()), *schema.get("anyOf", ())]
+        if parts and "type" not in schema and "properties" not in schema:
+            whole = (contract.resolve(self.document, part) for part in parts)
+            return set().union(*map(self._kinds, whole))
+        found = schema.get("type", KINDS)
+        kinds = {found} if isinstance(found, str) else {*found}
+        return kinds | {"integer"} if "number" in kinds else kinds

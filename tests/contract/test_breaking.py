@@ -55,15 +55,15 @@ BREAKING = {
     ),
     "key": (
         lambda s: pose(s).update(security=[{"bearer": ["read"]}]),
-        f"GET {POSE}: needs a key",
+        f"GET {POSE} now needs a key",
     ),
     "parameter needed": (
         lambda s: s["components"]["parameters"]["level"].update(required=True),
-        f"GET {POSE}: parameter level is needed",
+        f"GET {POSE} now needs parameter level",
     ),
     "enumeration": (
         lambda s: schema(s, "Names")["enum"].remove("vrm"),
-        "Names (asked): no longer 'vrm'",
+        "Names (asked): enum {",
     ),
     "field of an answer": (
         lambda s: without(schema(s, "Trust")["properties"], "sigma"),

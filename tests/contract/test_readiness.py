@@ -93,23 +93,14 @@ def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkey
     assert len(asked) == 6
 
 
-@pytest.mark.parametrize(
-    ("hostile", "said"),
-    [
-        (model_files.large, "takes more than 512 MB of memory to open"),
-        (
-            model_files.fill,
-            "its graph has an operator 'ConstantOfShape', which posefield does not use",
-        ),
-    ],
-)
 def test_a_file_that_is_meant_to_do_harm_is_told_and_the_others_are_taken(
-    told, models, tmp_path, caplog, hostile, said
+    told, models, tmp_path, caplog
 ):
     """In /readyz, the metric and the log."""
+    said = "takes more than 512 MB of memory to open"
     shutil.copy(models / "reach.onnx", tmp_path)
     shelf = ReloadingRegistry([tmp_path], VersionLimits())
-    (tmp_path / "bad.onnx").write_bytes(hostile((models / "reach.onnx").read_bytes()))
+    (tmp_path / "bad.onnx").write_bytes(model_files.large((models / "reach.onnx").read_bytes()))
     shutil.copy(models / "walk.onnx", tmp_path)
     shelf.scan()
     shelf.scan()

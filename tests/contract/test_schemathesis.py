@@ -202,102 +202,66 @@ def failures(event):
 
 
 def narrowed(spec, card):
-    """The contract with what only this model's card says: its controls, times and performers."""
+    """The contract of models, poses, clips and reasons with what only this model's card says: its
+    controls, times and performers. Which lists are equally long, which names and axes differ and
+    which segments follow one another no schema can say: such questions are left out."""
     narrow = copy.deepcopy(spec)
-    parts = narrow["components"]
-    numbers = {
-        c.name: {"type": "number", "minimum": c.minimum, "maximum": c.maximum}
-        for c in card.controls
-    }
-    exact = {
-        "type": "object",
-        "properties": numbers,
-        "required": list(numbers),
-        "additionalProperties": False,
-    }
-    parts["schemas"]["Controls"] = exact
-    parts["parameters"]["controls"]["schema"] = exact
-    parts["parameters"]["model"]["schema"] = {"enum": ["reach"]}
-    bounds = {"start": (0, 0.2), "end": (0.3, 0.8), "fps": (1, 240)}
-    for name, (low, high) in bounds.items():
-        between = {"type": "number", "minimum": low, "maximum": high}
-        parts["parameters"][name]["schema"] = between
-        for question in ("ClipQuestion", "NamedClipQuestion"):
-            parts["schemas"][question]["properties"][name] = between
+    for path in [*narrow["paths"]]:
+        if path.split("/")[-1].partition(".")[0] in ("crowd", "clips", "sigma", "batch") or (
+            "performances" in path
+        ):
+            del narrow["paths"][path]
+    schemas, parameters = (narrow["components"][part] for part in ("schemas", "parameters"))
+    clip = schemas["ClipQuestion"]["properties"]
+
+    def only(name, schema, *names):
+        """Narrow a parameter, a field of clips, and schemas."""
+        parameters[name]["schema"] = schema
+        if name in clip:
+            clip[name] = schema
+        schemas.update(dict.fromkeys(names, schema))
+
+    def between(low, high, kind="number"):
+        return {"type": kind, "minimum": low, "maximum": high}
+
+    numbers = {c.name: between(c.minimum, c.maximum) for c in card.controls}
+    exact = {"type": "object", "properties": numbers, "required": [*numbers]}
+    only("controls", {**exact, "additionalProperties": False}, "Controls")
+    only("model", {"enum": ["reach"]})
+    for name, ends in {"start": (0, 0.2), "end": (0.3, 0.8), "fps": (1, 240)}.items():
+        only(name, between(*ends))
     # This model's last pose leads nowhere, and one schema serves all formats, glTF too.
-    parts["schemas"]["Loop"] = {"type": "boolean", "enum": [False]}
-    for name, only in (("unit", "m"), ("up", "y")):
-        for question in ("ClipQuestion", "ClipsQuestion"):
-            parts["schemas"][question]["properties"][name] = {"enum": [only, None]}
+    schemas["Loop"] = {"type": "boolean", "enum": [False]}
+    for name, value in (("unit", "m"), ("up", "y")):
+        only(name, {"enum": [value]})
     # Nor can it say which formats have a body, and the service has no characters of users.
-    for question in ("ClipQuestion", "ClipsQuestion"):
-        for name in ("body", "character"):
-            del parts["schemas"][question]["properties"][name]
+    for name in ("body", "character"):
+        del clip[name]
+        for path in ("clip", "clip.{format}"):
+            given = narrow["paths"][f"/v1/models/{{model}}/{path}"]["get"]["parameters"]
+            given[:] = [each for each in given if not each.get("$ref", "").endswith(f"/{name}")]
     # Feet of this model are as predicted, so that they stand on no floor but the level one.
-    parts["schemas"]["FloorValue"] = {"enum": [0.0]}
-    parts["parameters"]["floor"]["schema"] = {"enum": ["0"]}
-    # That names differ cannot be said in a schema.
-    del parts["schemas"]["NamedClipQuestion"]["properties"]["name"]
-    parts["schemas"]["ClipsQuestion"]["properties"]["clips"]["maxItems"] = 3
-    times = {"type": "number", "minimum": 0, "maximum": 0.8}
-    parts["parameters"]["time"]["schema"]["items"] = times
-    parts["schemas"]["PoseQuestion"]["properties"]["times"]["items"] = times
-    # That all lists are equally long cannot be said in a schema, nor that this model does not walk.
-    crowd = parts["schemas"]["CrowdQuestion"]
-    level = {"type": "integer", "minimum": 0, "maximum": len(card.levels) - 1}
-    crowd["properties"] = {"controls": exact, "time": times, "level": level}
-    narrow_holds(parts, card, times)
-    for path in ("crowd", "crowd.{format}"):
-        del narrow["paths"][f"/v1/models/{{model}}/{path}"]["get"]
-    # One schema serves all formats, glTF too.
-    given = narrow["paths"]["/v1/models/{model}/clip.{format}"]["get"]["parameters"]
-    given.remove({"$ref": "#/components/parameters/body"})
-    for path in ("clip", "clip.{format}"):
-        whole = narrow["paths"][f"/v1/models/{{model}}/{path}"]["get"]["parameters"]
-        whole.remove({"$ref": "#/components/parameters/character"})
-    for name, only in (("unit", "m"), ("up", "y")):
-        given.remove({"$ref": f"#/components/parameters/{name}"})
-        given.append({"name": name, "in": "query", "schema": {"enum": [only]}})
-    # That a grid's axes differ, and are not among what is fixed, cannot be said either.
-    axes = {"across": {"enum": [card.controls[0].name]}, "along": {"enum": [card.controls[1].name]}}
-    others = {control.name: numbers[control.name] for control in card.controls[2:]}
-    fixed = {"type": "object", "properties": others, "additionalProperties": False}
-    parts["schemas"]["SigmaQuestion"]["properties"] |= {**axes, "controls": fixed}
-    for name, only in axes.items():
-        parts["parameters"][name]["schema"] = only
-    parts["parameters"]["fixedControls"]["schema"] = fixed
-    parts["schemas"]["GridSteps"]["maximum"] = 100
-    parts["parameters"]["level"]["schema"] = parts["schemas"]["LevelNumber"] = level
-    performers = list(card.performers)
+    only("floor", {"enum": ["0"]})
+    schemas["FloorValue"] = clip["floor"] = {"enum": [0.0]}
+    only("feet", {"enum": ["as_predicted"]}, "FeetMode")
+    times = between(0, 0.8)
+    parameters["time"]["schema"]["items"] = times
+    schemas["PoseQuestion"]["properties"]["times"]["items"] = times
+    only("level", between(0, len(card.levels) - 1, "integer"), "LevelNumber")
     for name in ("performer", "whose"):
-        parts["parameters"][name]["schema"] = {"enum": performers}
-    parts["schemas"]["Performer"] = {"enum": [*performers, None]}
+        only(name, {"enum": [*card.performers]}, "Performer")
     # No schema can say that a performer is given in one of two ways.
     for name in ("label", "whoseLabel"):
-        parts["parameters"][name]["schema"] = {"type": "array", "maxItems": 0}
-    parts["schemas"]["Labels"] = {"type": "object", "additionalProperties": False}
-    # Which segments follow one another, and which fields exclude each other, no schema can say.
-    endings = ("", ".{format}", "/batch", "/batch.{format}")
-    for path in (f"performances{ending}" for ending in endings):
-        del narrow["paths"][f"/v1/{path}"]
-    crowd = parts["schemas"]["CrowdQuestion"]["properties"]
-    crowd["labels"] = {"type": "object", "additionalProperties": False}
-    for parameter in parts["parameters"].values():
+        only(name, {"type": "array", "maxItems": 0})
+    schemas["Labels"] = {"type": "object", "additionalProperties": False}
+    # None of its controls is measured, and which places are out of reach no schema can say.
+    only("exact", {"enum": ["auto", "none"]}, "Exact")
+    schemas["Extrapolate"] = {"enum": ["warn"]}
+    target = schemas["Target"]["properties"]
+    target |= {"joint": {"enum": list(card.skeleton.names)}, "time": times}
+    schemas["Targets"]["maxItems"] = 1
+    words = [f"{card.skeleton.names[-1]}@{when}:0.3,1.2,-0.4" for when in ("event", "0.5", "end")]
+    parameters["target"]["schema"] = {"type": "array", "maxItems": 1, "items": {"enum": words}}
+    for parameter in parameters.values():
         parameter.pop("example", None)
     return narrow
-
-
-def narrow_holds(parts, card, times):
-    """Narrow the constraints to this model's: none of its controls is measured, it has no feet
-    that stand, and no schema can say which places are out of reach, or that two targets differ."""
-    parts["schemas"]["FeetMode"] = parts["parameters"]["feet"]["schema"] = {
-        "enum": ["as_predicted"]
-    }
-    parts["schemas"]["Exact"] = parts["parameters"]["exact"]["schema"] = {"enum": ["auto", "none"]}
-    parts["schemas"]["Extrapolate"] = {"enum": ["warn"]}
-    target = parts["schemas"]["Target"]["properties"]
-    target |= {"joint": {"enum": list(card.skeleton.names)}, "time": times}
-    parts["schemas"]["Targets"]["maxItems"] = 1
-    words = [f"{card.skeleton.names[-1]}@{when}:0.3,1.2,-0.4" for when in ("event", "0.5", "end")]
-    listed = {"type": "array", "maxItems": 1, "items": {"enum": words}}
-    parts["parameters"]["target"]["schema"] = listed

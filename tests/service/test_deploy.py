@@ -1,6 +1,5 @@
 """Tests of service/deploy: valid manifests and scripts, which run a complete export in parts."""
 
-import copy
 import os
 import subprocess
 import sys
@@ -149,27 +148,17 @@ def test_an_array_needs_to_know_what_to_export():
     assert (done.returncode, done.stderr.split()[0]) == (2, "usage:")
 
 
-def test_shellcheck_finds_nothing(tmp_path):
+def test_shellcheck_finds_nothing():
     script = DEPLOY / "export-slurm.sh"
     assert (run([BIN / "shellcheck", script]).stdout, os.access(script, os.X_OK)) == ("", True)
-    # Negative control.
-    careless = tmp_path / "careless.sh"
-    careless.write_text(script.read_text().replace('"$model"', "$model"))
-    assert "SC2086" in run([BIN / "shellcheck", careless]).stdout
 
 
 def openjd(*words):
     return run([BIN / "openjd", *words])
 
 
-def test_the_openjd_template_is_valid(tmp_path):
-    template = DEPLOY / "export-openjd.yaml"
-    assert openjd("check", template).returncode == 0
-    # Negative control.
-    plain = copy.deepcopy(yaml.safe_load(template.read_text()))
-    plain["steps"][0]["script"]["actions"]["onRun"]["commands"] = ["bash"]
-    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(plain))
-    assert openjd("check", tmp_path / "wrong.yaml").returncode != 0
+def test_the_openjd_template_is_valid():
+    assert openjd("check", DEPLOY / "export-openjd.yaml").returncode == 0
 
 
 @pytest.mark.system

@@ -67,17 +67,6 @@ def test_a_file_of_another_size_is_found_without_verifying(
     assert exporting.content(target) == exporting.content(complete[layout])
 
 
-@pytest.mark.parametrize(("layout", "name"), [("folder", DAMAGED[0][1]), ("tar", DAMAGED[2][1])])
-def test_a_flipped_bit_is_not_looked_for_without_verifying(
-    layout, name, complete, source, model_path, tmp_path
-):
-    """Negative control: it is the checksum that finds it."""
-    target = shutil.copytree(complete[layout], tmp_path / "target")
-    flip(target / name)
-    work = exporting.work(model_path, source, target, 4, layout)
-    assert run.run(work, source, exporting.Recorder()).already_complete
-
-
 def test_a_manifest_that_lost_a_line_is_found_without_verifying(
     complete, source, model_path, tmp_path
 ):

@@ -152,12 +152,6 @@ def test_faults_are_named_by_line_or_row(model, folder, table):
     assert [said for _, said in found["jsonl"]] == [said for _, said in found["parquet"]]
 
 
-def test_the_oracle_refuses_some_rows(model):
-    """Negative control."""
-    table = [POINT, {**POINT, "level": 4}, {"start": 0.5, "end": 0.3}, {"fps": 60.0}]
-    assert [row is not None for row in bodies(model, table)] == [True, False, False, True]
-
-
 def test_controls_may_be_left_open(model, tmp_path):
     """A table, a grid and a URL ask the same question; the service chooses the other controls."""
     path = text(tmp_path / "q.csv", "turn,stature", "10,", "20,1.75")
@@ -359,10 +353,3 @@ def test_rows_are_not_held(model, tmp_path, kind):
     ask = asked.get(kind) or {"path": text(tmp_path / f"q.{kind}", *lines[kind])}
     opened = source(model, **ask)
     assert peak(lambda: sum(1 for _ in opened.rows())) < BOUND
-
-
-@pytest.mark.system
-def test_rows_that_are_held_would_be_noticed(model):
-    """Negative control of the test above."""
-    opened = source(model, sample=MANY)
-    assert peak(lambda: list(opened.rows())) > 2 * BOUND

@@ -144,48 +144,15 @@ def test_locked_euler_angles_mean_the_same_rotation_and_end_in_zero(order, middl
     assert np.max(np.abs(quat.to_matrix(dropped) - quat.to_matrix(q))) > 1e-2
 
 
-@pytest.fixture
-def pairs(rng):
-    return quat.normalize(rng.normal(size=(2, 7, 5, 4)))
-
-
-@pytest.fixture
-def turning_vectors(rng):
-    # Zero and a half turn too, where the sine over the angle is zero over zero and zero.
-    turning_vectors = rng.normal(size=(7, 5, 3))
-    turning_vectors[0] = 0.0
-    turning_vectors[1] *= np.pi / np.linalg.norm(turning_vectors[1], axis=-1, keepdims=True)
-    return turning_vectors
-
-
-def planes(values):
-    """Values (..., k) as planes (k, ...)."""
-    return np.ascontiguousarray(np.moveaxis(values, -1, 0))
-
-
-def same(found, expected):
-    return np.array_equal(found, planes(expected))
-
-
-def test_product_has_the_same_bits(pairs):
-    a, b = pairs
-    found = np.empty((4, 7, 5))
-    quat.product_planes(planes(a), planes(b), out=found)
-    assert same(found, quat.mul(a, b))
-    assert not same(found, quat.mul(b, a))
-
-
-def test_turned_vectors_have_the_same_bits(pairs, turning_vectors):
-    found = np.empty((3, 7, 5))
-    quat.rotate_planes(planes(pairs[0]), planes(turning_vectors), out=found)
-    assert same(found, quat.rotate(pairs[0], turning_vectors))
-    assert not same(found, quat.rotate(pairs[1], turning_vectors))
-
-
-def test_one_quaternion_alone_has_the_same_bits(pairs, turning_vectors):
-    """Components are then single numbers, which NumPy cannot write to."""
-    turned, both = np.empty(3), np.empty(4)
-    quat.rotate_planes(pairs[0, 2, 2], turning_vectors[2, 2], out=turned)
-    quat.product_planes(pairs[0, 2, 2], pairs[1, 2, 2], out=both)
-    assert np.array_equal(turned, quat.rotate(pairs[0, 2, 2], turning_vectors[2, 2]))
-    assert np.array_equal(both, quat.mul(pairs[0, 2, 2], pairs[1, 2, 2]))
+# Of one quaternion alone components are single numbers, which NumPy cannot write to.
+@pytest.mark.parametrize("count", [(), (7, 5)])
+def test_products_and_turned_vectors_of_planes_have_the_same_bits(rng, count):
+    one, other = quat.normalize(rng.normal(size=(2, *count, 4)))
+    vectors = rng.normal(size=(*count, 3))
+    planes = [np.moveaxis(values, -1, 0).copy() for values in (one, other, vectors)]
+    both, turned = np.empty((4, *count)), np.empty((3, *count))
+    quat.product_planes(planes[0], planes[1], out=both)
+    quat.rotate_planes(planes[0], planes[2], out=turned)
+    assert np.array_equal(np.moveaxis(both, 0, -1), quat.mul(one, other))
+    assert np.array_equal(np.moveaxis(turned, 0, -1), quat.rotate(one, vectors))
+    assert not np.array_equal(np.moveaxis(both, 0, -1), quat.mul(other, one))

@@ -11,7 +11,7 @@ from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.synthesis.trust import explain_result
 
-SHARES = (-40.0, -8.0, -1.0, -0.3, -0.2, -0.05, 0.0, 0.5, 1.0, 1.05, 1.2, 1.3, 2.0, 9.0, 40.0)
+SHARES = (-40.0, -1.0, -0.3, -0.05, 0.0, 0.5, 1.0, 1.05, 1.2, 2.0, 40.0)
 """Places of asked values, from 0 at the smallest sampled one to 1 at the largest."""
 NEAR = 1e-6
 # Share of a control's range: the tolerance of the correction in each.
@@ -48,7 +48,7 @@ def swept(model, performer):
         )
 
 
-def test_durations_stay_within_the_margin_of_the_captured_ones(model):
+def test_durations_stay_in_their_margin_and_measured_controls_are_monotone_and_not_passed(model):
     low, high = model.session.card.durations
     margin = answer_bounds.MARGIN
     for performer in (None, *model.session.card.performers):
@@ -58,11 +58,6 @@ def test_durations_stay_within_the_margin_of_the_captured_ones(model):
                     assert (
                         low * (1 - margin) - NEAR <= answer.duration <= high * (1 + margin) + NEAR
                     )
-
-
-def test_a_measured_control_is_given_monotonically_and_never_passed(model):
-    for performer in (None, *model.session.card.performers):
-        for control, values, answers in swept(model, performer):
             if control.measure is None or control.measure.is_body_measure:
                 continue
             given = np.array([answer.measured[control.name] for answer in answers])

@@ -121,19 +121,10 @@ WORK = [solved, mapped, suggested, archived, crowded, planned, walked, stood, se
 
 
 @pytest.mark.parametrize("work", WORK, ids=lambda work: work.__name__)
-@pytest.mark.parametrize("last", [1, 6])
-def test_work_stops_when_it_is_cancelled(work, last, reaching, walk):
-    own, context = Counted(last), copy_context()
+def test_work_stops_when_it_is_cancelled(work, reaching, walk):
+    own, context = Counted(6), copy_context()
     context.run(cancellation.current.set, own)
     with pytest.raises(Cancelled):
         context.run(work, reaching, walk)
     # Several threads of one crowd may look before the first of them has ended.
-    assert last <= own.looks <= last + 8
-
-
-@pytest.mark.parametrize("work", [solved, mapped, walked], ids=lambda work: work.__name__)
-def test_work_that_is_not_cancelled_goes_on(work, reaching, walk):
-    own, context = Counted(10**9), copy_context()
-    context.run(cancellation.current.set, own)
-    assert context.run(work, reaching, walk) is not None
-    assert own.looks > 6
+    assert 6 <= own.looks <= 14

@@ -106,15 +106,10 @@ def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
             ask(reacher, ClipQuestion(controls=POINT, loop=True))
 
 
-@pytest.mark.parametrize(
-    ("span", "said"),
-    [({"start": 0.2}, "start: 0.2 s with loop, expected none: a loop is a whole cycle")],
-)
-def test_a_part_of_a_loop_is_refused(walker, span, said):
+def test_a_part_of_a_loop_is_refused(walker):
     for ask in (clips.synthesize_clip, clips.check):
-        with pytest.raises(InvalidField) as caught:
-            ask(walker, ClipQuestion(controls=STROLL, loop=True, **span))
-        assert str(caught.value) == said
+        with pytest.raises(InvalidField, match=r"^start: 0\.2 s with loop, expected none: a loop"):
+            ask(walker, ClipQuestion(controls=STROLL, loop=True, start=0.2))
 
 
 def test_names_of_a_convention_need_roles(walker):
