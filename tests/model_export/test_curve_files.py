@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from exported_clips import encoded
 from families import face_files
 from minimal import plain_recipe, recipe_with, small_clip, write_clips
 from pydantic import ValidationError
@@ -48,6 +49,19 @@ def test_curves_are_found_by_a_suffix(folder):
         assert example.clip.curves.names == list(NAMES)
         assert np.abs(example.clip.curve_values - values(clip)).max() < WRITTEN
         assert np.abs(example.clip.curve_values - values(clip + 1)).max() > 0.05
+
+
+@pytest.mark.parametrize("form", ["glb", "usda"])
+def test_curves_of_written_files_come_back(folder, form):
+    """The project's own files, which hold the curves as weights of blend shapes."""
+    for clip, example in enumerate(read(folder)):
+        (folder / f"{clip}.{form}").write_bytes(encoded(example.clip, form))
+    table = folder / "clips.csv"
+    table.write_text(table.read_text().replace(".bvh", f".{form}"))
+    recipe = recipe_with(curves={"suffix": f".{form}"}, source={"metres_per_unit": 1.0})
+    for clip, example in enumerate(ingest.ingest(recipe, folder)[0]):
+        assert example.clip.curves.names == list(NAMES)
+        assert np.abs(example.clip.curve_values - values(clip)).max() < WRITTEN
 
 
 def test_curves_without_a_skeleton_move_one_joint_that_rests(folder):

@@ -1,8 +1,9 @@
-"""Files of curves: CSV with a column `frame` that counts from 0 and a column for each curve."""
+"""Files of curves: CSV with a column `frame` and one for each curve, or files of motions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import PurePosixPath
 
 import numpy as np
 
@@ -13,10 +14,11 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, CurveValues
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import clip_table
+from posefield_train.source import clip_table, motion_readers
 from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.control_sources import Curves
 from posefield_train.source.data_folder import FileLocation
+from posefield_train.source.motion_file import ReadOptions
 
 FRAME = "frame"
 RESTING_JOINT = "Root"
@@ -25,29 +27,47 @@ RESTING_JOINT = "Root"
 
 @dataclass(frozen=True)
 class CurveReader:
-    """Reader of the curve files of one recipe: all have the curves of the first one."""
+    """Reader of the curve files of one recipe: all have the curves of the first one.
+
+    rate: of the recipe, frames a second.
+    """
 
     keys: Curves
     curves: tuple[Curve, ...]
+    rate: float | None
 
-    def read(self, place: FileLocation) -> CurveValues:
-        """Return the curves of a file.
+    def read(self, row: ClipRow) -> CurveValues:
+        """Return the curves of a row.
 
         Raises RecipeError for a missing column or frame, and for a cell that is not a number within
         the curve's range.
         """
-        table = clip_table.open_table(place)
+        table = _open(row, self.rate)
         _expect_frames(table)
         _expect_columns(table, [curve.name for curve in self.curves], self.keys)
         return _values(table, self.curves)
 
 
-def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
-    """Return the reader of the files of rows.
+def _open(row: ClipRow, rate: float | None) -> ClipTable:
+    """Return the table of a row's curves; of a file of motions the weights of blend shapes."""
+    place = row.curve_file
+    form = motion_readers.SUFFIXES.get(PurePosixPath(place.name).suffix.lower())
+    if form is None:
+        return clip_table.open_table(place)
+    curves = motion_readers.read(place, ReadOptions(rate, row.animation)).curves
+    columns = {name: map(repr, values.tolist()) for name, values in curves.items()}
+    cells = zip(*columns.values(), strict=True)
+    numbered = ((str(frame), *values) for frame, values in enumerate(cells))
+    records = [dict(zip((FRAME, *columns), values, strict=True)) for values in numbered]
+    return ClipTable(str(place), list(enumerate(records)))
+
+
+def reader(keys: Curves, rows: Sequence[ClipRow], rate: float | None) -> CurveReader:
+    """Return the reader of the files of rows. rate: of the recipe, frames a second.
 
     Raises RecipeError for keys of an unknown curve, and for a file without curves.
     """
-    first = clip_table.open_table(rows[0].curve_file)
+    first = _open(rows[0], rate)
     _expect_frames(first)
     found = [name for name in first.columns if name != FRAME]
     names = keys.names or found
@@ -57,7 +77,7 @@ def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
         if name not in names:
             text = f"curves.of.{name}{did_you_mean(name, names)}, expected one of {names}"
             raise RecipeError(first.name, text, 1)
-    return CurveReader(keys, tuple(map(keys.curve, names)))
+    return CurveReader(keys, tuple(map(keys.curve, names)), rate)
 
 
 def read_known(place: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveValues, list[str]]:

@@ -85,7 +85,7 @@ def ingest(
     rows = clip_table.read(recipe, folder)
     alone = recipe.curves is not None and recipe.curves.alone
     files = {} if alone else read_files(rows, recipe.source, known)
-    curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
+    curves = curve_files.reader(recipe.curves, rows, recipe.source.rate) if recipe.curves else None
     notes = [*data_folder.table_notes(rows[0].table), *reader_notes(files)]
     if recipe.source.root_offset is None:
         notes += offset_notes(files)
@@ -218,7 +218,7 @@ def _whole_clip(
     recipe: Recipe, wholes: Mapping[str, Clip], curves: CurveReader | None, row: ClipRow
 ) -> Clip:
     """Return the clip of all frames of a row's file, with its curves. wholes: clips by motion."""
-    values = curves.read(row.curve_file) if curves else None
+    values = curves.read(row) if curves else None
     if values and recipe.curves and recipe.curves.rate:
         return curve_files.resting_clip(values, recipe.curves.rate)
     clip = wholes[row.motion]

@@ -146,9 +146,8 @@ def choice(names: Sequence[str], wanted: str) -> int | None:
 def curve_notes(curves: Mapping[str, Floats]) -> list[str]:
     """Return a note on weights of blend shapes, which are no motion of joints."""
     listed = ", ".join(list(curves)[:20])
-    return [f"{len(curves)} curves ({listed}) left out: [curves] of a recipe reads them"][
-        : len(curves)
-    ]
+    said = f"curves ({listed}) are no joints: only [curves] of a recipe reads them"
+    return [said] if curves else []
 
 
 LEAST_RATE = 10.0

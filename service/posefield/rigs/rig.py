@@ -104,16 +104,17 @@ def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequenc
             f"{HOW}",
         )
     limbs = {role for chain in CHAINS for role in chain[:3]} | {"hips"}
-    unsure = [
-        f"{role} (perhaps {own.joint!r}, {own.confidence:.2f}: {'; '.join(own.reasons)})"
-        for role, own in guesses.items()
-        if role in limbs and not own.is_sure
-    ]
+    unsure = {role: own for role, own in guesses.items() if role in limbs and not own.is_sure}
     if unsure:
+        # The least sure first: the others often follow from them.
+        ranked = sorted(unsure, key=lambda role: unsure[role].confidence)
+        doubts = [f"{role} (perhaps {unsure[role].joint!r})" for role in ranked]
+        more = f" and {len(doubts) - 4} more" if len(doubts) > 4 else ""
+        reasons = dict.fromkeys(reason for own in unsure.values() for reason in own.reasons)
         raise MotionFileError(
             source,
-            f"found no sure joint for {', '.join(unsure)}; expected a confidence of "
-            f"{LOWEST_CONFIDENCE}: {HOW}",
+            f"found no sure joint for {', '.join(doubts[:4])}{more}: {'; '.join([*reasons][:3])}; "
+            f"expected a confidence of {LOWEST_CONFIDENCE}: {HOW}",
         )
 
 
