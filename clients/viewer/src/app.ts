@@ -192,7 +192,7 @@ class App {
     const { state, faults } = restored(wanted, open.model, open.card);
     this.#notice.remark("model", faults.join(" · ") || null);
     const { controls } = open.store.state;
-    const same = Object.entries(state.controls).every(([name, value]) => controls[name] === value);
+    const same = JSON.stringify(sorted(state.controls)) === JSON.stringify(sorted(controls));
     const playing = state.playing && !theme.still();
     open.store.set({ ...state, playing, ...(same ? { controls } : {}) });
   }
@@ -269,6 +269,8 @@ function calm(state: State, { entries }: Address): State {
   const asked = entries.some(([key]) => key === "~playing");
   return theme.still() && !asked ? { ...state, playing: false } : state;
 }
+
+const sorted = (controls: State["controls"]) => Object.entries(controls).sort();
 
 /** Mount all parts, until the session's signal. */
 function mountParts(session: Session): void {

@@ -3,26 +3,25 @@
 import type { ModelCard, Trust } from "@posefield/client";
 
 import { button, chooser, el, icon, id, labelled, svg, textButton, titled } from "./dom.ts";
-import { otherSets } from "./examples.ts";
+import { type Control, otherSets } from "./examples.ts";
 import type { Session } from "./player.ts";
-import type { State } from "./state.ts";
+import { has, type State } from "./state.ts";
 import * as written from "./written.ts";
 import { title } from "./written.ts";
 
-export type Control = ModelCard["controls"][number];
 type Preset = NonNullable<ModelCard["presets"]>[number];
 
 export function mount(host: HTMLElement, session: Session): void {
   const { card, player, signal, store } = session;
   const sliders = card.controls.map((control, column) => {
     const examples = card.examples.map((row) => row[column]!);
-    const set = (value: number) =>
-      store.set({ controls: { ...store.state.controls, [control.name]: value } });
+    const set = (value: number | null) => {
+      const { [control.name]: _, ...others } = store.state.controls;
+      store.set({ controls: value === null ? others : { ...others, [control.name]: value } });
+    };
     return [control.name, new Slider(control, examples, set)] as const;
   });
-  const reset = button("Reset all", "Reset all controls (R)", () =>
-    store.set({ controls: defaults(card) }),
-  );
+  const reset = button("Reset all", "Reset all controls (R)", () => store.set({ controls: {} }));
   reset.dataset["act"] = "reset";
   host.append(titled("Controls", reset));
   if (card.presets?.length) host.append(presets(card.presets, session));
@@ -49,20 +48,18 @@ export function mount(host: HTMLElement, session: Session): void {
     host.append(labelled(title(name), list));
   }
   const show = () => {
-    for (const [name, slider] of sliders) slider.show(store.state.controls[name]!);
+    const { controls, inferred } = store.state;
+    for (const [name, slider] of sliders)
+      slider.show(controls[name] ?? inferred[name]!, !Object.hasOwn(controls, name));
   };
   show();
   store.listen((_, changed) => {
-    if (changed.has("controls")) show();
+    if (has(changed, "controls", "inferred")) show();
   }, signal);
   player.onTrust(({ deviations = [] }) => {
     for (const [name, slider] of sliders)
       slider.showDeviation(deviations.find(({ control }) => control === name) ?? null);
   });
-}
-
-export function defaults({ controls }: Pick<ModelCard, "controls">): Record<string, number> {
-  return Object.fromEntries(controls.map(({ name, default: value }) => [name, value]));
 }
 
 /** Named points of the controls, from the model's recipe, as buttons. */
@@ -92,6 +89,11 @@ export function isAt({ controls, labels, performer }: State, preset: Preset): bo
 /** Share of the sampled range by which a slider goes beyond it on either side. */
 const BEYOND = 0.25;
 const STEPS = 1500;
+/** Steps of a key: one moves by two hundredths of the sampled range. */
+const [STEP, KEYS] = [
+  20,
+  { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 },
+] as const;
 
 /** A slider over the sampled range and beyond, with captured clips as ticks, and its number. */
 class Slider {
@@ -103,22 +105,23 @@ class Slider {
   readonly #fault = el("p", { class: "fault", role: "alert", id: id() });
   readonly #given = el("p", { class: "given", "data-given": "" });
   readonly #reset: HTMLButtonElement;
-  readonly #set: (value: number) => void;
+  readonly #set: (value: number | null) => void;
   #value: number;
 
-  /** examples: values of captured clips. */
-  constructor(control: Control, examples: readonly number[], set: (value: number) => void) {
+  /** examples: values of captured clips. set: called with null to leave the control open. */
+  constructor(control: Control, examples: readonly number[], set: (value: number | null) => void) {
     this.#control = control;
     this.#value = control.default;
     this.#set = set;
     const { description, minimum, maximum, unit } = control;
     const name = title(control.name);
-    this.#reset = button(icon("reset"), `Reset ${name}`, () => set(control.default));
+    this.#reset = button(icon("reset"), `Reset ${name}`, () => set(null));
     const [label, about] = [id(), id()];
     this.#range.setAttribute("aria-labelledby", label);
     this.#range.setAttribute("aria-describedby", about);
     this.#number.setAttribute("aria-label", `${name} in ${unit || "numbers"}`);
     this.#range.addEventListener("input", () => set(this.#snapped()));
+    this.#range.addEventListener("keydown", (event) => this.#press(event));
     this.#number.addEventListener("change", () => this.#enter());
     const [low, high] = [minimum, maximum].map((value) => written.short(value, maximum - minimum));
     const sampled = `${description ? `${description}. ` : ""}Sampled ${low} to ${high} ${unit}`;
@@ -139,22 +142,23 @@ class Slider {
       this.#given,
       el("p", { class: "about", id: about }, sampled),
     );
-    this.show(control.default);
+    this.show(control.default, true);
   }
 
-  show(value: number): void {
+  /** open: the value was inferred. */
+  show(value: number, open: boolean): void {
     this.#value = value;
     const { minimum, maximum, unit } = this.#control;
     const outside = value < minimum || value > maximum;
     this.#range.value = String(Math.round(STEPS * share(this.#control, value)));
     this.#range.setAttribute(
       "aria-valuetext",
-      `${this.#text()} ${unit}${outside ? ", outside what was sampled" : ""}`,
+      `${this.#text()} ${unit}${outside ? ", outside what was sampled" : open ? ", inferred" : ""}`,
     );
     if (document.activeElement !== this.#number) this.#number.value = this.#text();
     this.element.toggleAttribute("data-outside", outside);
-    this.#mark.textContent = outside ? "outside" : "";
-    this.#reset.disabled = value === this.#control.default;
+    this.#mark.textContent = outside ? "outside" : open ? "inferred" : "";
+    this.#reset.disabled = open;
     this.#refuse("");
   }
 
@@ -176,6 +180,18 @@ class Slider {
     return values.reduce((best, other) =>
       Math.abs(other - value) < Math.abs(best - value) ? other : best,
     );
+  }
+
+  /** Move by steps, or to the next of few values. */
+  #press(event: KeyboardEvent): void {
+    const count = KEYS[event.key as keyof typeof KEYS] ?? 0;
+    if (!count || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    const next = this.#control.values
+      .toSorted((a, b) => Math.sign(count) * (a - b))
+      .find((value) => Math.sign(count) * (value - this.#value) > 1e-9);
+    this.#range.valueAsNumber += STEP * count;
+    this.#set(next ?? this.#snapped());
   }
 
   #enter(): void {

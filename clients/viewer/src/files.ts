@@ -4,9 +4,10 @@ import { type ClipFormat, type ClipQuestion, PosefieldError } from "@posefield/c
 
 import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
 import { checkbox, chooser, el, labelled, saveFile, textButton } from "./dom.ts";
+import type { Control } from "./examples.ts";
 import type { Session } from "./player.ts";
 import { TAKE_AND_FEET, takeAndFeet, targetFields } from "./questions.ts";
-import { type Changes, has } from "./state.ts";
+import { type Changes, has, valuesOf } from "./state.ts";
 import { videoButton } from "./video.ts";
 import { figure, title } from "./written.ts";
 
@@ -26,6 +27,7 @@ const NAMES = [
   ["vrm", "VRM"],
   ["humanik", "HumanIK"],
 ] as const;
+const BODY: ReadonlySet<string> = new Set(["leg_length", "stature"]);
 const DEFAULT = ["", "default"] as const;
 const UNITS = [DEFAULT, ["m", "metres"], ["cm", "centimetres"]] as const;
 const UPS = [DEFAULT, ["y", "Y"], ["z", "Z"]] as const;
@@ -124,8 +126,11 @@ class Files {
     const { card, store } = this.#session;
     const { controls, labels, performer, level, root } = store.state;
     const { fps, loop, names, unit, up, format, exact } = this.#choice;
+    // The motion on the stage matches measured controls that were set, not those inferred.
+    const measured = this.#measured;
+    const matched = exact ? measured.filter((name) => Object.hasOwn(controls, name)) : [];
     return {
-      controls,
+      controls: valuesOf(store.state),
       fps,
       ...(performer !== null && { performer }),
       ...(Object.keys(labels).length && { labels }),
@@ -134,16 +139,23 @@ class Files {
       ...(loop && { loop }),
       ...targetFields(card, store.state),
       ...takeAndFeet(card, store.state),
-      ...(!exact && { exact: "none" }),
+      ...(matched.length < measured.length && { exact: matched.length ? matched : "none" }),
       ...(names !== "own" && { names }),
       ...(unit && format !== "glb" && { unit }),
       ...(up && format !== "glb" && { up }),
     };
   }
 
+  /** Controls that are measured on a motion, not on the performer's body. */
+  get #measured(): string[] {
+    const of = ({ measure }: Control) => measure?.quantity ?? "stature";
+    const { controls } = this.#session.card;
+    return controls.filter((c) => !BODY.has(of(c))).map(({ name }) => name);
+  }
+
   #update(changed: Changes): void {
     if (has(changed, "root", "level", "target", ...TAKE_AND_FEET)) this.#show();
-    else if (has(changed, "controls", "performer", "labels")) this.#showTexts();
+    else if (has(changed, "controls", "inferred", "performer", "labels")) this.#showTexts();
   }
 
   #take(part: Partial<Choice>): void {
@@ -197,8 +209,8 @@ class Files {
   #options(): HTMLElement[] {
     const { card, store } = this.#session;
     const rows: HTMLElement[] = [];
+    const measured = this.#measured.map(title);
     if (card.cyclic) rows.push(checkbox("Closed loop", (loop) => this.#take({ loop })));
-    const measured = card.controls.filter(({ measure }) => measure).map(({ name }) => title(name));
     if (measured.length) {
       const box = checkbox(`Match exactly: ${measured.join(", ")}`, (exact) =>
         this.#take({ exact }),

@@ -1,12 +1,11 @@
-/** The state as the address bar's hash: `#reaching?stature=1.72&turn=20&~time=0.5`.
+/** The state as the address bar's hash: `#reaching?stature=1.72&turn=~20&~time=0.5`.
  *
- * Controls go by their names; other entries begin with `~` and are written where they differ from the
+ * Controls go by their names, with `~` before a value that was inferred; other entries begin with `~` and are written where they differ from the
  * start. Entries that cannot be read are reported, and the others are used.
  */
 
 import type { ModelCard } from "@posefield/client";
 
-import { defaults } from "./controls.ts";
 import { otherSets } from "./examples.ts";
 import { LONGEST_SCRIPT, read as readScript } from "./performance/script.ts";
 import {
@@ -17,7 +16,7 @@ import {
   VARIETY,
   whyFeetCannotStand,
 } from "./questions.ts";
-import type { State, Store } from "./state.ts";
+import { type State, type Store, valuesOf } from "./state.ts";
 import { read as number } from "./written.ts";
 
 export interface Address {
@@ -26,7 +25,7 @@ export interface Address {
   readonly entries: readonly (readonly [string, string])[];
 }
 
-type Rest = Omit<State, "model" | "controls">;
+type Rest = Omit<State, "model" | "controls" | "inferred">;
 type Key = keyof Rest;
 
 /** An entry; `read` returns undefined for a text that is not as expected. */
@@ -56,7 +55,8 @@ export function initial(model: string, card: ModelCard): State {
   const [across = "", along = ""] = axes;
   return {
     model,
-    controls: defaults(card),
+    controls: {},
+    inferred: Object.fromEntries(card.controls.map(({ name, default: value }) => [name, value])),
     performer: null,
     labels: {},
     level: 0,
@@ -92,23 +92,25 @@ export function restored(
   card: ModelCard,
 ): { state: State; faults: readonly string[] } {
   const start = initial(model, card);
-  const controls: Record<string, number> = { ...start.controls };
+  const controls: Record<string, number> = {};
+  const inferred: Record<string, number> = { ...start.inferred };
   const rest: Partial<Record<Key, unknown>> = {};
   const faults: string[] = [];
   for (const [key, text] of entries) {
     const fault = key.startsWith("~")
       ? readEntry(rest, key.slice(1), text, card)
-      : readControl(controls, key, text);
+      : readControl(controls, inferred, key, text);
     if (fault) faults.push(fault);
   }
-  return { state: { ...start, ...(rest as Partial<Rest>), controls }, faults };
+  return { state: { ...start, ...(rest as Partial<Rest>), controls, inferred }, faults };
 }
 
 export function written(state: State, card: ModelCard): string {
   const start = initial(state.model, card);
-  const controls = Object.entries(state.controls).map(
-    ([name, value]) => `${safe(name)}=${rounded(value)}`,
-  );
+  const controls = Object.entries(valuesOf(state)).map(([name, value]) => {
+    const sign = Object.hasOwn(state.controls, name) ? "" : "~";
+    return `${safe(name)}=${sign}${rounded(value)}`;
+  });
   const rest = (Object.keys(FIELDS) as Key[])
     .map((key) => [key, entryOf(state, key)] as const)
     .filter(([key, text]) => text !== entryOf(start, key))
@@ -120,11 +122,16 @@ function entryOf(state: State, key: Key): string {
   return (FIELDS[key] as Field<unknown>).write(state[key]);
 }
 
-function readControl(controls: Record<string, number>, name: string, text: string): string | null {
-  if (!Object.hasOwn(controls, name)) return `${name}: this model has no such control`;
-  const value = number(text);
+function readControl(
+  controls: Record<string, number>,
+  inferred: Record<string, number>,
+  name: string,
+  text: string,
+): string | null {
+  if (!Object.hasOwn(inferred, name)) return `${name}: this model has no such control`;
+  const value = number(text.replace(/^~/, ""));
   if (typeof value === "string") return `${name}: ${value}`;
-  controls[name] = value;
+  (text.startsWith("~") ? inferred : controls)[name] = value;
   return null;
 }
 
@@ -275,7 +282,7 @@ function plain(text: string): string {
 /** Milliseconds without a change until the address is written. */
 const REST = 350;
 
-/** Write each change of the state into the address; those of time make no step of the history. */
+/** Write each change of the state into the address; those of time and of inferred controls make no step of the history. */
 export function follow(store: Store, card: ModelCard, signal: AbortSignal): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   let lasting = false;
@@ -291,7 +298,7 @@ export function follow(store: Store, card: ModelCard, signal: AbortSignal): void
   };
   store.listen((state, changed) => {
     if (changed.size === 1 && changed.has("time") && state.playing) return;
-    lasting ||= [...changed].some((key) => key !== "time" && key !== "playing");
+    lasting ||= [...changed].some((key) => !["time", "playing", "inferred"].includes(key));
     clearTimeout(timer);
     timer = setTimeout(write, REST);
   }, signal);

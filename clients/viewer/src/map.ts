@@ -17,7 +17,7 @@ import {
 import { Latest } from "./latest.ts";
 import { legend, summary, table } from "./map-words.ts";
 import type { Session } from "./player.ts";
-import { type Changes, has, type State } from "./state.ts";
+import { type Changes, has, type State, valuesOf } from "./state.ts";
 import * as theme from "./theme.ts";
 import { figure, precise, title } from "./written.ts";
 
@@ -118,8 +118,8 @@ class ControlMap {
 
   get #point(): [number, number] {
     const [across, along] = this.#axes;
-    const value = (control: Control) => this.#state.controls[control.name] ?? control.default;
-    return [value(across), value(along)];
+    const values = valuesOf(this.#state);
+    return [values[across.name]!, values[along.name]!];
   }
 
   get #frame(): Frame {
@@ -127,12 +127,12 @@ class ControlMap {
   }
 
   get #dots(): Dot[] {
-    return clips(this.#session.card, this.#axes, this.#state.controls);
+    return clips(this.#session.card, this.#axes, valuesOf(this.#state));
   }
 
   #update(changed: Changes): void {
     if (has(changed, "across", "along")) this.#showAxes();
-    if (!has(changed, "across", "along", "controls", "performer", "labels")) return;
+    if (!has(changed, "across", "along", "controls", "inferred", "performer", "labels")) return;
     this.#chosen = null;
     this.#describe();
     this.#redraw();
@@ -156,14 +156,14 @@ class ControlMap {
 
   /** Ask for sigma, where the question is another than that of the shown map. */
   #request(rest: number): void {
-    const { controls, labels, performer } = this.#state;
+    const { labels, performer } = this.#state;
     const key = JSON.stringify({
       across: this.#axes[0].name,
       along: this.#axes[1].name,
       columns: COLUMNS,
       rows: ROWS,
       margin: MARGIN,
-      controls: others(controls, this.#axes),
+      controls: others(valuesOf(this.#state), this.#axes),
       performer,
       labels,
     });
@@ -232,7 +232,7 @@ class ControlMap {
     const [across, along] = this.#axes;
     const [x, y] = this.#point;
     const where = `${across.name} ${figure(x)} ${across.unit}, ${along.name} ${figure(y)} ${along.unit}`;
-    const { index, apart } = nearestTo(this.#session.card, this.#state.controls);
+    const { index, apart } = nearestTo(this.#session.card, valuesOf(this.#state));
     const near = `nearest example ${this.#name(index)}${apart < 1e-9 ? ", exactly" : ""}`;
     this.#current.textContent = `${where}; ${near}`;
     const label = `Map: ${where}; ${near}. Arrows move, page keys go to examples`;
@@ -301,7 +301,7 @@ class ControlMap {
     const lines = [this.#name(index)];
     const error = card.left_out?.[index];
     if (error !== undefined) lines.push(`left out: ${precise(error)} away`);
-    const apart = distance(card, this.#state.controls, index);
+    const apart = distance(card, valuesOf(this.#state), index);
     if (apart > 0.02) lines.push(`other controls: ${figure(100 * apart)} % of a range away`);
     this.#tip.replaceChildren(...lines.map((line) => el("div", {}, line)));
     const { at } = this.#dots[index]!;
@@ -348,7 +348,7 @@ class ControlMap {
   #stepClip(by: number): void {
     const { card } = this.#session;
     const count = card.examples.length;
-    const from = this.#chosen ?? nearestTo(card, this.#state.controls).index;
+    const from = this.#chosen ?? nearestTo(card, valuesOf(this.#state)).index;
     this.#goToClip((from + by + count) % count);
   }
 }

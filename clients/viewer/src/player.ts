@@ -36,7 +36,6 @@ export interface Session extends Page {
 
 export class Player {
   readonly #page: Page;
-  readonly #stopwatch = new Stopwatch();
   readonly #watchers = new Set<(shown: Shown) => void>();
   readonly #trusts = new Set<(trust: Trust) => void>();
   readonly #clips = new Set<(clip: Motion) => void>();
@@ -100,7 +99,6 @@ export class Player {
   ask(): void {
     this.#next();
     this.#setClip(null);
-    this.#stopwatch.asked(this.#turn);
     this.#poses.ask(this.#turn);
     this.#fetchClip(this.#answered ? IDLE : 0);
   }
@@ -177,16 +175,19 @@ export class Player {
 
   #take(turn: number, { boneOffsets, trust }: Poses): void {
     this.#answered = turn;
-    this.#stopwatch.answered(turn);
     this.#offsets = boneOffsets;
     this.trust = trust;
-    for (const listener of this.#trusts) listener(trust);
     const { store } = this.#page;
+    const { inferred } = store.state;
+    // Open controls follow without another request.
+    const follow = trust.inferred?.map((name) => [name, trust.controls[name]!] as const) ?? [];
+    if (follow.some(([name, value]) => inferred[name] !== value))
+      store.set({ inferred: { ...inferred, ...Object.fromEntries(follow) } });
+    for (const listener of this.#trusts) listener(trust);
     if (store.state.time > trust.duration) store.set({ time: trust.duration });
   }
 
   #step(seconds: number): boolean {
-    this.#stopwatch.drawn();
     const { loop, playing, speed, time, view } = this.#page.store.state;
     // A performance has a time of its own.
     if (!playing || !this.#clip || view === "performance") return false;
@@ -226,42 +227,4 @@ function atRest({ skeleton }: ModelCard): Pose {
   });
   rest.root[1] = -Math.min(...heights);
   return rest;
-}
-
-/** Measures of dragging that the browser keeps; then all of them are dropped. */
-const KEPT = 1000;
-const measures = { count: 0 };
-
-/** Latency of answers, as measures of the browser that tests read.
- *
- * `posefield:first-pose` from the opening of the page; `posefield:drag` from each change of a
- * control to the drawing of a pose that answers it or a newer one.
- */
-class Stopwatch {
-  #open: (readonly [turn: number, since: number])[] = [];
-  #answered = 0;
-
-  asked(turn: number): void {
-    this.#open.push([turn, performance.now()]);
-  }
-
-  answered(turn: number): void {
-    this.#answered = turn;
-  }
-
-  /** Call before the drawing of an answer, which ends with this turn of the event loop. */
-  drawn(): void {
-    if (this.#answered && this.#open.length) queueMicrotask(() => this.#measure());
-  }
-
-  #measure(): void {
-    const end = performance.now();
-    for (const [turn, since] of this.#open) {
-      if (turn > this.#answered) break;
-      const [name, start] = measures.count++ ? ["drag", since] : ["first-pose", 0];
-      if (measures.count % KEPT === 0) performance.clearMeasures("posefield:drag");
-      performance.measure(`posefield:${name}`, { start, end });
-    }
-    this.#open = this.#open.filter(([turn]) => turn > this.#answered);
-  }
 }

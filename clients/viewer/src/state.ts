@@ -4,8 +4,10 @@ export type View = "one" | "levels" | "crowd" | "performance";
 
 export interface State {
   readonly model: string;
-  /** A number for each control, in its unit. */
+  /** Values of the controls that were set; the service infers the others. */
   readonly controls: Readonly<Record<string, number>>;
+  /** A value for each control, as last inferred; before that its default. */
+  readonly inferred: Readonly<Record<string, number>>;
   readonly performer: string | null;
   /** A name for each label set besides performers; sets without a name are left open. */
   readonly labels: Readonly<Record<string, string>>;
@@ -46,6 +48,11 @@ export interface State {
   readonly varied: boolean;
   /** Script of the performance, as JSON; empty until one is begun. */
   readonly script: string;
+}
+
+/** Return a value for each control: that which was set, else the inferred one. */
+export function valuesOf({ controls, inferred }: Pick<State, "controls" | "inferred">) {
+  return { ...inferred, ...controls };
 }
 
 export type Changes = ReadonlySet<keyof State>;

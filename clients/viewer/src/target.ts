@@ -5,12 +5,10 @@ import { Mesh, MeshBasicMaterial, Object3D, SphereGeometry } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 
 import { el, id, titled } from "./dom.ts";
-import { Latest } from "./latest.ts";
 import { pose, sample } from "./playback.ts";
 import type { Session } from "./player.ts";
-import { targetFields } from "./questions.ts";
 import { place, placed } from "./skeleton.ts";
-import type { State } from "./state.ts";
+import { type State, valuesOf } from "./state.ts";
 import * as theme from "./theme.ts";
 import * as written from "./written.ts";
 
@@ -35,9 +33,8 @@ class Target {
   readonly #miss = el("strong", { "data-miss": "" });
   readonly #fault = el("p", { class: "fault", role: "alert" });
   readonly #fields: readonly HTMLInputElement[];
-  readonly #latest = new Latest<Point>((point) => this.#askControls(point));
-  /** Controls are being set for the target; other changes of controls end it. */
-  #setting = false;
+  /** The time follows the event until the clip comes. */
+  #moving = false;
 
   constructor(host: HTMLElement, session: Session, event: CardEvent) {
     const { card, player, scene, signal, store } = session;
@@ -89,7 +86,10 @@ class Target {
       host.dataset["handle"] = at.map((pixel) => pixel.toFixed(0)).join(" ");
       return false;
     }, signal);
-    player.onClip((clip) => this.#rest(clip));
+    player.onClip((clip) => {
+      this.#moving = false;
+      this.#rest(clip);
+    });
     player.onTrust((trust) => this.#showMiss(trust));
     const tint = () => this.#ball.material.color.set(theme.colour("--accent"));
     theme.listen(tint, signal);
@@ -98,8 +98,7 @@ class Target {
       if (changed.has("view")) this.#appear();
       if (changed.has("target") && state.target) this.#handle.position.set(...state.target);
       if (changed.has("target") && player.clip) this.#rest(player.clip);
-      if (changed.has("controls") && !changed.has("target") && !this.#setting)
-        store.set({ target: null });
+      if (changed.has("controls") && !changed.has("target")) store.set({ target: null });
     }, signal);
     signal.addEventListener("abort", () => {
       // A drag ends when the model is replaced.
@@ -119,40 +118,19 @@ class Target {
     store.set({ playing: false, time: this.#event.share * player.duration });
   }
 
-  /** Take the handle's position as the target, and ask for controls that fit it. */
+  /** Take the handle's position as the target, and leave controls open; those of few values stay. */
   #set(): void {
+    const { card, store } = this.#session;
     const { x, y, z } = this.#handle.position;
     const point: Point = [x, y, z];
-    this.#session.store.set({ target: point });
+    const values = valuesOf(store.state);
+    const fixed = card.controls.filter((control) => control.values.length > 0);
+    this.#moving = true;
+    store.set({
+      controls: Object.fromEntries(fixed.map(({ name }) => [name, values[name]!])),
+      target: point,
+    });
     this.#write(point);
-    this.#latest.ask(point);
-  }
-
-  /** Set the controls that the service infers from the target; those of few values stay. */
-  async #askControls(target: Point): Promise<void> {
-    const { card, notice, service, signal, store } = this.#session;
-    const { controls, labels, model, performer } = store.state;
-    const fixed = card.controls.filter(({ values }) => values.length > 0);
-    const question = {
-      controls: Object.fromEntries(fixed.map(({ name }) => [name, controls[name]!])),
-      times: [0],
-      ...{ labels, performer, ...targetFields(card, { target }) },
-    };
-    try {
-      const { trust } = await service.client.pose(model, question, signal);
-      if (signal.aborted || store.state.target !== target) return;
-      const rounded = Object.entries(trust.controls).map(
-        ([name, value]) => [name, Number(value.toPrecision(6))] as const,
-      );
-      this.#setting = true;
-      store.set({
-        controls: { ...controls, ...Object.fromEntries(rounded) },
-        time: this.#event.share * trust.duration,
-      });
-      this.#setting = false;
-    } catch (fault) {
-      if (!signal.aborted) notice(fault);
-    }
   }
 
   /** Without a target, show the joint's own position. */
@@ -169,8 +147,10 @@ class Target {
     this.#miss.textContent = written.centimetres(0);
   }
 
-  #showMiss({ targets = [] }: Trust): void {
-    if (!this.#session.store.state.target) return;
+  #showMiss({ duration, targets = [] }: Trust): void {
+    const { store } = this.#session;
+    if (!store.state.target) return;
+    if (this.#moving) store.set({ time: this.#event.share * duration });
     const met = targets.find(({ what }) => what === `${this.#joint} at event`);
     if (met) this.#miss.textContent = written.centimetres(met.miss);
   }

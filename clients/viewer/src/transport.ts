@@ -1,6 +1,5 @@
 /** Time: play, single frames, position in the clip, speed and loop, by buttons and keys. */
 
-import { defaults } from "./controls.ts";
 import { button, el, icon, toggle } from "./dom.ts";
 import { step } from "./playback.ts";
 import type { Session } from "./player.ts";
@@ -108,7 +107,7 @@ function listenToKeys(session: Session): void {
     arrowright: ({ shiftKey }) => move(session, shiftKey ? 10 : 1),
     home: () => store.set({ playing: false, time: 0 }),
     end: () => store.set({ playing: false, time: player.duration }),
-    r: () => store.set({ controls: defaults(card) }),
+    r: () => store.set({ controls: {} }),
     l: flip("loop"),
     g: flip("ghost"),
     f: flip("feet"),

@@ -37,7 +37,6 @@ export async function sigma(page: Page): Promise<number> {
 
 /** Until the body is there, and the clip that it plays. */
 export async function settled(page: Page): Promise<void> {
-  await page.waitForFunction(() => performance.getEntriesByName("posefield:first-pose").length > 0);
   await page.locator("#stage[data-clip]").waitFor();
   await page.waitForFunction(() => document.querySelector(".nearest li"));
 }

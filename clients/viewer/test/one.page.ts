@@ -189,6 +189,43 @@ test("a slider moves the body, sigma and the address", () =>
     await until(async () => Math.abs((await shown()) - usual) < 0.01, "R resets");
   }));
 
+test("controls that are not set follow those that are, by the same requests", () =>
+  on("/#cmu_walk?~playing=no&~time=0.3", async (page) => {
+    const asked: string[] = [];
+    page.on("request", (request) => {
+      const [, kind] = /\/(pose|clip)\./.exec(request.url()) ?? [];
+      if (kind && request.method() === "POST")
+        asked.push(`${kind} ${JSON.stringify(request.postDataJSON().controls)}`);
+    });
+    const marks = async () => page.locator(".control .mark").allTextContents();
+    assert.deepEqual(await marks(), ["inferred", "inferred", "inferred"]);
+    await typed(page, "speed").fill("1.75");
+    await typed(page, "speed").press("Enter");
+    await until(async () => page.url().includes("stride_length=~1.5"), "the address follows");
+    await page.locator("#stage[data-clip]").waitFor();
+    assert.deepEqual(asked, ['pose {"speed":1.75}', 'clip {"speed":1.75}']);
+    assert.deepEqual(await marks(), ["", "inferred", "inferred"]);
+    assert.ok(Number(await typed(page, "stride_length").inputValue()) > 1.5);
+    assert.equal(await page.locator(".warnings li").count(), 0);
+    await page.getByText("Captured near here", { exact: true }).waitFor();
+    const text = await page.locator(".files pre").innerText();
+    assert.match(text, /speed=1.75&turn=.*&stride_length=1.5.*exact=speed/);
+    // The file of the text is the motion of the stage.
+    const link = /'(http[^']*)'/.exec(text)![1]!.replace("clip.usdc", "clip.json");
+    const [full, shown] = await page.evaluate(async (link) => {
+      const open = link.replace(/&(turn|stride_length)=[^&]*/g, "").replace(/&exact=speed/, "");
+      const ask = async (url: string) => (await (await fetch(url)).json()).rotations;
+      return [await ask(link), await ask(open)];
+    }, link);
+    assert.deepEqual(full, shown);
+    await page.reload();
+    await until(async () => (await marks()).join() === ",inferred,inferred", "links keep it");
+    await slider(page, "speed").press("ArrowLeft");
+    await until(async () => /speed=1\.7[0-3]/.test(page.url()), "a key moves visibly");
+    await page.getByRole("button", { name: "Reset Speed" }).click();
+    await until(async () => (await marks()).join() === "inferred,inferred,inferred", "reset");
+  }));
+
 test("numbers are typed, and what is none is refused in words", () =>
   on(REACH, async (page) => {
     const field = typed(page, "target_height");

@@ -171,7 +171,7 @@ describe("what a download holds exactly", () => {
   });
 
   it("is the feet and the measured controls", async () => {
-    const { page } = await opened(from, "/#cmu_walk");
+    const { page } = await opened(from, "/#cmu_walk?speed=1.2&turn=0&stride_length=1.3");
     await settled(page);
     assert.ok(!(await link(page)).has("feet") && !(await link(page)).has("exact"));
     await page.getByRole("button", { name: "Feet stand" }).click();
