@@ -32,7 +32,7 @@ ROOT hips
 		CHANNELS 3 Zrotation Yrotation Xrotation
 		JOINT foot:L
 		{
-			OFFSET 0.0000000 -40.0000000 0.5000000
+			OFFSET 0.0000000 0.0000000 0.0000000
 			CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
 			End Site
 			{

@@ -31,7 +31,8 @@ class ExportJob:
 
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
     layout: name of the layout. chunk: rows per chunk. unit, up: None for the convention of each
-    format. names: default naming convention of the joints. body: None for the default of each
+    format. names: default naming convention of the joints. root_bone: whether the clips have one by
+    default. body: None for the default of each
     format. character: name, digest and reference of the character of a user; empty for the model's.
     """
 
@@ -43,6 +44,7 @@ class ExportJob:
     unit: LengthUnit | None = None
     up: UpAxis | None = None
     names: NamingConvention = "own"
+    root_bone: bool = False
     body: BodyKind | None = None
     character: tuple[str, ...] = ()
 

@@ -111,9 +111,10 @@ def _library_misfit(job: ExportJob, query: ClipQuery) -> str | None:
     """Return the reason for which a query does not fit a library of one character, or None."""
     if query.format != LIBRARY_FORMAT:
         return f"format: {query.format!r}, expected {LIBRARY_FORMAT!r} in a library"
-    if query.question.names != job.names:
-        found = query.question.names
-        return f"names: {found!r}, expected {job.names!r} as of the library's character"
+    for name in ("names", "root_bone"):
+        found, expected = getattr(query.question, name), getattr(job, name)
+        if found != expected:
+            return f"{name}: {found!r}, expected {expected!r} as of the library's character"
     return None
 
 
@@ -144,7 +145,10 @@ def _library_stage(
     skeleton = joint_roles.rename_joints(card.skeleton, card.roles, job.names)
     convention = CLIP_ENCODERS[LIBRARY_FORMAT].convention(job.unit, job.up, job.body)
     curves = [curve.name for curve in card.curves]
-    yield STAGE, usd_library.library_stage(skeleton, convention, clips[0].rate, clips, curves)
+    stage = usd_library.library_stage(
+        skeleton, convention, clips[0].rate, clips, curves, job.root_bone
+    )
+    yield STAGE, stage
 
 
 LAYOUTS = {

@@ -123,7 +123,8 @@ class Delivery:
             clip, character.rig, roles, stances=stances, hands=hands, travel=travel
         )
         facts = {"character": character.name, "file": character.target.file, **report.facts()}
-        return made, facts, tuple(facts.pop("warnings"))
+        bone = clip.root_bone or character.target.has_floor_root
+        return replace(made, root_bone=bone), facts, tuple(facts.pop("warnings"))
 
 
 def deliver(character: UserCharacter, form: ClipEncoder, asked: FileAxes) -> Delivery:

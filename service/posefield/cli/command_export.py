@@ -132,6 +132,7 @@ def export(
         question.unit,
         question.up,
         question.names,
+        question.root_bone,
         question.body,
         () if character is None else character.facts,
     )

@@ -27,7 +27,7 @@ from posefield.encode.tables import model_tables, motion_tables
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Table, arrow_stream, npz_table
 from posefield.encode.usd_crowd import STREAMS
-from posefield.motion import bvh_writer
+from posefield.motion import bvh_writer, root_bone
 from posefield.motion.clip import CrowdClip, CrowdPoses
 from posefield.question.motion_question import BodyKind
 from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, SigmaGrid
@@ -35,7 +35,10 @@ from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, Sigm
 
 def bvh(answer: SampledClip, convention: Convention) -> bytes:
     """Return a BVH file; the format cannot store provenance, unit or up axis."""
-    clip = conventions.convert_clip(Convention(1.0, convention.up), answer.clip)
+    own = answer.clip
+    if own.root_bone:
+        own = root_bone.add_root(own, root_bone.with_root(own.skeleton))
+    clip = conventions.convert_clip(Convention(1.0, convention.up), own)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
 
 
@@ -82,11 +85,14 @@ class ClipEncoder(Format):
         return found
 
     def noted(self, answer: ClipAnswer) -> ClipAnswer:
-        """Return a result with a warning of its curves if the format carries none."""
-        if self.has_curves or answer.clip.curves is None:
-            return answer
-        warnings = (*answer.trust.warnings, left_out(answer.clip.curves.names, self.extension))
-        return replace(answer, trust=replace(answer.trust, warnings=warnings))
+        """Return a result with warnings of its curves and root bone if the format has none."""
+        notes = []
+        if answer.clip.curves is not None and not self.has_curves:
+            notes.append(left_out(answer.clip.curves.names, self.extension))
+        if answer.clip.root_bone and not (self.has_body or self.extension == "bvh"):
+            notes.append(f"{self.extension} files have no root bone: the hips travel")
+        warnings = (*answer.trust.warnings, *notes)
+        return replace(answer, trust=replace(answer.trust, warnings=warnings)) if notes else answer
 
     def encode(self, answer: SampledClip, convention: Convention | None = None) -> bytes:
         """Return the file of one result, in the format's default convention unless one is given."""

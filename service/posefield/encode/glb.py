@@ -289,8 +289,8 @@ def glb(answer: SampledClip, said: Convention) -> bytes:
     Raises InvalidField for a convention other than metres with Y up.
     """
     conventions.check_convention(said, METRES, "glb")
-    clip, store = answer.clip, GlbBuffer()
-    rig = character.rig(clip.skeleton, said.body)
+    store = GlbBuffer()
+    rig, clip = character.rig_and_clip(answer.clip, said.body)
     resting = character.rest_pose(rig, clip.translations[:1])
     parts = character_parts(store, resting)
     if clip.curves is not None:

@@ -37,11 +37,11 @@ def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
     """Return the clip as a BVH file, in degrees and the given unit, with joints depth first.
 
     Blanks and braces in names become underscores: many readers end a name at its first blank. The
-    root's OFFSET is zero, since readers differ on whether its channels replace or follow it. A
-    joint whose translation varies has six channels and the mean translation as OFFSET, another
-    three. A leaf without an end site gets one of zero length, which other readers require. Readers
-    recover the exact rate where it lies within 1e-4 of a whole or broadcast rate. Raises ValueError
-    for numbers that are not finite.
+    root, and a joint whose translation varies, have six channels and an OFFSET of zero, since
+    readers differ on whether channels replace or follow it; others have three. A leaf without an
+    end site gets one of zero length, which other readers require. Readers recover the exact rate
+    where it lies within 1e-4 of a whole or broadcast rate. Raises ValueError for numbers that are
+    not finite.
     """
     if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
         raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
@@ -79,9 +79,9 @@ class BvhLayout:
 
     @cached_property
     def offsets(self) -> Bones:
-        """Return the mean translations (J, 3) from each joint's parent, m; zero for the root."""
+        """Return the mean translations (J, 3) from parents, m; zero with position channels."""
         offsets = self.clip.translations.mean(axis=0)
-        offsets[0] = 0.0
+        offsets[self.has_position_channels] = 0.0
         return offsets
 
     def hierarchy(self) -> str:

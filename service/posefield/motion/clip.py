@@ -20,6 +20,7 @@ class Clip:
     rotations (F, J, 4): unit quaternions local to the parent. translations (F, J, 3): joint
     translations local to the parent, m; the root's is its path, the others' are the bone offsets.
     rate: frames a second. curves: values of scalar channels; None for a family without them.
+    root_bone: whether files have a joint on the floor above the hips (`root_bone`).
     """
 
     skeleton: Skeleton
@@ -27,6 +28,7 @@ class Clip:
     translations: Positions
     rate: float
     curves: CurveValues | None = None
+    root_bone: bool = False
 
     def __post_init__(self) -> None:
         frames, joints = len(self.rotations), len(self.skeleton)

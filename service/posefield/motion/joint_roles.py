@@ -96,7 +96,7 @@ def rename_joints(
     # Names that are not taken are kept first, so that no ending of another joint takes them.
     taken |= (kept := {name for name in skeleton.names if name not in said and name not in taken})
     renamed = (
-        said.get(name) or (name if name in kept else _free_name(name, taken, counts))
+        said.get(name) or (name if name in kept else free_name(name, taken, counts))
         for name in skeleton.names
     )
     return replace(skeleton, names=tuple(renamed))
@@ -110,10 +110,10 @@ def clean_names(names: Iterable[str], clean: Callable[[str], str]) -> tuple[str,
     given = list(names)
     taken = {name for name in given if clean(name) == name}
     counts = Counter[str]()
-    return tuple(n if n in taken else _free_name(clean(n), taken, counts) for n in given)
+    return tuple(n if n in taken else free_name(clean(n), taken, counts) for n in given)
 
 
-def _free_name(name: str, taken: set[str], counts: Counter[str]) -> str:
+def free_name(name: str, taken: set[str], counts: Counter[str]) -> str:
     """Return a name that is not taken; counts: the last ending tried, by name."""
     while True:
         counts[name] += 1

@@ -1,6 +1,7 @@
 """Performances: one motion of all segments of a script, its feet, and the report about it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import orjson
@@ -61,7 +62,9 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     character = script.character
     joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
     turns = quat.normalize(rotations)
-    clip = assemble(joints, turns, roots, character.bones, script.question.fps)
+    own = script.question
+    bone = own.root == "bone" or (own.root is None and own.names == "ue5")
+    clip = replace(assemble(joints, turns, roots, character.bones, own.fps), root_bone=bone)
     report = reporting.report(script, composed, judged, len(clip), told)
     return PerformanceAnswer(clip, report, _held_joints(composed.timeline, clip))
 

@@ -29,6 +29,8 @@ DEFAULT_VARIETY = 0.7
 """Size of a take's deviations, as a share of those of captured clips."""
 ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
 RootMode = Literal["travelling", "in_place"]
+FileRoot = Literal["travelling", "in_place", "bone"]
+"""Root of a clip; "bone" is a joint of its own, on the floor above the hips."""
 FeetMode = Literal["stand", "as_predicted"]
 FloorValue = float | Floor
 """Floor as a height, m, or as a plane."""
@@ -186,9 +188,13 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
         ),
     ] = None
     names: Annotated[NamingConvention, Meta(description="naming convention of the joints")] = "own"
-    root: Annotated[RootMode, Meta(description="whether the root travels or stays in place")] = (
-        "travelling"
-    )
+    root: Annotated[
+        FileRoot | None,
+        Meta(
+            description="whether the root travels, stays in place, or is a bone of its own on the "
+            "floor above the hips; default: bone with names=ue5, else travelling"
+        ),
+    ] = None
     loop: Annotated[
         bool, Meta(description="write one whole cycle whose last frame equals its first")
     ] = False
@@ -207,6 +213,11 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
             extra={"metavar": "HEIGHT|HEIGHT,SLOPE_X,SLOPE_Z"},
         ),
     ] = 0.0
+
+    @property
+    def root_bone(self) -> bool:
+        """Return whether files have a root bone."""
+        return self.root == "bone" or (self.root is None and self.names == "ue5")
 
     @property
     def ground(self) -> Floor:

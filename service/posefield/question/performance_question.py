@@ -197,6 +197,7 @@ class PerformanceQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     feet: FeetMode = "stand"
     extrapolate: ExtrapolationPolicy = "warn"
     names: NamingConvention = "own"
+    root: Literal["travelling", "bone"] | None = None
     unit: LengthUnit | None = None
     up: UpAxis | None = None
     body: Body = None

@@ -154,7 +154,7 @@ def _clip(model: Synthesizer, draft: ClipDraft, answer: PoseAnswer[np.float64]) 
     clip = assemble(draft.request.joints, turns, path, offsets, float(asked.fps))
     if answer.curves is not None:
         clip = replace(clip, curves=CurveValues(model.session.card.curves, answer.curves))
-    return ClipAnswer(clip, answer.trust)
+    return ClipAnswer(replace(clip, root_bone=asked.root_bone), answer.trust)
 
 
 def check(model: Synthesizer, asked: ClipQuestion) -> None:

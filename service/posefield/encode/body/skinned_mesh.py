@@ -3,7 +3,7 @@
 The plain body is one tapered box along each bone, which shows the bones and their sides.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +71,12 @@ class SkinnedMesh:
         found = moved.astype(np.float32).take(self.place, axis=1)
         found += self.points
         return found
+
+
+def below_root(mesh: SkinnedMesh) -> SkinnedMesh:
+    """Return the mesh for a skeleton with another joint before all others."""
+    places = replace(mesh.places, anchors=mesh.places.anchors + 1)
+    return replace(mesh, places=places, joints=mesh.joints + 1)
 
 
 def colours(mesh: SkinnedMesh) -> Singles:

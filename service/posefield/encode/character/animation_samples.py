@@ -1,7 +1,7 @@
 """Motions in USD's form: float32, real part last, neighbouring quaternions of one sign."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,13 +15,15 @@ class AnimationSamples:
     """M motions of one skeleton, concatenated: motion m has the frames starts[m] to starts[m + 1].
 
     rotations (N, J, 4): of all frames, real part last. path (N, 3): root positions, m. offsets (M,
-    J, 3): of the bones, m; the root's is not used. starts: (M + 1,). No number is -0.
+    J, 3): of the bones, m; the root's is not used. starts: (M + 1,). hips (N, 3): translations of
+    joint 1 below a root bone, m; None where there is none. No number is -0.
     """
 
     rotations: Singles
     path: Singles
     offsets: Singles
     starts: Indices
+    hips: Singles | None = None
 
     def __len__(self) -> int:
         return len(self.offsets)
@@ -31,6 +33,8 @@ class AnimationSamples:
         """Return the local translations (N, J, 3), m."""
         local = np.repeat(self.offsets, np.diff(self.starts), axis=0)
         local[:, 0] = self.path
+        if self.hips is not None:
+            local[:, 1] = self.hips
         return local
 
     def parts(self, frames: int) -> Iterator["AnimationSamples"]:
@@ -46,10 +50,11 @@ class AnimationSamples:
         frames = slice(self.starts[first], self.starts[last])
         starts = self.starts[first : last + 1] - self.starts[first]
         offsets = self.offsets[first:last]
-        return AnimationSamples(self.rotations[frames], self.path[frames], offsets, starts)
+        hips = None if self.hips is None else self.hips[frames]
+        return AnimationSamples(self.rotations[frames], self.path[frames], offsets, starts, hips)
 
 
-def from_clips(clips: Sequence[Clip]) -> AnimationSamples:
+def from_clips(clips: Sequence[Clip], root_bone: bool = False) -> AnimationSamples:
     """Return the moves of clips of one skeleton, with the bone offsets of their first frames."""
     starts = _starts([len(clip) for clip in clips])
     made = _empty(starts, len(clips[0].skeleton))
@@ -58,6 +63,8 @@ def from_clips(clips: Sequence[Clip]) -> AnimationSamples:
         _write_real_part_last(clip.rotations, made.rotations[frames])
         made.path[frames] = clip.translations[:, 0]
         made.offsets[index] = clip.translations[0]
+    if root_bone:
+        made = replace(made, hips=np.concatenate([c.translations[:, 1] for c in clips], dtype="f4"))
     return _normalize(made)
 
 
@@ -94,9 +101,10 @@ def _write_real_part_last(wxyz: Floats | Singles, xyzw: Singles) -> None:
 
 def _normalize(made: AnimationSamples) -> AnimationSamples:
     _unroll_quaternions(made)
-    for values in (made.rotations, made.path, made.offsets):
-        # USD's deduplication does not distinguish -0 from 0.
-        values += np.float32(0.0)
+    for values in (made.rotations, made.path, made.offsets, made.hips):
+        if values is not None:
+            # USD's deduplication does not distinguish -0 from 0.
+            values += np.float32(0.0)
     return made
 
 

@@ -15,12 +15,14 @@ import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
 from posefield.encode import conventions
+from posefield.encode.body import skinned_mesh
 from posefield.encode.body.mannequin import mannequin
 from posefield.encode.body.skinned_mesh import SkinnedMesh, bones_body
 from posefield.encode.character import extent
 from posefield.encode.character.extent import BodyBounds, PointTree
 from posefield.encode.conventions import METRES, Convention
-from posefield.motion import joint_roles
+from posefield.motion import joint_roles, root_bone
+from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
 
@@ -57,7 +59,8 @@ class CharacterRig:
     """Properties shared by all clips of a skeleton with one kind of body; compared by identity.
 
     names, paths: of the joints, the latter as in USD. tree: of joints and tips. body: the mesh, for
-    the skeleton's own bones; None for none. bounds: what bounds it in any pose.
+    the skeleton's own bones; None for none. bounds: what bounds it in any pose. hips: 1 below a
+    root bone, else 0.
     """
 
     skeleton: Skeleton
@@ -66,12 +69,23 @@ class CharacterRig:
     tree: PointTree
     body: SkinnedMesh | None
     bounds: BodyBounds
+    hips: int = 0
 
 
-def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY) -> CharacterRig:
-    """Return the rig of a skeleton, cached: it takes up to a tenth of a second to build."""
+def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY, has_root: bool = False) -> CharacterRig:
+    """Return the rig of a skeleton, cached: it takes up to a tenth of a second to build.
+
+    has_root: whether the rig has a root bone above the skeleton.
+    """
+    shape = skeleton.names, skeleton.parents, skeleton.tip_joints
     arrays = skeleton.offsets.tobytes(), skeleton.tip_offsets.tobytes()
-    return _cached_rig(skeleton.names, skeleton.parents, skeleton.tip_joints, *arrays, body)
+    return _cached_rig(*shape, *arrays, body, has_root)
+
+
+def rig_and_clip(clip: Clip, body: BodyKind) -> tuple[CharacterRig, Clip]:
+    """Return the rig and the motion of a clip as files have them: with its root bone, if any."""
+    found = rig(clip.skeleton, body, clip.root_bone)
+    return found, root_bone.add_root(clip, found.skeleton) if clip.root_bone else clip
 
 
 def body_size(skeleton: Skeleton, body: BodyKind) -> int:
@@ -83,14 +97,16 @@ def body_size(skeleton: Skeleton, body: BodyKind) -> int:
 @lru_cache(maxsize=64)
 def _cached_rig(
     names: tuple[str, ...], parents: tuple[int, ...], owners: tuple[int, ...],
-    arms: bytes, tips: bytes, kind: BodyKind,
+    arms: bytes, tips: bytes, kind: BodyKind, has_root: bool,
 ) -> CharacterRig:  # fmt: skip
     offsets, tip_offsets = (np.frombuffer(own).reshape(-1, 3) for own in (arms, tips))
     joints = Skeleton(names, parents, offsets, owners, tip_offsets)
-    paths = joint_paths(legal_names(joints.names), joints.parents)
     body = _mesh(joints, kind)
-    bounds = extent.bounds(joints, body)
-    return CharacterRig(joints, joints.names, paths, extent.tree(joints), body, bounds)
+    if has_root:
+        joints, body = root_bone.with_root(joints), body and skinned_mesh.below_root(body)
+    paths = joint_paths(legal_names(joints.names), joints.parents)
+    tree, bounds = extent.tree(joints), extent.bounds(joints, body)
+    return CharacterRig(joints, joints.names, paths, tree, body, bounds, int(has_root))
 
 
 def _mesh(skeleton: Skeleton, kind: BodyKind) -> SkinnedMesh | None:
@@ -117,9 +133,9 @@ class RestPose:
 def rest_pose(rig: CharacterRig, offsets: Floats | Singles) -> RestPose:
     """Return characters with bone offsets (M, J, 3), m; all stand as low as the rig does."""
     rest = offsets.astype(np.float64)
-    rest[:, 0] = rig.skeleton.offsets[0]
-    lowest = _lowest(rig.skeleton, rig.skeleton.offsets)
-    rest[:, 0, 1] += lowest - _lowest(rig.skeleton, rest)
+    rest[:, : rig.hips + 1] = rig.skeleton.offsets[: rig.hips + 1]
+    lowest = _lowest(rig, rig.skeleton.offsets)
+    rest[:, rig.hips, 1] += lowest - _lowest(rig, rest)
     if rig.body is None:
         none = np.zeros((len(rest), len(rig.tree.order)))
         return RestPose(rig, rest, np.empty((len(rest), 0, 3), np.float32), none)
@@ -128,11 +144,11 @@ def rest_pose(rig: CharacterRig, offsets: Floats | Singles) -> RestPose:
     return RestPose(rig, rest, rig.body.points_at(along), rig.bounds.radii(moved, along))
 
 
-def _lowest(skeleton: Skeleton, offsets: Floats) -> Floats:
+def _lowest(rig: CharacterRig, offsets: Floats) -> Floats:
     """Return the height (...) of the lowest joint or tip at rest with offsets (..., J, 3), m."""
-    heights = skeleton.at_rest(offsets)[..., 1]
-    tips = heights[..., list(skeleton.tip_joints)] + skeleton.tip_offsets[:, 1]
-    return np.concatenate([heights, tips], axis=-1).min(axis=-1)
+    heights = rig.skeleton.at_rest(offsets)[..., 1]
+    tips = heights[..., list(rig.skeleton.tip_joints)] + rig.skeleton.tip_offsets[:, 1]
+    return np.concatenate([heights[..., rig.hips :], tips], axis=-1).min(axis=-1)
 
 
 def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.NDArray[Any]]:

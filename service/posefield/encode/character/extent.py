@@ -148,6 +148,8 @@ def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     """
     turns = _joint_rotations(tree, moves)
     arms = np.repeat(_parent_offsets(tree, moves.offsets), np.diff(moves.starts), axis=-1)
+    if moves.hips is not None:
+        arms[:, np.flatnonzero(tree.order == 1)[0]] = moves.hips.T[[0, 1, 2, 0, 1]]
     places = np.empty((3, *arms.shape[1:]), np.float32)
     places[:, 0] = moves.path.T
     for each in tree.generations:

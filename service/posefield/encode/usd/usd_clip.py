@@ -56,7 +56,7 @@ def arrays_with_character(
 ) -> Iterator[ClipArrays]:
     """Yield arrays in the order of their results, with samples, character values and facts."""
     for rig, some in _grouped_by_rig(answers, convention):
-        made = animation_samples.from_clips([answer.clip for answer in some])
+        made = _samples_of(some)
         rest = character.rest_pose(rig, made.offsets)
         boxes = extent.bounding_boxes(rig.tree, made, rest.radii)
         values = character.character_arrays(rest, convention)
@@ -71,7 +71,7 @@ def arrays_without_character(
 ) -> Iterator[ClipArrays]:
     """Yield arrays in the order of their results, with samples and facts only."""
     for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
-        made = animation_samples.from_clips([answer.clip for answer in some])
+        made = _samples_of(some)
         for answer, samples in zip(some, _samples(made, some, convention), strict=True):
             yield _clip_arrays(rig, answer, samples, {})
 
@@ -81,16 +81,26 @@ def _grouped_by_rig(
 ) -> Iterator[tuple[CharacterRig, list[SampledClip]]]:
     """Yield consecutive results of one skeleton, at most FRAMES_AT_ONCE frames at a time."""
     _keep_freed_memory()
-    for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
+    for _, some in groupby(answers, lambda own: (id(own.clip.skeleton), own.clip.root_bone)):
         part: list[SampledClip] = []
         frames = 0
         for answer in some:
             frames += len(answer.clip)
             if part and frames > FRAMES_AT_ONCE:
-                yield character.rig(part[0].clip.skeleton, convention.body), part
+                yield _rig(part[0].clip, convention), part
                 part, frames = [], len(answer.clip)
             part.append(answer)
-        yield character.rig(part[0].clip.skeleton, convention.body), part
+        yield _rig(part[0].clip, convention), part
+
+
+def _rig(clip: Clip, convention: Convention) -> CharacterRig:
+    return character.rig(clip.skeleton, convention.body, clip.root_bone)
+
+
+def _samples_of(answers: Sequence[SampledClip]) -> AnimationSamples:
+    """Return the moves of results of one skeleton, with their root bones."""
+    made = [character.rig_and_clip(answer.clip, "none")[1] for answer in answers]
+    return animation_samples.from_clips(made, answers[0].clip.root_bone)
 
 
 @cache

@@ -22,6 +22,7 @@ from posefield.common.units import Floats
 from posefield.encode import conventions
 from posefield.encode.character import character
 from posefield.encode.character import extent as reach
+from posefield.encode.character.character import CharacterRig
 from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import layers
@@ -65,16 +66,18 @@ def library_stage(
     rate: float,
     entries: Sequence[LibraryEntry],
     curves: Sequence[str] = (),
+    has_root: bool = False,
 ) -> bytes:
     """Return the USD text of the stage; names of clips are made legal names of prims.
 
     rate: of the stage, frames a second. The stage is as long as the longest clip. curves: names of
-    the clips' curves, for which the body has blend shapes.
+    the clips' curves, for which the body has blend shapes. has_root: whether clips have root bones.
     """
     prims = character.legal_names(each.name for each in entries)
-    character_layer = _character_layer(skeleton, convention, rate, entries)
+    rig = character.rig(skeleton, convention.body, has_root)
+    character_layer = _character_layer(rig, convention, rate, entries)
     root = character_layer.GetPrimAtPath(ROOT)
-    character_prims.add_blend_shapes(root, character.rig(skeleton, convention.body), curves)
+    character_prims.add_blend_shapes(root, rig, curves)
     layers.prim(root, CLIPS.name, "Scope")
     for name in prims[:1]:
         character_prims.bind_animation(root, CLIPS.AppendChild(name))
@@ -85,10 +88,10 @@ def library_stage(
 
 
 def _character_layer(
-    skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[LibraryEntry]
+    rig: CharacterRig, convention: Convention, rate: float, entries: Sequence[LibraryEntry]
 ) -> Any:
     """Return the layer of the stage with its character alone."""
-    rig, made = character.rig(skeleton, convention.body), Sdf.Layer.CreateAnonymous("library.usda")
+    made = Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
     layers.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
     root = character_prims.root(made, ROOT.name, rig, convention)

@@ -18,7 +18,7 @@ from posefield.encode.formats import ClipEncoder
 from posefield.encode.glb import GlbBuffer
 from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
-from posefield.motion import quat
+from posefield.motion import quat, root_bone
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import BodyKind, ClipQuestion
 from posefield.question.performance_question import PerformanceQuestion
@@ -136,6 +136,13 @@ class RigTarget:
         stage = rig_layer.read_stage(path, rig.skeleton_path, rig.joint_paths)
         return cls(rig, path.name, reference, stage)
 
+    @property
+    def has_floor_root(self) -> bool:
+        """Return whether the root is a joint above the hips, near the floor at rest."""
+        heights = self.rig.skeleton.at_rest(self.rig.skeleton.offsets)[:, 1]
+        hips = self.rig.joints["hips"]
+        return hips > 0 and bool(np.ptp(heights[[0, hips]]) > 0.8 * (heights[hips] - heights.min()))
+
     def check(self, question: ClipQuestion | PerformanceQuestion) -> None:
         """Raise InvalidField for what no file of a user's character holds."""
         if question.names != "own":
@@ -143,6 +150,12 @@ class RigTarget:
                 "names",
                 f"{question.names!r} with a character, expected 'own': joints have the names of "
                 "its file",
+            )
+        if question.root == "bone" and not self.rig.joints["hips"]:
+            raise InvalidField(
+                "root",
+                f"'bone' with a character, expected one with a joint above the hips: {self.file} "
+                "has none",
             )
         if isinstance(question, ClipQuestion) and question.joint_sigma:
             raise InvalidField(
@@ -210,6 +223,9 @@ class RigTarget:
 
     def encode(self, form: ClipEncoder, answer: SampledClip, convention: Convention) -> bytes:
         """Return the file of a motion of the rig's skeleton, in the convention of `convention`."""
+        if answer.clip.root_bone and form.extension not in TABLES:
+            clip = root_bone.move_root(answer.clip, self.rig.joints["hips"])
+            answer = SampledClip(clip, answer.trust)
         if form.extension in LAYERS:
             # usd-core takes 0.12 CPU seconds to import.
             from posefield.encode.usd import usd_clip
