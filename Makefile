@@ -123,9 +123,9 @@ test-all: test test-system ## both rings and the older Blender
 	$(BIN)/python tests/interop/run.py --others
 
 .PHONY: fuzz
-fuzz: $(PAGE) $(DOCS) ## send requests drawn from the contract for half an hour; SECONDS, SEED
+fuzz: $(PAGE) $(DOCS) ## send requests drawn from the contract and mutate motion files for half an hour; SECONDS, SEED
 	POSEFIELD_FUZZ_SECONDS=$(or $(SECONDS),900) POSEFIELD_FUZZ_SEED=$(or $(SEED),$(shell date +%s)) \
-		$(BIN)/python -m pytest -n 2 tests/contract/test_schemathesis.py -k drawn
+		$(BIN)/python -m pytest -n 2 tests/contract/test_schemathesis.py tests/model_export/test_mutated_files.py -k "drawn or mutated"
 
 # Everything installable: all distributions of the workspace as wheels and sdists.
 .PHONY: wheels
