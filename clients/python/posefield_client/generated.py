@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict
 
 from msgspec import Struct
 
-CONTRACT = "5.0.0"
+CONTRACT = "5.1.0"
 """Version of the contract that this client was made for."""
 
 
@@ -36,7 +36,9 @@ class Operation(NamedTuple):
 
 Names = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
 
-Root = Literal["travelling", "in_place"]
+Root = Literal["travelling", "in_place", "bone"] | None
+
+PerformanceRoot = Literal["travelling", "bone"] | None
 
 Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
 
@@ -234,6 +236,7 @@ class PerformanceQuestion(TypedDict, total=False):
     feet: Literal["stand", "as_predicted"]
     extrapolate: Extrapolate
     names: Names
+    root: PerformanceRoot
     unit: Unit
     up: Up
     body: Body
@@ -255,6 +258,7 @@ class NamedScript(TypedDict, total=False):
     feet: Literal["stand", "as_predicted"]
     extrapolate: Extrapolate
     names: Names
+    root: PerformanceRoot
     unit: Unit
     up: Up
     body: Body

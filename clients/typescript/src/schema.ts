@@ -728,14 +728,26 @@ export interface components {
          */
         Names: "own" | "mixamo" | "ue5" | "vrm" | "humanik";
         /**
-         * @description `in_place` removes the travel of the root. For a cycle it removes the frame that moves
+         * @description `bone` adds a joint `root` on the floor above the hips to USD, glTF and BVH files. It carries
+         *     travel and heading, without sway; bob, sway and lean stay in the hips, and all other joints
+         *     are where they are without it. A character of a user needs a joint above its hips. Default:
+         *     `bone` with `names=ue5`, else `travelling`. `bone` since 5.1.0.
+         *
+         *     `in_place` removes the travel of the root. For a cycle it removes the frame that moves
          *     evenly along the cycle's arc, including its heading. For another motion it removes the
          *     straight line from the first pose of the whole clip to the last, at constant speed, and
          *     keeps the heading. Heights are kept. A model that was trained in place is unchanged.
-         * @default travelling
-         * @enum {string}
+         * @default null
+         * @enum {string|null}
          */
-        Root: "travelling" | "in_place";
+        Root: "travelling" | "in_place" | "bone" | null;
+        /**
+         * @description Whether the hips travel, or a joint `root` on the floor above them, as of clips. Default:
+         *     `bone` with `names=ue5`, else `travelling`. Since 5.1.0.
+         * @default null
+         * @enum {string|null}
+         */
+        PerformanceRoot: "travelling" | "bone" | null;
         /**
          * @description One whole cycle in N = max(1, round(duration * fps)) even steps, which gives N + 1 frames.
          *     Not valid with `start` or `end`. The last frame equals the first exactly or, if the root
@@ -1267,6 +1279,7 @@ export interface components {
             feet: "stand" | "as_predicted";
             extrapolate?: components["schemas"]["Extrapolate"];
             names?: components["schemas"]["Names"];
+            root?: components["schemas"]["PerformanceRoot"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
@@ -1311,6 +1324,7 @@ export interface components {
             feet: "stand" | "as_predicted";
             extrapolate?: components["schemas"]["Extrapolate"];
             names?: components["schemas"]["Names"];
+            root?: components["schemas"]["PerformanceRoot"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
@@ -2911,7 +2925,7 @@ export interface components {
         end: number;
         /** @description Naming convention of the joints. */
         names: components["schemas"]["Names"];
-        /** @description Whether the root travels or stays in place. */
+        /** @description Whether the root travels, stays in place, or is a bone of its own. */
         root: components["schemas"]["Root"];
         /** @description Whether the clip is one whole cycle. */
         loop: components["schemas"]["Loop"];
@@ -3605,7 +3619,7 @@ export interface operations {
                 level?: components["parameters"]["level"];
                 /** @description Naming convention of the joints. */
                 names?: components["parameters"]["names"];
-                /** @description Whether the root travels or stays in place. */
+                /** @description Whether the root travels, stays in place, or is a bone of its own. */
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is one whole cycle. */
                 loop?: components["parameters"]["loop"];
@@ -3764,7 +3778,7 @@ export interface operations {
                 level?: components["parameters"]["level"];
                 /** @description Naming convention of the joints. */
                 names?: components["parameters"]["names"];
-                /** @description Whether the root travels or stays in place. */
+                /** @description Whether the root travels, stays in place, or is a bone of its own. */
                 root?: components["parameters"]["root"];
                 /** @description Whether the clip is one whole cycle. */
                 loop?: components["parameters"]["loop"];
@@ -4917,7 +4931,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "5.0.0";
+export const CONTRACT = "5.1.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
