@@ -1,13 +1,18 @@
 """Tests of damaged model files: refused before onnxruntime reads them."""
 
 import os
+from pathlib import Path
 
+import document_pages
+import numpy as np
 import onnx
+import onnxruntime
 import pytest
 from model_files import numbered, written
 
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file
+from posefield.registry import model_registry
 
 DAMAGED = 500
 
@@ -134,3 +139,24 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
     said = "cannot be read: 107374182400 bytes, expected at most 67108864"
     assert unreadable(path) == said
     assert "expected at most 67108864" in refusal(bytes(checked_file.MAX_BYTES + 1))
+
+
+@pytest.mark.parametrize(("name", "level"), [(None, 0), (3, 0), (3, 2)])
+def test_the_manuals_file_for_other_engines_has_all_inputs(name, level, tmp_path, monkeypatch):
+    (tmp_path / "models").mkdir()
+    shipped = model_registry.SHIPPED_FOLDER / "cmu_walk.onnx"
+    monkeypatch.chdir(tmp_path)
+    Path("models/cmu_walk.onnx").write_bytes(shipped.read_bytes())
+    page = (document_pages.DOCS / "reference/model-file.md").read_text()
+    exec(next(own.text for own in document_pages.blocks(page) if "import onnx\n" in own.text))
+    labels = np.zeros((1, 15), "f4")
+    labels[0, [] if name is None else name] = 1.0
+    plain = {"controls": np.array([[1.2, 0, 1.38]], "f4"), "time": np.array([[0, 0.5]], "f4")}
+    asked = {**plain, "labels": labels, "level": np.array(level)}
+    own, other = (
+        onnxruntime.InferenceSession(file)
+        for file in ("models/cmu_walk.onnx", "cmu_walk_inputs.onnx")
+    )
+    assert {port.name for port in other.get_inputs()} == set(asked)
+    expected = own.run(None, plain if (name, level) == (None, 0) else asked)
+    assert all(map(np.array_equal, other.run(None, asked), expected))
