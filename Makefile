@@ -71,7 +71,7 @@ WALK = $(if $(wildcard build/models/cmu_walk.onnx),,$(SHIPPED)/cmu_walk.onnx)
 run: $(MODEL) $(PAGE) $(DOCS) ## serve the shipped walk and the models of build/models on port 8000
 	$(BIN)/posefield serve $(WALK) build/models
 
-# The motion data of CMU, as `posefield fetch cmu` leaves it; nothing of it is kept in the project.
+# The motion data of CMU, as `benchmarks/fetch.py cmu` leaves it; nothing of it is kept in the project.
 POSEFIELD_DATA ?= ../shared/data
 .PHONY: shipped-models
 shipped-models: $(MODEL) ## train the models that ship, from the motion data in POSEFIELD_DATA

@@ -21,10 +21,6 @@ COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "convert": (command_convert.convert, command_convert.CONVERT_EXAMPLES),
     "discover": (command_discover.discover, command_discover.EXAMPLES),
     "review": (command_discover.review, command_discover.REVIEW_EXAMPLES),
-    "fetch": (
-        command_convert.fetch,
-        ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],
-    ),
     "sample": (
         command_sample.sample,
         ["sample reaching -o reaching", "sample reaching --truth -c turn=20 -o truth.bvh"],

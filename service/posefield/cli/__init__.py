@@ -54,7 +54,6 @@ EXTRAS = {
     "mcp": ("mcp",),
 }
 TRAINING = {
-    "fetch": "Convert downloaded motion data for a shipped recipe.",
     "probe": "Propose unit, axes, feet and heading of motion files.",
     "init": "Write a recipe and a table for a folder of motion files.",
     "sample": "Write procedural motions and their recipe.",

@@ -4,9 +4,9 @@ from pathlib import Path, PurePosixPath
 
 from posefield.common.errors import FileError
 from posefield.motion import bvh_writer
-from posefield_train.fetch import data_sets
-from posefield_train.fetch.data_sets import HDM05, Fetched, FetchedFile
 from posefield_train.source import acclaim
+from recipe_data import data_sets
+from recipe_data.data_sets import HDM05, Fetched, FetchedFile
 
 RATE = 120.0
 """Frames a second; the names of the cut clips end in it, the files do not state it."""

@@ -1,4 +1,4 @@
-"""Tests of `posefield fetch` with files of HDM05, and with Acclaim files made of CMU's walks."""
+"""Tests of benchmarks/fetch.py with files of HDM05, and with Acclaim files made of CMU's walks."""
 
 import json
 import re
@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from acclaim_files import ARM_AMC, ARM_ASF, files_of
+from fetch import main
+from recipe_data import cmu_trials, data_sets
 
 from posefield.motion import bvh_writer, quat
 from posefield.motion import clip as clips
 from posefield.motion.skeleton import Skeleton
-from posefield_train.fetch import cmu_trials, data_sets
 from posefield_train.source import bvh, data_folder, ingest, recipe
 
 UNIT = cmu_trials.METRES_PER_UNIT
@@ -43,11 +44,14 @@ def clip_of(place):
 
 
 @pytest.fixture
-def fetch(posefield, tmp_path):
+def fetch(capsys, tmp_path):
     """Function that fetches into tmp_path/data; gives code, output, errors."""
-    return lambda name, source, *words: posefield(
-        *("fetch", name, source, "-o", tmp_path / "data", *words)
-    )
+
+    def run(name, source):
+        code = main([name, str(source), str(tmp_path / "data")])
+        return code, *capsys.readouterr()
+
+    return run
 
 
 def assert_same_motion(ours, theirs):
@@ -59,12 +63,11 @@ def assert_same_motion(ours, theirs):
 
 
 def test_reaches_are_converted_with_their_rows_and_hashes(fetch, downloaded, real_data, tmp_path):
-    code, out, err = fetch("hdm05", downloaded, "--json")
-    facts = json.loads(out)
+    code, _, err = fetch("hdm05", downloaded)
     assert code == 0, err
     assert [line.partition(": ")[0] for line in err.splitlines()] == ["missing"] * 58
     place = tmp_path / "data/hdm05_reach"
-    assert json.loads((place / "fetched.json").read_text()) == facts
+    facts = json.loads((place / "fetched.json").read_text())
     assert len(facts["missing"]) == 58 and len(facts["files"]) == facts["rows"] == 3
     known = data_sets.HDM05.hashes()
     for one in facts["files"]:
@@ -134,14 +137,14 @@ def test_walks_are_recognized_by_their_motion(fetch, acclaim_texts, walks, tmp_p
     # The trial's number is not the one that the table supposes, and one subject is unknown.
     write_trial(tmp_path / "cmu", acclaim_texts[WALK], 7, 12)
     write_trial(tmp_path / "cmu", acclaim_texts[TURN], 91, 3)
-    code, out, err = fetch("cmu", tmp_path / "cmu", "--json")
-    facts = json.loads(out)
+    code, _, err = fetch("cmu", tmp_path / "cmu")
     assert code == 0, err
+    place = tmp_path / "data/cmu_walk"
+    facts = json.loads((place / "fetched.json").read_text())
     assert {one["file"]: one["sources"][-1]["file"] for one in facts["files"]} == {
         WALK: "07_12.amc",
         TURN: "91_03.amc",
     }
-    place = tmp_path / "data/cmu_walk"
     for file in (WALK, TURN):
         assert_same_motion(place / file, walks(file))
     listed = (place / "strides.csv").read_text().splitlines()
@@ -228,13 +231,12 @@ def test_a_reach_of_other_content_is_converted_with_a_warning(fetch, tmp_path):
     assert np.allclose(made.root_path / UNIT, [1.0, 2.0, 3.0], atol=1e-6)
 
 
-def test_a_folder_without_files_or_without_a_skeleton_is_refused(posefield, tmp_path):
-    words = ("-o", tmp_path / "data")
-    code, _, err = posefield("fetch", "cmu", tmp_path, *words)
+def test_a_folder_without_files_or_without_a_skeleton_is_refused(fetch, tmp_path):
+    code, _, err = fetch("cmu", tmp_path)
     assert code == 3 and "found no .asf, .amc, .bvh file in this folder" in err
     (tmp_path / "07_01.amc").write_text(ARM_AMC)
-    code, _, err = posefield("fetch", "cmu", tmp_path, *words)
+    code, _, err = fetch("cmu", tmp_path)
     assert code == 3 and "07_01.amc: found no skeleton 07.asf for it, expected one" in err
     (tmp_path / "07.asf").write_text(ARM_ASF)
-    code, _, err = posefield("fetch", "cmu", tmp_path, *words)
+    code, _, err = fetch("cmu", tmp_path)
     assert code == 3 and "found none of 60 clips" in err

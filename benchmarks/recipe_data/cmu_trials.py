@@ -17,9 +17,9 @@ import numpy as np
 from posefield.common.errors import AcclaimError
 from posefield.motion import bvh_writer
 from posefield.motion.clip import Clip
-from posefield_train.fetch import data_sets
-from posefield_train.fetch.data_sets import CMU, Fetched, FetchedFile
 from posefield_train.source import acclaim, bvh
+from recipe_data import data_sets
+from recipe_data.data_sets import CMU, Fetched, FetchedFile
 
 RATE = 120.0
 """Frames a second of the walks; AMC files do not state it."""
