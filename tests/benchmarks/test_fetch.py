@@ -11,9 +11,6 @@ from acclaim_files import ARM_AMC, ARM_ASF, files_of
 from fetch import main
 from recipe_data import cmu_trials, data_sets
 
-from posefield.motion import bvh_writer, quat
-from posefield.motion import clip as clips
-from posefield.motion.skeleton import Skeleton
 from posefield_train.source import bvh, data_folder, ingest, recipe
 
 UNIT = cmu_trials.METRES_PER_UNIT
@@ -158,21 +155,6 @@ def test_walks_are_recognized_by_their_motion(fetch, acclaim_texts, walks, tmp_p
     assert {example.row.place.name for example in made} == {Path(WALK).name, Path(TURN).name}
 
 
-def test_a_t_pose_before_the_first_frame_is_left_out(fetch, walks, tmp_path):
-    clip = clip_of(walks(WALK))
-    first = np.zeros_like(clip.rotations[:1])
-    first[..., 0] = 1.0
-    posed = replace(
-        clip,
-        rotations=np.concatenate([first, clip.rotations]),
-        translations=np.concatenate([clip.translations[:1], clip.translations]),
-    )
-    (tmp_path / "cgspeed").mkdir()
-    (tmp_path / "cgspeed/07_01.bvh").write_bytes(bvh_writer.dumps(posed, metres_per_unit=UNIT))
-    assert fetch("cmu", tmp_path / "cgspeed")[0] == 0
-    assert_same_motion(tmp_path / "data/cmu_walk" / WALK, walks(WALK))
-
-
 def test_another_subject_another_motion_and_two_trials_are_no_match(fetch, acclaim_texts, tmp_path):
     write_trial(tmp_path / "other", acclaim_texts[WALK], 8, 1)
     code, _, err = fetch("cmu", tmp_path / "other")
@@ -186,49 +168,6 @@ def test_another_subject_another_motion_and_two_trials_are_no_match(fetch, accla
     code, _, err = fetch("cmu", tmp_path / "two")
     assert code == 3
     assert "found 07_01.amc, 07_02.amc with these strides, expected one trial" in err
-
-
-def steady_walk(frames, speed):
-    """A clip of the recipe's joints in a row, which walks ahead, speed in metres a frame."""
-    names = tuple(cmu_trials.JOINTS)
-    count = len(names)
-    parents = (-1, *range(count - 1))
-    offsets = np.zeros((count, 3))
-    offsets[2:, 0] = 0.1
-    joints = Skeleton(names, parents, offsets, (count - 1,), np.array([[0.1, 0.0, 0.0]]))
-    angles = 0.3 * np.sin(np.linspace(0.0, 9.0, frames))[:, None] * np.ones((1, count))
-    turned = quat.from_euler(np.stack([angles, 0.5 * angles, -angles], axis=-1), "ZYX")
-    path = speed * np.arange(frames)[:, None] * np.array([0.6, 0.0, 0.8])
-    return clips.assemble(joints, turned, path, offsets, cmu_trials.RATE)
-
-
-@pytest.mark.parametrize(("share", "code"), [(1.0, 0), (1.002, 3)])
-def test_the_length_of_the_strides_tells_trials_apart(fetch, tmp_path, share, code):
-    """Without captured motion: a walk that only has the frames and the stride of a row."""
-    (row,) = (one for one in data_sets.CMU.rows("strides.csv") if one["performer"] == "cmu_02")
-    apart = int(row["end_frame"]) - int(row["start_frame"])
-    clip = steady_walk(343, share * float(row["stride_m"]) / apart)
-    write_trial(tmp_path / "cmu", files_of(clip, UNIT), 2, 1)
-    assert fetch("cmu", tmp_path / "cmu")[0] == code
-    made = tmp_path / "data/cmu_walk" / row["file"]
-    assert made.exists() == (code == 0)
-    if made.exists():
-        assert clip_of(made).skeleton.names == tuple(cmu_trials.JOINTS.values())
-        assert np.abs(clip_of(made).positions() - clip.positions()).max() < 1e-6
-
-
-def test_a_reach_of_other_content_is_converted_with_a_warning(fetch, tmp_path):
-    """Without captured motion: an arm under the name of a clip of HDM05."""
-    (tmp_path / "own").mkdir()
-    (tmp_path / "own/HDM_bd.asf").write_text(ARM_ASF)
-    head, frame = ARM_AMC.split("\n1\n")[0], "root 1 2 3 0 0 0\nupper 90 0"
-    frames = "\n".join(f"{number}\n{frame}" for number in range(1, 254))
-    (tmp_path / "own/HDM_bd_grabHighR_001_120.amc").write_text(f"{head}\n{frames}\n")
-    code, out, err = fetch("hdm05", tmp_path / "own")
-    assert code == 0 and "CC BY-SA 3.0" in out and "1 of 61 motions, 1 rows of clips.csv" in out
-    assert "HDM_bd.asf and HDM_bd_grabHighR_001_120.amc: not the content of which" in err
-    made = clip_of(tmp_path / "data/hdm05_reach/bvh/HDM_bd_grabHighR_001_120.bvh")
-    assert np.allclose(made.root_path / UNIT, [1.0, 2.0, 3.0], atol=1e-6)
 
 
 def test_a_folder_without_files_or_without_a_skeleton_is_refused(fetch, tmp_path):
