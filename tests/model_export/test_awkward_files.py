@@ -3,13 +3,17 @@
 import gzip
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from exported_clips import encoded
 from minimal import TOML, small_clip, write_clips
 
+from posefield.motion import quat
+from posefield.motion.clip import assemble
+from posefield.motion.skeleton import Skeleton
 from posefield_train.source.clip_joints import keep_joints
 
 PHASES = (0.0, 0.5, 1.0, 1.5)
@@ -57,6 +61,27 @@ def without_end_sites(text: str) -> str:
     return "MOTION".join(["".join(kept), motion])
 
 
+def quadruped(folder: Path) -> None:
+    legs = [f"{side}{end}" for side in ("Left", "Right") for end in ("Front", "Hind")]
+    names = ["Root", "Pelvis", *(f"{leg}{part}" for leg in legs for part in ("UpperLeg", "Foot"))]
+    parents = [-1, 0, *(parent for at in range(4) for parent in (1, 2 + 2 * at))]
+    offsets = np.tile([[0.1, -0.3, 0.2]], (len(names), 1))
+    own = Skeleton(tuple(names), tuple(parents), offsets, (), np.zeros((0, 3)))
+    rotations = np.tile(quat.IDENTITY, (9, len(names), 1))
+    clip = assemble(own, rotations, np.zeros((9, 3)), offsets, 30.0)
+    (folder / "a.bvh").write_bytes(encoded(clip, "bvh"))
+
+
+def with_legs(text: str) -> str:
+    """The file with two legs of 0.8 units, without channels."""
+    legs = "".join(
+        f"JOINT {side}UpLeg {{ OFFSET {x} 0 0 JOINT {side}Leg {{ OFFSET 0 -0.4 0 "
+        f"JOINT {side}Foot {{ OFFSET 0 -0.4 0 }} }} }}\n"
+        for side, x in (("Left", 0.1), ("Right", -0.1))
+    )
+    return re.sub(r"}\s*MOTION", f"{legs}}}\nMOTION", text)
+
+
 def table(text: str) -> Callable[[Path], None]:
     """Writer of a family with another table."""
 
@@ -65,6 +90,11 @@ def table(text: str) -> Callable[[Path], None]:
         (folder / "clips.csv").write_text(text)
 
     return write
+
+
+def rows(mark: str, heading: str) -> str:
+    """A table of the family with decimal commas."""
+    return "\n".join([heading, *(f"{at}.bvh{mark}{at},5" for at in range(4))]) + "\n"
 
 
 def source(line: str) -> str:
@@ -122,7 +152,7 @@ CASES = [
         "frame time in milliseconds",
         bvh(frame_time("33.333")),
         PROBE,
-        ("30.0 frames a second (confidence: low)", "33.333 looks like milliseconds"),
+        ("30 frames a second (confidence: low)", "33.333 looks like milliseconds"),
     ),
     Case("frame time that is the rate", bvh(frame_time("60")), PROBE, ("60 looks like the rate",)),
     Case(
@@ -164,6 +194,50 @@ CASES = [
         lambda folder: (folder / "a.glb").write_bytes(encoded(small_clip(), "glb")),
         "convert a.glb --unit 0.01 -o o.bvh",
         ("states a unit of 1 m, overruled: read as 0.01 m",),
+    ),
+    *(
+        Case(name, table(text), TRAIN, ("clips.csv: 4 decimal commas were read as points",))
+        for name, text in (
+            ("semicolons", rows(";", "file;v")),
+            ("a named separator", rows(";", "sep=;\nfile;v")),
+            ("tabs", rows("\t", "file\tv")),
+        )
+    ),
+    Case(
+        "decimal commas between commas",
+        table("file,v\n0.bvh,0,5\n"),
+        TRAIN,
+        ("clips.csv:2: found 3 cells, expected the 2 of the heading",),
+        code=3,
+    ),
+    Case(
+        "a wrong unit",
+        family(recipe=TOML.replace("metres_per_unit = 1.0", "metres_per_unit = 100.0")),
+        TRAIN,
+        ("condition it better; the bones are 143 m long together: is source.metres_per_unit",),
+        code=4,
+    ),
+    Case(
+        "legs of two metres",
+        family(with_legs, files="0123", recipe=TOML.replace("= 1.0", "= 2.5", 1)),
+        TRAIN,
+        ("note: the legs are 2 m long, of an adult about 0.86 m: is source.metres_per_unit",),
+    ),
+    Case(
+        "a rate that is no whole number",
+        lambda folder: (folder / "a.glb").write_bytes(
+            encoded(replace(small_clip(), rate=37.5), "glb")
+        ),
+        "probe a.glb",
+        ("fps             37.5 frames a second (confidence: certain)",),
+    ),
+    Case("a quadruped", quadruped, "init .", ("wrote clips.csv and recipe.toml",)),
+    Case(
+        "styles of no use",
+        table(rows(",", "file,style,v")),
+        TRAIN,
+        ("clips.csv:1: column 'style' has 4 values and no use", "clips.labels"),
+        code=3,
     ),
     Case(
         "gzip",

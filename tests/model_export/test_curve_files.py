@@ -114,7 +114,7 @@ def test_a_cell_that_is_no_number_is_refused(folder, cell):
         ("\n7,", "\n8,", "frame 8 after 6, expected 7"),
         ("frame,", "image,", "no column 'frame' (number of the frame, from 0)"),
         ("jawOpen", "jawOpn", "no curves ['jawOpen'] (did you mean 'jawOpn'?)"),
-        ("frame,", "frame,brow,", "not the 4 cells of the heading"),
+        ("frame,", "frame,brow,", "expected the 4 of the heading"),
     ],
 )
 def test_missing_frames_and_other_names_are_refused(folder, old, new, said):

@@ -145,8 +145,8 @@ def test_a_root_that_stays_while_its_child_moves_is_told(clip, tmp_path, written
     path.write_text(head + "\n".join(["MOTION", *lines[:2], *rows]) + "\n")
     report = probe_report.probe([path])
     assert report.warnings == (
-        f"the root 'dummy' stays in place while {name!r} moves: make {name!r} the root, or its "
-        "motion is lost",
+        f"the root 'dummy' stays in place while {name!r} moves: training takes {name!r} as the "
+        "root",
     )
     assert report.proposed["up"].value == "y"
     # Negative control: the file itself is without a warning.

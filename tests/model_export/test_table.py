@@ -78,13 +78,13 @@ def test_a_missing_column_is_named_with_the_columns_that_are_there(refused, clip
 def test_a_cell_that_is_no_finite_number_is_named_by_line_and_column(refused, tmp_path, cell):
     fault = refused(f'file,v\na.bvh,1\nb.bvh,"{cell}"\n')
     assert str(fault).startswith(f"{tmp_path / 'clips.csv'}:3: ")
-    assert fault.message == f"column 'v': {cell!r}, expected a number"
+    assert fault.message.startswith(f"column 'v': {cell!r}, expected a number")
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("file,v\nb.bvh,1\na.bvh\n", "not the 2 cells of the heading"),
+        ("file,v\nb.bvh,1\na.bvh,1,2\n", "found 3 cells, expected the 2 of the heading"),
         ('file,v\na.bvh,"1\n', "not CSV: unexpected end of data"),
         ("", "no rows below the heading"),
         ("file,v\nü.bvh,1\n".encode("latin-1"), "not UTF-8 text"),

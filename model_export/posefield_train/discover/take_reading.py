@@ -15,11 +15,12 @@ from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
 from posefield.roles.joint_recognition import NEEDED, RoleGuess
 from posefield_train.probe import proposals
-from posefield_train.probe.proposals import ADULT_LEG, MOST_WHOLE, OTHER_UNIT, Proposal
+from posefield_train.probe.proposals import MOST_WHOLE, Proposal
 from posefield_train.source import frame_faults, motion_file, motion_readers, take_groups
 from posefield_train.source.frame_faults import NO_FAULTS, FrameFaults
 from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
+from posefield_train.source.skeleton_checks import ADULT_LEG, OTHER_UNIT
 
 COMPARED = (
     "hips",

@@ -47,11 +47,13 @@ def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> floa
         worst = max(worst, float(gaps[at]))
         if worst > PARITY_LIMIT:
             named = [*own_card.skeleton.names, *(curve.name for curve in own_card.curves)]
+            notes = own_card.diagnostics.get("notes", ())
+            doubts = [note for note in notes if note.endswith("?")]
             raise ExportRefused(
                 f"the graph puts {named[at[2]]} {100 * worst:.4f} cm from where "
                 f"the reference does, expected at most {100 * PARITY_LIMIT:g} cm; at "
                 f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
-                "condition it better"
+                f"condition it better{''.join(f'; {doubt}' for doubt in doubts)}"
             )
     return worst
 

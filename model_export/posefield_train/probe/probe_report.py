@@ -14,6 +14,7 @@ from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import proposals
 from posefield_train.probe.proposals import Figure, Proposal
 from posefield_train.source import ingest, motion_file, motion_readers
+from posefield_train.source.skeleton_checks import OTHER_UNIT
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
 SHOWN_JOINTS, SHOWN_FAULTS = 40, 20
@@ -171,10 +172,15 @@ def _warnings(figures: Sequence[Figure], usual: Sequence[Figure]) -> list[str]:
     still = [each for each in usual if not each.moves[0] and any(each.moves)]
     if still:
         mover = still[0].names[still[0].moves.index(True)]
-        found.append(
-            f"the root {still[0].names[0]!r} stays in place while {mover!r} moves: make {mover!r} "
-            "the root, or its motion is lost"
-        )
+        beside = [
+            name
+            for name, parent in zip(still[0].names, still[0].file.skeleton.parents, strict=True)
+            if parent == 0 and name != mover
+        ]
+        then = f"training takes {mover!r} as the root"
+        if beside:
+            then += f" where motion.drop_joints = {beside[:6]} leaves out what is beside it"
+        found.append(f"the root {still[0].names[0]!r} stays in place while {mover!r} moves: {then}")
     stretching = [each for each in usual if any(each.moves[1:])]
     if stretching and not still:
         found.append(
@@ -189,7 +195,7 @@ def _mixed_settings(usual: Sequence[Figure]) -> list[str]:
     found = []
     legs = {each.file.source: leg for each in usual if (leg := each.leg_length())}
     middle = float(np.median(list(legs.values()))) if legs else 0.0
-    least = proposals.OTHER_UNIT
+    least = OTHER_UNIT
     odd = [own for own, leg in legs.items() if max(leg, middle) > least * min(leg, middle)]
     if odd:
         found.append(
@@ -252,7 +258,8 @@ def _roles(report: ProbeReport) -> str:
 def _value(name: str, found: Proposal) -> str:
     if found.value is None or found.value == []:
         return "unknown"
-    shown = ", ".join(found.value) if isinstance(found.value, list) else str(found.value)
+    is_list, is_number = (isinstance(found.value, kind) for kind in (list, float))
+    shown = ", ".join(found.value) if is_list else f"{found.value:{'.7g' if is_number else ''}}"
     return f"{shown}{UNITS.get(name, '')}"
 
 

@@ -10,15 +10,11 @@ from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat, skeleton
 from posefield.roles import joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
-from posefield_train.source import frame_faults, motion_file
+from posefield_train.source import frame_faults, motion_file, skeleton_checks
 from posefield_train.source.clip_joints import UNITS
 from posefield_train.source.motion_file import MotionFile
+from posefield_train.source.skeleton_checks import ADULT_LEG, OTHER_UNIT
 
-ADULT_LEG = 0.86
-"""Length of the bones from hip to foot of an adult, m."""
-OTHER_UNIT = 2.1
-"""Least ratio of the legs of two bodies with the same joints that are in different units: legs of a
-child and an adult differ by less, any two units by more."""
 MAX_FRAMES = 200
 """Frames of a file that are measured, spread evenly."""
 MOST_WHOLE, FEW = 50, 5
@@ -70,20 +66,7 @@ class Figure:
 
     def leg_length(self) -> float | None:
         """Return the length of the bones from the hip to the foot, in the file's unit, or None."""
-        lengths = [self._chain(f"{side}UpperLeg", f"{side}Foot") for side in ("left", "right")]
-        known = [length for length in lengths if length]
-        return float(np.mean(known)) if known else None
-
-    def _chain(self, upper: str, lower: str) -> float | None:
-        if not {upper, lower} <= self.roles.keys():
-            return None
-        parents = self.file.skeleton.parents
-        top, joint = (self.names.index(self.roles[role]) for role in (upper, lower))
-        length = 0.0
-        while joint > top:
-            length += float(self.bones[joint])
-            joint = parents[joint]
-        return length if joint == top else None
+        return skeleton_checks.leg_length(self.file.skeleton, self.roles, self.bones)
 
     def without_frames(self) -> "Figure":
         """Return the figure with the first frame alone of its file, whose others take memory."""
@@ -125,7 +108,7 @@ def faults(measured: Figure) -> list[str]:
     """Return the faults of the frames of a figure's file, which has its frames and a rate."""
     file, joints = measured.file, list(measured.sure_roles.values())
     leg = measured.leg_length()
-    if file.rate is None or not leg:
+    if file.rate is None or not leg or not joints:
         return []
     columns = [measured.names.index(joint) for joint in joints]
     bones = file.skeleton
@@ -188,7 +171,10 @@ def _stated(values: Sequence[Any], measured: Proposal, unit: str = "") -> Propos
 
 def _measured_unit(figures: Sequence[Figure]) -> Proposal:
     """Return the length of the files' unit in metres, from the length of the legs."""
-    legs = [leg for figure in figures if (leg := figure.leg_length())]
+    every = [leg for figure in figures if (leg := figure.leg_length())]
+    # Of files in several units those of most.
+    alike = [[leg for leg in every if one / OTHER_UNIT < leg <= one] for one in every]
+    legs = max(alike, key=len, default=[])
     length = float(np.median(legs or [figure.size for figure in figures]))
     usual, what = (ADULT_LEG, "leg, hip to foot") if legs else (ADULT_SIZE, "largest extent")
     if length <= 0.0:
@@ -204,6 +190,9 @@ def _measured_unit(figures: Sequence[Figure]) -> Proposal:
         f"the next units: {length * UNITS[second]:.3g} m in {second}, "
         f"{length * UNITS[third]:.3g} m in {third}",
     ]
+    if len(legs) < len(every):
+        evidence.append(f"{len(every) - len(legs)} of {len(every)} files are in another unit")
+        confidence = "low"
     if not legs:
         evidence.append("no legs were recognised by their names")
         confidence = "low"

@@ -1,14 +1,13 @@
 """Acclaim motion files: a skeleton (ASF), motions of it (AMC), and their conversion to a clip.
 
-The format: Schafer, "Acclaim Skeleton File Definition V1.10" (1994). Only what the files of CMU and
-HDM05 use is read; anything else that would change the motion is refused.
+The format: Schafer, "Acclaim Skeleton File Definition V1.10" (1994). What has one meaning alone is
+read, with notes on what is passed over; anything else that would change the motion is refused.
 """
 
 import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +17,13 @@ from posefield.motion import clip, quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source.bvh import MAX_POSES, Readable
-from posefield_train.source.bvh_hierarchy import MAX_NUMBER, NUMBER, Vector, quote
+from posefield_train.source.bvh_hierarchy import (
+    MAX_NUMBER,
+    NUMBER,
+    Vector,
+    foreign_encoding,
+    quote,
+)
 
 ROOT = "root"
 MAX_BONES = 1000
@@ -28,9 +33,13 @@ MAX_LINE = 10_000
 MAX_ASF_BYTES, MAX_AMC_BYTES = 4_000_000, 500_000_000
 """Limits of a file's size: several times MAX_BONES, and 45 minutes of 31 joints at 120 frames/s."""
 NEEDED = ("units", "root", "bonedata", "hierarchy")
-IGNORED = ("version", "name", "documentation", "skin")
+IGNORED = ("version", "name", "namespace", "documentation", "skin")
 """Sections that do not change the motion."""
-HEADER = {":fully-specified", ":degrees"}
+CHANNELS = ["TX", "TY", "TZ", "RX", "RY", "RZ"]
+ANGLES = {"deg": 1.0, "degrees": 1.0, "rad": math.degrees(1.0), "radians": math.degrees(1.0)}
+"""Units of angles, degrees."""
+MAX_HEADER = 100
+"""Limit of lines before the first frame."""
 FRAME = re.compile(r"\d{1,9}", re.ASCII)
 
 
@@ -40,7 +49,8 @@ class AsfBone:
 
     parent: name of the parent bone, "root" for the first ones. direction, length: in the file's
     unit and global axes. axis: angles, degrees, of the bone's own axes about the fixed X, Y, Z in
-    this order. dof: free angles in the order of the motion file's columns, such as "XZ".
+    this order. dof: free angles in the order of the motion file's columns, such as "XZ". order: in
+    which they turn the bone.
     """
 
     name: str
@@ -49,14 +59,23 @@ class AsfBone:
     length: float
     axis: Vector
     dof: str
+    order: str = "XYZ"
 
 
 @dataclass(frozen=True)
 class AsfFile:
-    """A skeleton file. source: its name. bones: depth first, parents before children."""
+    """A skeleton file.
+
+    source: its name. bones: depth first, parents before children. columns: of the root in motion
+    files, such as "TX". order: in which its angles turn it. angle: unit of angles, degrees.
+    """
 
     source: str
     bones: tuple[AsfBone, ...]
+    columns: tuple[str, ...]
+    order: str
+    angle: float
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -70,6 +89,7 @@ class AmcFile:
     source: str
     root: Floats
     angles: dict[str, Floats]
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -113,7 +133,11 @@ def _read_lines(path: Readable, most: int) -> Iterator[_Line]:
                 if len(content) > MAX_LINE or read > most:
                     expected = f"expected at most {MAX_LINE} bytes a line and {most} in all"
                     raise AcclaimError(source, f"found more bytes than allowed, {expected}", number)
-                words = tuple(content.decode("latin-1").partition("#")[0].split())
+                if number == 1 and (packed := foreign_encoding(content)):
+                    message = f"found {packed}, expected plain text"
+                    raise AcclaimError(source, message, number)
+                text = content.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
+                words = tuple(text.partition("#")[0].split())
                 if words:
                     yield _Line(source, number, words)
     except OSError as fault:
@@ -123,17 +147,20 @@ def _read_lines(path: Readable, most: int) -> Iterator[_Line]:
 def read_asf(path: Readable) -> AsfFile:
     """Return the skeleton of a file.
 
-    Raises AcclaimError, naming the line, for a file that breaks the grammar, and for what this
-    reader does not know: angles in radians, bones that move or stretch, a root that is not at the
-    origin, and axes in another order than XYZ.
+    The root's position is that of the motion, whatever the skeleton says. Raises AcclaimError,
+    naming the line, for a file that breaks the grammar, and for what this reader does not know:
+    bones that move or stretch, a root that is turned, and turned axes in another order than XYZ.
     """
     sections: dict[str, list[_Line]] = {}
+    notes = list[str]()
     section: list[_Line] | None = None
     for line in _read_lines(path, MAX_ASF_BYTES):
         if line.words[0].startswith(":"):
-            name, known = line.words[0][1:].lower(), sorted({*IGNORED, *NEEDED})
-            if name not in known or name in sections:
-                raise line.unexpected(f"each of the sections {', '.join(known)} once")
+            name = line.words[0][1:].lower()
+            if name in sections:
+                raise line.unexpected("each section once")
+            if name not in (*IGNORED, *NEEDED):
+                notes.append(f"section :{name} of the skeleton is unknown: left out")
             section = sections[name] = []
         elif section is None:
             raise line.unexpected("a section, such as :version")
@@ -144,20 +171,27 @@ def read_asf(path: Readable) -> AsfFile:
             raise AcclaimError(str(path), f"found no entry of section :{name}, expected some")
     units = sections["units"]
     angles = [line for line in units if line.words[0].lower() == "angle"]
-    if len(angles) != 1 or angles[0].words[1:] != ("deg",):
-        raise (angles or units)[-1].unexpected("angle deg, once")
+    if len(angles) != 1 or angles[0].words[-1].lower() not in ANGLES:
+        raise (angles or units)[-1].unexpected("angle deg or angle rad, once")
+    angle = ANGLES[angles[0].words[-1].lower()]
     root = {line.words[0].lower(): line for line in sections["root"]}
-    for key, expected in {"order": "TX TY TZ RX RY RZ", "axis": "XYZ"}.items():
-        line = root.get(key, sections["root"][0])
-        if [word.upper() for word in line.words[1:]] != expected.split():
-            raise line.unexpected(f"{key} {expected}")
+
+    order, axes = (root.get(key, sections["root"][0]) for key in ("order", "axis"))
+    columns = tuple(word.upper() for word in order.words[1:])
+    if sorted(columns) != sorted(CHANNELS):
+        raise order.unexpected(f"order and {' '.join(CHANNELS)}, each once")
+    if len(axes.words) != 2 or sorted(axes.words[1].upper()) != [*"XYZ"]:
+        raise axes.unexpected("axis and XYZ, in any order")
     for key in ("position", "orientation"):
         line = root.get(key, sections["root"][0])
         if any(line.numbers(line.words[1:], 3, f"{key} 0 0 0")):
-            raise line.unexpected(f"{key} 0 0 0")
+            if key == "orientation":
+                raise line.unexpected(f"{key} 0 0 0")
+            notes.append("the root's position in the skeleton is replaced by that of the motion")
     drafts = _bone_drafts(sections["bonedata"])
     tree = _tree(sections["hierarchy"], drafts)
-    return AsfFile(str(path), tuple(_bone(drafts[name], name, parent) for name, parent in tree))
+    bones = tuple(_bone(drafts[name], name, parent, angle) for name, parent in tree)
+    return AsfFile(str(path), bones, columns, axes.words[1].upper(), angle, tuple(notes))
 
 
 _Draft = dict[str, _Line]
@@ -199,20 +233,21 @@ def _entry(draft: _Draft, key: str, count: int) -> _Line:
     return draft[key]
 
 
-def _bone(draft: _Draft, name: str, parent: str) -> AsfBone:
+def _bone(draft: _Draft, name: str, parent: str, angle: float) -> AsfBone:
     direction, length = _entry(draft, "direction", 3), _entry(draft, "length", 1)
     axis = _entry(draft, "axis", 4)
-    if axis.words[4].upper() != "XYZ":
-        raise axis.unexpected("axis and three angles in the order XYZ")
+    order = axis.words[4].upper()
     x, y, z = direction.numbers(direction.words[1:], 3, "direction and three numbers")
     a, b, c = axis.numbers(axis.words[1:4], 3, "axis, three angles and XYZ")
+    if sorted(order) != [*"XYZ"] or (order != "XYZ" and any((a, b, c))):
+        raise axis.unexpected("axis and three angles in the order XYZ, or zeros in any")
     (size,) = length.numbers(length.words[1:], 1, "length and a number")
     words = draft["dof"].words[1:] if "dof" in draft else ()
     free = "".join(word[1:].upper() for word in words if word.lower().startswith("r"))
-    ordered = all("XYZ".find(a) < "XYZ".find(b) for a, b in pairwise(free))
-    if len(free) != len(words) or not set(free) <= set("XYZ") or not ordered:
-        raise draft["dof"].unexpected("dof and some of rx, ry and rz, in this order")
-    return AsfBone(name, parent, (x, y, z), size, (a, b, c), free)
+    if len(free) != len(words) or not set(free) <= set("XYZ") or len(set(free)) != len(free):
+        raise draft["dof"].unexpected("dof and some of rx, ry and rz, each once")
+    axes = (angle * a, angle * b, angle * c)
+    return AsfBone(name, parent, (x, y, z), size, axes, free, order)
 
 
 def _tree(lines: Sequence[_Line], drafts: dict[str, _Draft]) -> list[tuple[str, str]]:
@@ -247,15 +282,15 @@ def read_amc(path: Readable, skeleton: AsfFile) -> AmcFile:
     another skeleton, or whose frames are not numbered one after another.
     """
     widths = {ROOT: 6, **{bone.name: len(bone.dof) for bone in skeleton.bones if bone.dof}}
-    groups = _groups(_read_lines(path, MAX_AMC_BYTES), max(len(HEADER), 1 + len(widths)))
-    header = next(groups)
-    for line in header:
-        if line.words[0].lower() not in HEADER or len(line.words) > 1:
-            raise line.unexpected(f"{' and '.join(sorted(HEADER))}, then frames")
-    keys = {line.words[0].lower() for line in header}
-    if keys != HEADER:
-        message = f"found the header {sorted(keys)}, expected {sorted(HEADER)}"
-        raise AcclaimError(str(path), message)
+    groups = _groups(_read_lines(path, MAX_AMC_BYTES), max(MAX_HEADER, 1 + len(widths)))
+    angle, notes = skeleton.angle, list[str]()
+    for line in next(groups):
+        key = line.words[0].lower()
+        if not key.startswith(":"):
+            raise line.unexpected("a header such as :DEGREES, then frames")
+        angle = ANGLES.get(key[1:], angle)
+        if key[1:] not in ("fully-specified", *ANGLES):
+            notes.append(f"the header {' '.join(line.words)} is unknown: left out")
     most = MAX_POSES // (len(skeleton.bones) + 1)
     frames: list[Floats] = []
     before = None
@@ -279,7 +314,10 @@ def read_amc(path: Readable, skeleton: AsfFile) -> AmcFile:
         raise AcclaimError(str(path), "found no frame, expected at least one")
     ends = np.cumsum([*widths.values()])[:-1]
     columns = dict(zip(widths, np.split(np.stack(frames), ends, axis=1), strict=True))
-    return AmcFile(str(path), columns.pop(ROOT), columns)
+    root = columns.pop(ROOT)[:, [skeleton.columns.index(name) for name in CHANNELS]]
+    root[:, 3:] *= angle
+    angles = {name: angle * own for name, own in columns.items()}
+    return AmcFile(str(path), root, angles, tuple(notes))
 
 
 def _groups(lines: Iterator[_Line], most: int) -> Iterator[list[_Line]]:
@@ -296,6 +334,14 @@ def _groups(lines: Iterator[_Line], most: int) -> Iterator[list[_Line]]:
             raise line.unexpected("the number of the next frame")
         group.append(line)
     yield group
+
+
+def _turns(angles: Floats, axes: str, order: str) -> Floats:
+    """Return rotations (F, 4) by angles (F, k), degrees, about axes, in an order of them."""
+    # The last turn is the outermost.
+    outwards = [axis for axis in reversed(order) if axis in axes]
+    columns = [axes.index(axis) for axis in outwards]
+    return quat.from_euler(np.deg2rad(angles[:, columns]), "".join(outwards))
 
 
 def to_clip(skeleton: AsfFile, motion: AmcFile, *, metres_per_unit: float, rate: float) -> Clip:
@@ -315,12 +361,11 @@ def to_clip(skeleton: AsfFile, motion: AmcFile, *, metres_per_unit: float, rate:
     if other:
         message = f"only it or {skeleton.source} has angles of {sorted(other)}"
         raise AcclaimError(motion.source, message)
-    rotations = [quat.from_euler(np.deg2rad(motion.root[:, 5:2:-1]), "ZYX")]
+    rotations = [_turns(motion.root[:, 3:], "XYZ", skeleton.order)]
     for bone in bones:
         if bone.dof:
-            axes = quat.from_euler(np.deg2rad(np.array(bone.axis)[::-1]), "ZYX")
-            free = np.deg2rad(motion.angles[bone.name][:, ::-1])
-            turns = quat.mul(axes, quat.from_euler(free, bone.dof[::-1]))
+            axes = _turns(np.array([bone.axis]), "XYZ", "XYZ")
+            turns = quat.mul(axes, _turns(motion.angles[bone.name], bone.dof, bone.order))
             rotations.append(quat.mul(turns, quat.conj(axes)))
         else:
             rotations.append(np.tile(quat.IDENTITY, (len(motion.root), 1)))

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice, pairwise
@@ -13,6 +14,7 @@ import numpy as np
 from posefield.common.errors import RecipeError
 from posefield.common.units import Floats
 from posefield_train.source import data_folder
+from posefield_train.source.bvh_hierarchy import foreign_encoding
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import PERFORMER, Condition
@@ -21,6 +23,9 @@ LABEL_FORM = (
     "a name of printable characters, without commas and colons, and without blanks at its ends"
 )
 
+
+STYLE_COLUMNS = ("style", "styles", "emotion", "mood")
+"""Columns whose names say that clips of equal controls differ."""
 
 FrameSpans = tuple[tuple[int, int], ...]
 """Intervals of frames of a file, first and last."""
@@ -36,13 +41,29 @@ MAX_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
 """Limits of a table: a hundred times the size of the largest published families of motions."""
 
 
+DECIMAL_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)", re.ASCII)
+
+
 def open_table(place: FileLocation) -> "ClipTable":
-    """Return the table of a CSV file; RecipeError if it is invalid."""
+    """Return the table of a CSV file; RecipeError if it is invalid.
+
+    Cells are separated by commas, or by semicolons or tabs, of which the heading has more; decimal
+    commas are then read as points, and `decimal_commas` counts them.
+    """
+    content = data_folder.read(place, MAX_BYTES, "a table")
+    if packed := foreign_encoding(content[:4]):
+        raise RecipeError(str(place), f"found {packed}, expected a table in UTF-8", 1)
     try:
-        text = data_folder.read(place, MAX_BYTES, "a table").decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
-    reader = csv.DictReader(io.StringIO(text, newline=None), strict=True)
+    file = io.StringIO(text, newline=None)
+    heading = file.readline()
+    # The first line of a table of Excel may name the separator.
+    skipped = int(re.fullmatch("sep=.\n", heading) is not None)
+    file.seek(len(heading) if skipped else 0)
+    delimiter = heading[4] if skipped else max(",;\t", key=heading.count)
+    reader = csv.DictReader(file, strict=True, delimiter=delimiter)
     try:
         names = reader.fieldnames or []
         if len(names) > MOST_COLUMNS:
@@ -50,7 +71,7 @@ def open_table(place: FileLocation) -> "ClipTable":
             raise RecipeError(str(place), message, 1)
         if twins := sorted({name for name in names if names.count(name) > 1}):
             raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
-        records = [(reader.line_num, record) for record in islice(reader, MOST_ROWS)]
+        records = [(reader.line_num + skipped, own) for own in islice(reader, MOST_ROWS)]
         further = next(reader, None)
     except csv.Error as fault:
         raise RecipeError(str(place), f"not CSV: {fault}", reader.line_num) from fault
@@ -59,8 +80,23 @@ def open_table(place: FileLocation) -> "ClipTable":
         raise RecipeError(str(place), message, reader.line_num)
     for line, record in records:
         if None in record or None in record.values():
-            raise RecipeError(str(place), f"not the {len(names)} cells of the heading", line)
-    return ClipTable(str(place), records)
+            count = sum(record.get(name) is not None for name in names) + len(record.get(None, ""))
+            message = f"found {count} cells, expected the {len(names)} of the heading"
+            raise RecipeError(str(place), message, line)
+    if delimiter == ",":
+        return ClipTable(str(place), records)
+    commas = sum(bool(DECIMAL_COMMA.fullmatch(c)) for _, own in records for c in own.values())
+    points = [
+        (
+            line,
+            {
+                name: DECIMAL_COMMA.sub(r"\1.\2", c) if DECIMAL_COMMA.fullmatch(c) else c
+                for name, c in own.items()
+            },
+        )
+        for line, own in records
+    ]
+    return ClipTable(str(place), points, commas)
 
 
 @dataclass(frozen=True)
@@ -69,6 +105,7 @@ class ClipTable:
 
     name: str
     records: list[tuple[int, dict[str, str]]]
+    decimal_commas: int = 0
 
     @property
     def columns(self) -> list[str]:
@@ -105,7 +142,8 @@ class ClipTable:
             value = math.nan
         if not math.isfinite(value):
             found = record[column]
-            raise RecipeError(self.name, f"column {column!r}: {found!r}, expected a number", line)
+            expected = "a number with a decimal point" if "," in found else "a number"
+            raise RecipeError(self.name, f"column {column!r}: {found!r}, expected {expected}", line)
         return value
 
     def frame(self, line: int, record: dict[str, str], column: str) -> int:
@@ -225,24 +263,41 @@ class ClipRow:
         return RecipeError(self.table, message, self.line)
 
 
-def read(recipe: Recipe, folder: Path) -> list[ClipRow]:
+def read(recipe: Recipe, folder: Path, notes: list[str] | None = None) -> list[ClipRow]:
     """Return the rows of the recipe's table that meet its conditions.
 
     If the folder lacks the table, the one beside the recipe is read, else the shipped one of its
-    name, if there is one. Raises RecipeError, naming line and column, for the first invalid cell,
-    and for a missing column, no matching row, and two rows of the same frames.
+    name, if there is one. notes: to which those on the table are added. Raises RecipeError, naming
+    line and column, for the first invalid cell, and for a missing column, no matching row, two rows
+    of the same frames, and styles of which the recipe says nothing.
     """
     place = data_folder.find_table(folder, recipe.clips.table, recipe.folder)
     cells = open_table(place)
-    cells.require(_columns(recipe))
-    rows = [
-        _row(recipe, folder, cells, line, record)
+    columns = _columns(recipe)
+    cells.require(columns)
+    chosen = [
+        (line, record)
         for line, record in cells.records
         if all(cells.satisfies(line, record, c, w) for c, w in recipe.clips.where.items())
     ]
+    rows = [_row(recipe, folder, cells, line, record) for line, record in chosen]
     if not rows:
         raise RecipeError(cells.name, f"none of {len(cells.records)} rows meets the conditions")
     refuse_repeats(rows)
+    for name in cells.columns:
+        values = {record[name] for _, record in chosen}
+        if name.lower() in STYLE_COLUMNS and name not in columns and len(values) > 1:
+            raise RecipeError(
+                cells.name,
+                f"column {name!r} has {len(values)} values and no use in the recipe, expected "
+                f"clips.labels = {{ style = {name!r} }} with kriging.label = 'style', or one of "
+                "them chosen by clips.where",
+                1,
+            )
+    if notes is not None:
+        notes += data_folder.table_notes(cells.name)
+        if cells.decimal_commas:
+            notes.append(f"{place.name}: {cells.decimal_commas} decimal commas were read as points")
     return rows
 
 

@@ -18,7 +18,6 @@ from posefield_train.source import (
     clip_joints,
     clip_table,
     curve_files,
-    data_folder,
     measured_controls,
     motion_file,
     skeleton_checks,
@@ -82,11 +81,12 @@ def ingest(
     known: files that were read before, which are not read again. Raises RecipeError for an invalid
     row, MotionFileError for a file that cannot be read.
     """
-    rows = clip_table.read(recipe, folder)
+    notes = list[str]()
+    rows = clip_table.read(recipe, folder, notes)
     alone = recipe.curves is not None and recipe.curves.alone
     files = {} if alone else read_files(rows, recipe.source, known)
     curves = curve_files.reader(recipe.curves, rows, recipe.source.rate) if recipe.curves else None
-    notes = [*data_folder.table_notes(rows[0].table), *reader_notes(files)]
+    notes += reader_notes(files)
     if recipe.source.root_offset is None:
         notes += offset_notes(files)
     # Converted once for all rows: a long file may have hundreds. Of thousands of clips each stage

@@ -30,7 +30,7 @@ def snapped_rate(frame_time: float) -> float:
 
     Otherwise the inverse of the frame time.
     """
-    rate = 1.0 / frame_time
+    rate = 1.0 / float(frame_time)
     nearest = min((max(1.0, float(round(rate))), *BROADCAST_RATES), key=lambda c: abs(c - rate))
     return nearest if abs(nearest - rate) <= RATE_TOLERANCE * nearest else rate
 

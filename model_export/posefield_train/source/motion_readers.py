@@ -55,7 +55,8 @@ def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
             "begins that of the motion",
         )
     skeleton = acclaim.read_asf(data_folder.beside(place, found[0]))
-    clip = acclaim.to_clip(skeleton, acclaim.read_amc(place, skeleton), metres_per_unit=1.0, rate=1)
+    motion = acclaim.read_amc(place, skeleton)
+    clip = acclaim.to_clip(skeleton, motion, metres_per_unit=1.0, rate=1)
     note = f"{place.name}: read with the skeleton {found[0]}"
     return MotionFile(
         str(place),
@@ -65,7 +66,7 @@ def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
         clip.translations,
         options.rate,
         "source.rate",
-        notes=(note,),
+        notes=(note, *skeleton.notes, *motion.notes),
     )
 
 

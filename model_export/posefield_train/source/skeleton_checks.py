@@ -10,6 +10,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
+from posefield.roles import joint_recognition
 from posefield_train.source.facing import Facing, FacingError, find_facing, turn_basis
 
 STATIC = 1e-6
@@ -228,6 +229,48 @@ def _distances(offsets: Floats, one: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(np.sum(np.square(offsets - one), axis=-1), axis=-1)))
 
 
+ADULT_LEG = 0.86
+"""Length of the bones from hip to foot of an adult, m."""
+OTHER_UNIT = 2.1
+"""Least ratio of the legs of two bodies with the same joints that are in different units: legs of a
+child and an adult differ by less, any two units by more."""
+SMALLEST_BODY, LARGEST_BODY = 0.02, 20.0
+"""Lengths of all bones together beyond which a body without legs is doubted, m."""
+
+
+def leg_length(joints: Skeleton, roles: Mapping[str, str], bones: Floats) -> float | None:
+    """Return the mean length of the legs, from hip to foot; None without their roles.
+
+    roles: joints by role. bones (J,): length of the bone that leads to each joint.
+    """
+    known = []
+    for side in ("left", "right"):
+        if not {f"{side}UpperLeg", f"{side}Foot"} <= roles.keys():
+            continue
+        top, joint = (joints.names.index(roles[side + end]) for end in ("UpperLeg", "Foot"))
+        length = 0.0
+        while joint > top:
+            length += float(bones[joint])
+            joint = joints.parents[joint]
+        known += [length] if joint == top and length else []
+    return float(np.mean(known)) if known else None
+
+
+def size_notes(joints: Skeleton, bones: Floats) -> list[str]:
+    """Return a note on a body that is far from a person's size, as in a wrong unit.
+
+    bones (J,): length of the bone that leads to each joint, m.
+    """
+    guesses = joint_recognition.recognise(joints.names, joints.parents)
+    leg = leg_length(joints, joint_recognition.sure_roles(guesses), bones)
+    doubt = "is source.metres_per_unit right?"
+    if leg is not None and not ADULT_LEG / OTHER_UNIT < leg < ADULT_LEG * OTHER_UNIT:
+        return [f"the legs are {leg:.3g} m long, of an adult about {ADULT_LEG} m: {doubt}"]
+    if leg is None and len(joints) > 1 and not SMALLEST_BODY < bones.sum() < LARGEST_BODY:
+        return [f"the bones are {bones.sum():.3g} m long together: {doubt}"]
+    return []
+
+
 class RigError(ValueError):
     """A skeleton that cannot be trained; clip: index of a clip that shows it."""
 
@@ -275,6 +318,7 @@ def normalize(
                 "bones with a length",
                 index,
             )
+    notes += size_notes(clips[0].skeleton, np.linalg.norm(np.median(offsets, axis=0), axis=-1))
     stretch = None if stretches else find_stretch(clips)
     if stretch:
         raise RigError(stretch.sentence(clips[0].skeleton), stretch.clip)
