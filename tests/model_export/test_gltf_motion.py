@@ -228,6 +228,8 @@ def keyed(times):
         (b'{"asset": {"version": "1.0"}}', "'1.0' of glTF, expected 2.0"),
         (b'{"asset": {"version": "2.0"}, "nodes": 3}', "breaks its format"),
         (edited(animations=[]), "no animation, a skeleton or mesh without motion"),
+        (edited(nodes=arm(translation=[1e400, 0, 0])), "node 0 has numbers that are not finite"),
+        (edited(scene=1e400), "not glTF: cannot convert float infinity"),
         (compressed(), "buffer view 1 requires the extension EXT_meshopt_compression"),
         (swinging(GltfFile([{"name": "box"}])), "'box' without a skeleton"),
         (two_skeletons(), r"2 skeletons \(a, c\), expected one"),

@@ -8,9 +8,11 @@ import usd_files
 from gltf_files import GltfFile, arm
 from pxr import Sdf, UsdSkel, Vt
 
+from posefield.common.errors import MotionFileError
 from posefield.motion import quat
 from posefield.motion.skeleton import positions
 from posefield_train.source import motion_readers
+from posefield_train.source.motion_file import ReadOptions
 
 FRAMES = 13
 TIMES = np.arange(FRAMES) / 30.0
@@ -24,7 +26,7 @@ def places(file):
     return positions(file.skeleton.parents, file.rotations, file.translations)
 
 
-SKIN = {"joints": [0, 1]}
+SKIN, HILT = {"joints": [0, 1]}, {"joints": [2, 3]}
 
 
 def swing(*curves, nodes=(), skins=(SKIN,), turn=SWING, **facts):
@@ -63,7 +65,7 @@ GROWING = (1.0 + TIMES)[:, None] * ONES
         (swing(linear(0, "scale", ONES), linear(1, "scale", ONES)), None),
         (swing(linear(1, "scale", GROWING)), "scale of lower left out: no joint follows it"),
         (swing(linear(0, "scale", ONES * [-1, -1, 1]), turn=TURNED), None),
-        (swing(nodes=ODD, skins=({"joints": [2, 3]}, SKIN)), "read: hilt left out"),
+        (swing(nodes=ODD, skins=(HILT, SKIN)), "read: hilt left out"),
         (two(), "'walk' moves the skeleton: 'pose' left out"),
         (with_faces(), r"curves \(jawOpen, smile\) are no joints"),
         (swing(extensionsRequired=["KHR_draco_mesh_compression", "KHR_node_visibility"]), None),
@@ -88,6 +90,20 @@ def test_weights_of_morph_targets_are_curves(tmp_path):
     (tmp_path / "a.glb").write_bytes(with_faces().glb())
     found = motion_readers.read(tmp_path / "a.glb").curves
     assert np.allclose(found["jawOpen"], TIMES) and np.allclose(found["smile"], 1.0 - TIMES)
+
+
+def test_one_of_two_moving_skeletons_is_named(tmp_path):
+    file = swing(linear(2, "rotation", SWING[:, [1, 2, 3, 0]]), nodes=ODD, skins=(HILT, SKIN))
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    for name in ("hilt", "tip"):
+        found = motion_readers.read(tmp_path / "a.glb", ReadOptions(skeleton=name))
+        assert found.skeleton.names == ("hilt", "tip")
+    for name, said in ((None, r"2 skeletons \(hilt, upper\), expected one"), ("x", "2 skeletons")):
+        with pytest.raises(MotionFileError, match=said):
+            motion_readers.read(tmp_path / "a.glb", ReadOptions(skeleton=name))
+    (tmp_path / "b.glb").write_bytes(swing().glb())
+    with pytest.raises(MotionFileError, match="found the skeleton 'upper', expected 'x'"):
+        motion_readers.read(tmp_path / "b.glb", ReadOptions(skeleton="x"))
 
 
 def stage(path):
@@ -117,6 +133,10 @@ def second_animation(made):
 
 def missing_look(made):
     made.DefinePrim("/Looks").GetReferences().AddReference("none.usda")
+
+
+def missing_layer(made):
+    made.GetRootLayer().subLayerPaths.append("none.usda")
 
 
 def narrow(made):
@@ -158,6 +178,7 @@ def instances(made):
         (no_poses, "no restTransforms: the first frame was taken"),
         (only_rotations, "no translations and scales: those at rest were taken"),
         (second_animation, "/Root/Anim moves /Root/Skel: /Root/Run left out"),
+        (missing_layer, "/ refers to what cannot be read, which was left out.*none.usda"),
         (missing_look, "/Looks refers to what cannot be read, which was left out.*none.usda"),
         (narrow, "time codes 2 to 5: all samples, 0 to 12, were read"),
         (second_skeleton, None),

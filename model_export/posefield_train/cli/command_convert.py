@@ -32,6 +32,10 @@ class SourceArguments:
         str | None,
         typer.Option(help="animation of a file that holds several, by name or USD path"),
     ] = None
+    skeleton: Annotated[
+        str | None,
+        typer.Option(help="skeleton of a file that moves several, by name, path or a joint"),
+    ] = None
     unit: Annotated[
         float | None,
         typer.Option(
@@ -77,7 +81,7 @@ def convert(
     for name, value in (("unit", source.unit), ("rate", source.rate)):
         if value is not None and not 0.0 < value < float("inf"):
             raise InvalidField(name, f"{value}, expected a positive number")
-    options = ReadOptions(source.rate, source.animation)
+    options = ReadOptions(source.rate, source.animation, source.skeleton)
     said = Conventions(source.unit, source.up, options, source.blender)
     found = converted_file.convert(source.file, said)
     atomic_files.write(found.content, output)

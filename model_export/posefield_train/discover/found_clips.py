@@ -173,7 +173,7 @@ def read_roles(path: Path) -> dict[str, str]:
     """
     content = data_folder.read(path, MOST_ROLES_BYTES, "a TOML file with roles")
     try:
-        found = tomllib.loads(content.decode())
+        found = tomllib.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as fault:
         raise FileError(path, f"not TOML: {fault}") from fault
     roles = found.get("roles")

@@ -218,6 +218,9 @@ def read_takes(
         said = f"such as {first[0]}: {first[1]}" if first else "it has no motion files"
         raise FileError(folder, f"no take that can be searched; {said}")
     figures = {body.take.file: body.figure for body in kept}
+    for file, figure in figures.items():
+        if figure.file.notes:
+            notes[file] = [*figure.file.notes, *notes.get(file, [])]
     return ReadTakes(tuple(takes), refused, notes, figures)
 
 

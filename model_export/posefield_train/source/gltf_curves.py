@@ -101,7 +101,7 @@ def _track(document: GltfDocument, sampler: Any, part: str) -> Track:
         values = values[:, [3, 0, 1, 2]]
     kind = sampler.interpolation or "LINEAR"
     if kind not in ("LINEAR", "STEP", "CUBICSPLINE"):
-        raise document.error(f"found interpolation {kind!r}, expected one of glTF 2.0")
+        raise document.error(f"found interpolation {str(kind)[:20]!r}, expected one of glTF 2.0")
     parts = 3 if kind == "CUBICSPLINE" else 1
     count = parts * len(times)
     if part == "weights" and len(values) % count == 0:

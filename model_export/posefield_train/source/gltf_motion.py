@@ -29,7 +29,8 @@ def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> M
     without one chosen, and for keys that are no frames.
     """
     # pygltflib checks no types, so that wrong ones are found where they are used.
-    with rest_joints.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
+    wrong = TypeError, AttributeError, LookupError, ValueError, ArithmeticError
+    with rest_joints.naming_faults(source, *wrong):
         return _read(content, source, beside, options)
 
 
@@ -37,7 +38,8 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
     document = gltf_document.load(content, source, beside)
     name, animation, notes = _chosen(document, options.animation)
     curves = gltf_curves.tracks(document, animation)
-    joints = _joints(document, curves)
+    joints = _joints(document, curves, options.skeleton)
+    motion_file.expect_skeleton(source, joints.tree, options)
     moving = {*joints.nodes, *joints.outer}
     tracks = {key: own for key, own in curves.items() if key[0] in moving and key[1] in PARTS}
     if not tracks:
@@ -122,19 +124,19 @@ def _is_moving(_: GltfDocument, curves: Tracks) -> bool:
 
 
 def _is_of_person(document: GltfDocument, curves: Tracks) -> bool:
-    joints = _joints(document, curves)
+    joints = _joints(document, curves, None)
     return joint_recognition.is_person(joints.tree.names, joints.tree.parents)
 
 
-def _joints(document: GltfDocument, curves: Tracks) -> GltfJoints:
-    """Return the joints that curves move."""
+def _joints(document: GltfDocument, curves: Tracks, wanted: str | None) -> GltfJoints:
+    """Return the joints that curves move, or those with a name that is wanted."""
     groups = gltf_rig.skeletons(document)
     animated = {node for node, part in curves if part in PARTS}
     found = next((own for own in _moved(document, groups, curves, animated) if own), [])
     if not found:
         return _animated_tree(document, animated)
     trees = [gltf_rig.joint_tree(document, own) for own in found]
-    own = found[rest_joints.one_skeleton(document.source, trees, set())]
+    own = found[rest_joints.one_skeleton(document.source, trees, {wanted or ""})]
     return gltf_rig.joints_of(document, own, [other for other in groups if other is not own])
 
 

@@ -12,6 +12,7 @@ from posefield.common.errors import MotionFileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
+from posefield.rigs.rest_joints import JointTree
 
 BROADCAST_RATES = tuple(1000.0 * base / 1001.0 for base in (24, 30, 60, 120))
 RATE_TOLERANCE = 1e-4
@@ -124,11 +125,13 @@ class MotionFile:
 class ReadOptions:
     """Settings of a recipe for reading a file; None for those that it does not have.
 
-    rate: source.rate, frames a second. animation: name of one of several in the file.
+    rate: source.rate, frames a second. animation: name of one of several in the file. skeleton:
+    the same, or the name of one of its joints.
     """
 
     rate: float | None = None
     animation: str | None = None
+    skeleton: str | None = None
 
 
 AS_STATED = ReadOptions()
@@ -141,6 +144,14 @@ def choice(names: Sequence[str], wanted: str) -> int | None:
         return names.index(wanted)
     number = int(wanted) if wanted.isdecimal() else 0
     return number - 1 if 1 <= number <= len(names) else None
+
+
+def expect_skeleton(source: str, tree: JointTree, options: ReadOptions) -> None:
+    """Raise MotionFileError for another skeleton than the one that is wanted."""
+    if options.skeleton not in (None, tree.label, *tree.names):
+        raise MotionFileError(
+            source, f"found the skeleton {tree.label!r}, expected {options.skeleton!r}"
+        )
 
 
 def curve_notes(curves: Mapping[str, Floats]) -> list[str]:

@@ -287,7 +287,7 @@ def read(path: Path) -> Recipe:
     """Return the recipe of a TOML file; RecipeError names the invalid key."""
     content = data_folder.read(path, MAX_BYTES, "a recipe")
     try:
-        text = content.decode()
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise RecipeError(path, f"not UTF-8 text: {fault}") from fault
     # tomllib takes quadratic time in the parts of a key: 40 s for a key of MAX_BYTES.

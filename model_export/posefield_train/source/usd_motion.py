@@ -129,7 +129,7 @@ def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
 
 def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     opened = usd_rig.open_stage(path, source)
-    motion, notes = _chosen(opened, options.animation)
+    motion, notes = _chosen(opened, options)
     notes += opened.notes(motion.prim, motion.animation.GetPrim())
     codes = motion.sample_codes()
     pace = _codes_per_second(opened, notes)
@@ -148,6 +148,7 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     # The samples themselves, where the rate is theirs.
     exact = (codes if options.rate is None else found.times * pace).tolist()
     tree, rest, moved, said = motion.posed_joints(exact)
+    motion_file.expect_skeleton(source, tree, options)
     skeleton, rotations, places, more = rest_joints.plain_motion(source, tree, rest, moved)
     curves, stage = motion.curves(exact), opened.stage
     begin, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
@@ -173,7 +174,7 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     )
 
 
-def _chosen(opened: SkelStage, wanted: str | None) -> tuple[SkelMotion, list[str]]:
+def _chosen(opened: SkelStage, options: ReadOptions) -> tuple[SkelMotion, list[str]]:
     """Return the skeleton with the animation that is wanted, or that it is bound to; and notes."""
     skeletons = opened.prims(UsdSkel.Skeleton)
     animations = opened.prims(UsdSkel.Animation)
@@ -185,7 +186,7 @@ def _chosen(opened: SkelStage, wanted: str | None) -> tuple[SkelMotion, list[str
             f"found the skeleton {skeletons[0].GetPath()} without a SkelAnimation, expected one"
         )
     bound = {prim: _bound_animation(opened, prim) for prim in skeletons}
-    found = _animations(opened, animations, wanted)
+    found = _animations(opened, animations, options.animation)
     if len(found) > 1:
         found = [own for own in found if own.GetPath() in bound.values()] or found
     if len(found) > 1:
@@ -200,10 +201,12 @@ def _chosen(opened: SkelStage, wanted: str | None) -> tuple[SkelMotion, list[str
         )
     tokens = UsdSkel.Animation(found[0]).GetJointsAttr().Get() or ()
     named = {str(token).rpartition("/")[2] for token in tokens}
-    prim, notes = opened.skeleton(owners or skeletons, set() if owners else named)
+    prim, notes = opened.skeleton(
+        owners or skeletons, {options.skeleton or ""} if owners else named
+    )
     animation = next((own for own in found if own.GetPath() == bound[prim]), found[0])
     others = [str(own.GetPath()) for own in animations if own != animation]
-    if wanted is None and others:
+    if options.animation is None and others:
         said = f"{animation.GetPath()} moves {prim.GetPath()}: {', '.join(others[:SHOWN])} left out"
         notes.append(said)
     own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))

@@ -106,7 +106,7 @@ def read_roles(path: Path) -> dict[str, str]:
     if len(content) > MOST_ROLES_BYTES:
         raise FileError(path, f"{len(content)} bytes, expected at most {MOST_ROLES_BYTES}")
     try:
-        found = tomllib.loads(content.decode())
+        found = tomllib.loads(content.decode("utf-8-sig"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as fault:
         raise FileError(path, f"no TOML: {fault}") from fault
     roles = found.get("roles")

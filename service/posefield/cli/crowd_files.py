@@ -1,5 +1,6 @@
 """The `crowd` command: writes a walking crowd of a model to a file and reports on it."""
 
+import codecs
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -78,7 +79,7 @@ def routes(path: Path) -> Sequence[Route]:
 
 def _read_json(path: Path) -> Any:
     try:
-        return orjson.loads(path.read_bytes())
+        return orjson.loads(path.read_bytes().removeprefix(codecs.BOM_UTF8))
     except OSError as fault:
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
     except orjson.JSONDecodeError as fault:

@@ -19,8 +19,8 @@ from posefield.common.units import Floats
 
 IGNORED_EXTENSIONS = (
     *("KHR_mesh_quantization", "KHR_materials", "KHR_texture", "EXT_texture", "KHR_lights"),
-    *("EXT_lights", "KHR_xmp", "KHR_node_", "MSFT_lod", "EXT_mesh_", "KHR_draco", "KHR_audio"),
-    *("KHR_physics", "MSFT_physics", "OMI_", "VRM", "KHR_implicit_shapes"),
+    *("EXT_lights", "KHR_xmp", "KHR_node_", "MSFT_", "EXT_mesh_", "KHR_draco", "KHR_audio"),
+    *("KHR_physics", "KHR_collision", "KHR_rigid", "KHR_implicit_shapes", "OMI_", "MOZ_", "VRM"),
 )
 """Beginnings of required extensions that leave joints and animations as they are, or are read."""
 
@@ -134,7 +134,7 @@ def load(content: bytes, source: str, beside: Beside) -> GltfDocument:
             is_binary = content[:4] == b"glTF"
             read = form.load_from_bytes if is_binary else form.gltf_from_json
             parts = read(content if is_binary else content.decode())
-        except (ValueError, RecursionError, OSError, struct.error) as fault:
+        except (ValueError, RecursionError, OSError, ArithmeticError, struct.error) as fault:
             raise MotionFileError(source, f"not glTF: {fault}") from fault
     version = str(parts.asset.version)
     if version.partition(".")[0] != "2":
@@ -168,7 +168,7 @@ def numbers(document: GltfDocument, index: int, kind: str) -> Floats:
     document.expect_plain(f"accessor {index}", accessor)
     if accessor.type != kind or accessor.componentType not in COMPONENTS:
         raise document.error(
-            f"accessor {index} has type {accessor.type} of {accessor.componentType}, "
+            f"accessor {index} has type {str(accessor.type)[:9]} of {accessor.componentType}, "
             f"expected {kind}"
         )
     dtype, width = np.dtype(COMPONENTS[accessor.componentType]).newbyteorder("<"), WIDTHS[kind]

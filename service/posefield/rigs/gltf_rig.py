@@ -32,6 +32,9 @@ class GltfJoints:
 def node_transform(document: GltfDocument, index: int) -> Transform:
     """Return the transform of a node; MotionFileError for a matrix that skews or mirrors."""
     node = document.parts.nodes[index]
+    stated = (node.matrix, node.rotation, node.translation, node.scale)
+    if not np.all(np.isfinite([number for own in stated for number in own or ()])):
+        raise document.error(f"node {index} has numbers that are not finite")
     if node.matrix is not None and list(node.matrix) != np.eye(4).ravel().tolist():
         return rest_joints.of_matrix(np.array(node.matrix, float).reshape(4, 4), f"node {index}")
     x, y, z, w = map(float, node.rotation or (0, 0, 0, 1))

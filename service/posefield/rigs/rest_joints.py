@@ -153,6 +153,8 @@ def plain_motion(
     Raises MotionFileError for a scale that is animated, uneven or mirrored, but at the end of a
     chain, where no joint follows it.
     """
+    if not all(np.all(np.isfinite(own)) for own in (*rest, *motion)):
+        raise MotionFileError(source, "has transforms that are not finite, expected numbers")
     sizes, notes = _constant_scales(source, joints, motion.scale)
     # Products (J,) of the scales of each joint's ancestors.
     above = np.ones(len(sizes))
@@ -211,7 +213,7 @@ def one_skeleton(source: str, trees: Sequence[JointTree], named: Set[str]) -> in
     """Return the index of the skeleton with named joints or legs; MotionFileError for several."""
     found = list(range(len(trees)))
     if len(found) > 1:
-        found = [own for own in found if not named.isdisjoint(trees[own].names)] or found
+        found = [own for own in found if named & {trees[own].label, *trees[own].names}] or found
     if len(found) > 1:
         is_person = joint_recognition.is_person
         found = [own for own in found if is_person(*trees[own][1:])] or found
@@ -219,7 +221,8 @@ def one_skeleton(source: str, trees: Sequence[JointTree], named: Set[str]) -> in
         labels = ", ".join(trees[index].label for index in found[:20])
         raise MotionFileError(
             source,
-            f"found {len(found)} skeletons ({labels}), expected one: export each character alone",
+            f"found {len(found)} skeletons ({labels}), expected one: export each character alone, "
+            "or name one by --skeleton of convert, its joints by --roles for --character",
         )
     return found[0]
 

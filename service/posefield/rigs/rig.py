@@ -217,7 +217,7 @@ def read_rig(path: Path, roles: Mapping[str, str] = NONE_STATED) -> Rig:
         raise MotionFileError(path, f"cannot be read: {fault.strerror}") from fault
     named, prim = {name.rpartition("/")[2] for name in roles.values()}, ""
     with rest_joints.naming_faults(
-        source, RuntimeError, TypeError, AttributeError, LookupError, ValueError
+        source, RuntimeError, ArithmeticError, TypeError, AttributeError, LookupError, ValueError
     ):
         # usd-core takes 0.12 s to import, pygltflib 0.1 s.
         if suffix in USD_SUFFIXES:

@@ -44,7 +44,9 @@ class SkelStage:
         found, needed = [], [prim.GetPath() for prim in prims]
         for fault in self.stage.GetCompositionErrors():
             site, said = fault.rootSite.path, " ".join(str(fault).split())[:200]
-            if any(path.HasPrefix(site) or site.HasPrefix(path) for path in needed):
+            # A layer as a whole has the root's path.
+            is_part = any(path.HasPrefix(site) or site.HasPrefix(path) for path in needed)
+            if is_part and not site.IsAbsoluteRootPath():
                 raise self.error(f"refers to what cannot be read: {said}")
             found.append(f"{site} refers to what cannot be read, which was left out: {said}")
         return found
