@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rigid_takes
 
 from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer, quat
@@ -298,3 +299,24 @@ def test_the_example_of_landmarks_is_a_recipe_and_a_table(tmp_path, clip, writte
     for name in re.findall(r"bvh/\S+\.bvh", blocks["csv"]):
         written(clip, name)
     assert [row.landmarks for row in clip_table.read(own, tmp_path)] == [(84,), (113,), (76,)]
+
+
+def test_init_proposes_the_controls_of_clips_of_a_body(posefield, tmp_path):
+    """Raises of the right arm to six heights: the draft trains once its licence is stated."""
+    for seed in range(6):
+        take = rigid_takes.clip("F", seed)
+        raised = replace(take, rotations=take.rotations[:110], translations=take.translations[:110])
+        (tmp_path / f"{seed}.bvh").write_bytes(bvh_writer.dumps(raised, metres_per_unit=0.01))
+    code, out, err = posefield("init", tmp_path)
+    assert code == 0 and "complete the licence (TODO)" in out and "discover" not in err
+    path = tmp_path / "recipe.toml"
+    path.write_text(path.read_text().replace('licence = ""', 'licence = "CC0-1.0"'))
+    names = [control.name for control in recipe.read(path).controls]
+    assert any(name.startswith("right_hand") for name in names)
+    assert posefield("train", path, "-o", tmp_path / "m.onnx")[0] == 0
+
+
+def test_init_of_long_takes_names_the_search_for_clips(posefield, tmp_path):
+    rigid_takes.write_takes(tmp_path)
+    code, _, err = posefield("init", tmp_path)
+    assert code == 0 and f"posefield discover {tmp_path} finds clips in long takes" in err

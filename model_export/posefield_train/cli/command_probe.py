@@ -1,12 +1,13 @@
 """Commands `posefield probe` and `posefield init`: proposals for a recipe from motion files."""
 
+import statistics
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from posefield.common import atomic_files
-from posefield.common.errors import FileError, InvalidField
+from posefield.common.errors import FileError, InvalidField, MotionError
 from posefield.console.options import Json
 from posefield.console.output import as_json
 from posefield_train.cli import output_files
@@ -51,7 +52,8 @@ def init(
 ) -> None:
     """Write a recipe and a table for a folder of motion files.
 
-    Complete recipe.toml where it says TODO, then train it. No file is overwritten.
+    Complete recipe.toml where it says TODO, then train it. Controls and an event are proposed for
+    clips of a known body that have no table. No file is overwritten.
     """
     from posefield_train.probe import recipe_draft
     from posefield_train.source import motion_readers
@@ -73,9 +75,41 @@ def init(
     if known is None:
         written.insert(0, folder / recipe_draft.TABLE)
         atomic_files.write(recipe_draft.table_text(report, folder).encode(), written[0])
-    draft = recipe_draft.recipe_text(report, folder.resolve().name, known)
+    proposed = _proposed(report, folder) if known is None else []
+    draft = recipe_draft.recipe_text(report, folder.resolve().name, known, proposed)
     atomic_files.write(draft.encode(), recipe)
-    _tell(report, written, json)
+    _tell(report, written, "the licence" if proposed else "the licence and the controls", json)
+
+
+LONG = 12.0
+"""Median seconds of files from which on they are rather takes than clips."""
+
+
+def _proposed(report: "ProbeReport", folder: Path) -> list[str]:
+    """Return the lines of the proposed event and controls; none where nothing can be proposed."""
+    from posefield_train.families import recipe_folder
+    from posefield_train.families.found_families import FamilyRow
+
+    seconds = statistics.median(file.seconds or 0.0 for file in report.files)
+    if seconds > LONG:
+        typer.echo(
+            f"the files are {seconds:.0f} s long in the median: posefield discover {folder} finds "
+            "clips in long takes, and strides with --strides",
+            err=True,
+        )
+    names = [Path(file.path).relative_to(folder).as_posix() for file in report.files]
+    rows = [
+        FamilyRow(name, 0, file.frames - 1, "", name)
+        for name, file in zip(names, report.files, strict=True)
+    ]
+    facts = recipe_folder.RecipeFacts("draft", "Draft", "not stated yet", report, labelled=False)
+    text = recipe_folder.recipe_text(facts, recipe_folder.PLACEHOLDER)
+    try:
+        proposal = recipe_folder.propose(text, "draft", rows, folder, report.roles)
+    except (MotionError, ValueError, KeyError):
+        # Bodies without roles, clips that are no family: the draft has places for controls.
+        return []
+    return recipe_folder.proposal_lines(proposal, report.roles)
 
 
 def _probe(files: list[Path]) -> "ProbeReport":
@@ -94,7 +128,7 @@ def _refuse_existing(path: Path) -> None:
         raise FileError(path, f"exists already, and is not overwritten{hint}")
 
 
-def _tell(report: "ProbeReport", written: list[Path], json: bool) -> None:
+def _tell(report: "ProbeReport", written: list[Path], todo: str, json: bool) -> None:
     """Print the files that were written, and what has to be completed."""
     from posefield_train.probe import probe_report
 
@@ -103,6 +137,6 @@ def _tell(report: "ProbeReport", written: list[Path], json: bool) -> None:
         return
     typer.echo("\n".join(probe_report.summary(report)))
     typer.echo(
-        f"wrote {' and '.join(map(str, written))}: complete the licence and the controls (TODO), "
+        f"wrote {' and '.join(map(str, written))}: complete {todo} (TODO), "
         f"then: posefield train {written[-1]} -o model.onnx"
     )

@@ -28,12 +28,13 @@ def propose(
     name: str,
     rows: Sequence[FamilyRow],
     data: Path,
+    roles: dict[str, str],
     known: MotionFiles | None = None,
 ) -> ControlProposal:
     """Return the proposed controls of a family.
 
     text: of a recipe with any control. name: of its table without the ending. data: folder of the
-    takes. known: files that were read before. Raises RecipeError, BvhError or TrainingError for
+    takes. roles: joints by role. known: files that were read before. Raises MotionError for
     clips that cannot be read as one family, and ValueError for those that no control can be
     proposed for.
     """
@@ -43,9 +44,18 @@ def propose(
         (place / f"{name}.toml").write_text(text, encoding="utf-8")
         own = recipe.read(place / f"{name}.toml")
         examples, _ = ingest.ingest(own, data, known)
-    found = control_proposals.propose_controls(_family_clips(own, examples))
-    if not found.controls:
-        raise ValueError("no measure of the clips predicts those of takes that are left out")
+        found = control_proposals.propose_controls(_family_clips(own, examples))
+        if not found.controls:
+            raise ValueError("no measure of the clips predicts those of takes that are left out")
+        if found.event is None:
+            return found
+        # A moment at the start or the end of a clip is refused as an event.
+        lines = proposal_lines(found, roles)
+        (place / f"{name}.toml").write_text(with_proposal(text, lines), encoding="utf-8")
+        try:
+            ingest.ingest(recipe.read(place / f"{name}.toml"), data, known)
+        except MotionError:
+            return replace(found, event=None)
     return found
 
 
@@ -189,6 +199,8 @@ def proposal_lines(proposal: ControlProposal, roles: dict[str, str]) -> list[str
             words = re.sub(r"([A-Z])", r" \1", control.role).lower()
             moment = MOMENTS[control.at]
             description = DIRECTIONS[control.quantity].format(f"the {words}", moment)
+        if control.role and words.endswith("s"):
+            description = description.replace(" it is ", " they are ").replace(" is ", " are ")
         lines += [f"description = {quote(description)}", ""]
     if proposal.event is not None:
         role, moment = proposal.event
@@ -259,7 +271,7 @@ def offer(
         draft = replace(facts, licence="not stated yet")
         text = recipe_text(draft, PLACEHOLDER)
         try:
-            proposal = propose(text, facts.name, family.rows, data, known)
+            proposal = propose(text, facts.name, family.rows, data, facts.report.roles, known)
         except (MotionError, ValueError) as fault:
             refused.append(replace(family, reasons=(str(fault),)))
             continue

@@ -226,7 +226,7 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     draft = re.sub('^licence = ""$', 'licence = "not stated yet"', text, count=1, flags=re.M)
     name = recipe_folder.family_name(first)
     try:
-        found = recipe_folder.propose(draft, name, own.rows[first], own.data)
+        found = recipe_folder.propose(draft, name, own.rows[first], own.data, into["roles"])
     except (MotionError, ValueError) as fault:
         said = f"the clips of {first} and those merged into it make no family: {fault}"
         raise InvalidField("merge", said) from fault

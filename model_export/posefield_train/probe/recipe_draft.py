@@ -34,19 +34,22 @@ def table_text(report: ProbeReport, folder: Path) -> str:
     return lines.getvalue()
 
 
-def recipe_text(report: ProbeReport, name: str, table: ClipTable | None) -> str:
+def recipe_text(
+    report: ProbeReport, name: str, table: ClipTable | None, proposed: Sequence[str] = ()
+) -> str:
     """Return a recipe to be completed.
 
     name: of the folder. table: a table that exists already; None for that of `table_text`.
+    proposed: lines of the event and the controls; none for places where to write them.
     """
+    controls = [*proposed, ""] if proposed else [*_controls(report, table), *_event(report, table)]
     return "\n".join(
         [
             *_head(name),
             *source_lines(report),
             *_clips(table),
-            *_controls(report, table),
+            *controls,
             *motion_lines(report),
-            *_event(report, table),
             *role_lines(report),
             "[size]",
             "rms_budget_cm = 1.0",
