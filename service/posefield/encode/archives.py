@@ -66,7 +66,9 @@ def zip_chunks(members: Iterable[ZipMember]) -> Iterator[bytes]:
         # No flags, method 0 (stored).
         name = member.name.encode("ascii")
         common = (0, 0, TIME, DATE, member.crc, member.size, member.size, len(name))
-        padding = _padding(at + LOCAL_HEADER.size + len(name))
+        # An extra field, of four bytes or more, that ends at a multiple of the alignment.
+        length = -(at + LOCAL_HEADER.size + len(name) + 4) % ALIGNMENT
+        padding = struct.pack("<2H", PADDING_ID, length) + bytes(length)
         local = LOCAL_HEADER.pack(b"PK\3\4", VERSION, *common, len(padding)) + name + padding
         index.append(_central_entry(common, at, name))
         yield local
@@ -75,12 +77,6 @@ def zip_chunks(members: Iterable[ZipMember]) -> Iterator[bytes]:
     central = b"".join(index)
     yield central
     yield _end_of_directory(len(index), len(central), at)
-
-
-def _padding(before: int) -> bytes:
-    """Return an extra field, of four bytes or more, that ends at a multiple of the alignment."""
-    length = -(before + 4) % ALIGNMENT
-    return struct.pack("<2H", PADDING_ID, length) + bytes(length)
 
 
 def _central_entry(common: tuple[int, ...], at: int, name: bytes) -> bytes:
@@ -124,16 +120,12 @@ def tar(members: Members) -> Iterator[bytes]:
     Names too long for ustar have a pax record. Raises ValueError for a name that is not ASCII.
     """
     for name, content in members:
-        yield _tar_header(name, len(content))
+        member = tarfile.TarInfo(name.encode("ascii").decode())
+        member.size, member.mtime = len(content), MODIFICATION_TIME
+        yield member.tobuf(tarfile.PAX_FORMAT)
         yield content
         yield bytes(-len(content) % tarfile.BLOCKSIZE)
     yield END_BLOCKS
-
-
-def _tar_header(name: str, size: int) -> bytes:
-    member = tarfile.TarInfo(name.encode("ascii").decode())
-    member.size, member.mtime = size, MODIFICATION_TIME
-    return member.tobuf(tarfile.PAX_FORMAT)
 
 
 def zip(members: Members) -> Iterator[bytes]:  # noqa: A001  # read as packs.zip

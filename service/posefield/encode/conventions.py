@@ -5,13 +5,11 @@ rotations of the rest pose remain the identity: (x, y, z) becomes (x, -z, y), wh
 Numbers other than -0 never become -0.
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
-from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, LengthUnit, Singles, UpAxis
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
@@ -57,25 +55,6 @@ class Convention:
 
 METRES = Convention(1.0, "y")
 CENTIMETRES = Convention(0.01, "y")
-
-
-def requested_convention(
-    unit: LengthUnit | None, up: UpAxis | None, body: BodyKind | None, usual: Convention
-) -> Convention:
-    """Return the requested convention; None is the default of the format."""
-    length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
-    return Convention(length, usual.up if up is None else up, usual.body if body is None else body)
-
-
-def check_convention(found: Convention, law: Convention, name: str) -> None:
-    """Raise InvalidField for a convention that a format does not allow."""
-    if found.metres_per_unit != law.metres_per_unit:
-        raise InvalidField(
-            "unit",
-            f"{found.metres_per_unit:g} m, expected {law.metres_per_unit:g} m: the law of {name}",
-        )
-    if found.up != law.up:
-        raise InvalidField("up", f"{found.up!r}, expected {law.up!r}: the law of {name}")
 
 
 Coordinates = TypeVar("Coordinates", Floats, Singles)
@@ -137,12 +116,3 @@ def convert_box(convention: Convention, corners: Floats) -> Floats:
     corners: m, with Y up.
     """
     return np.sort(convert_positions(convention, corners), axis=-2)
-
-
-def rounded_lengths(convention: Convention, lengths: Floats) -> Floats:
-    """Return lengths in the unit of a file, rounded to a tenth of a micrometre.
-
-    As decimals they are then short, and still near their float32 values.
-    """
-    decimals = 7 + math.floor(math.log10(convention.metres_per_unit))
-    return np.round(lengths, decimals) + 0.0

@@ -17,6 +17,7 @@ from posefield.encode.conventions import (
     CENTIMETRES,
     JSON,
     METRES,
+    METRES_PER_UNIT,
     MSGPACK,
     NPZ,
     Convention,
@@ -79,9 +80,14 @@ class ClipEncoder(Format):
                 f"{body!r}, expected none given: {self.extension} files carry no body, "
                 "usda, usdc, usdz and glb do",
             )
-        found = conventions.requested_convention(unit, up, body, self.usual)
-        if self.convention_fixed:
-            conventions.check_convention(found, self.usual, self.extension)
+        length = self.usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
+        found = Convention(length, up or self.usual.up, body or self.usual.body)
+        law = f"the law of {self.extension}"
+        if self.convention_fixed and length != self.usual.metres_per_unit:
+            expected = f"expected {self.usual.metres_per_unit:g} m"
+            raise InvalidField("unit", f"{length:g} m, {expected}: {law}")
+        if self.convention_fixed and found.up != self.usual.up:
+            raise InvalidField("up", f"{found.up!r}, expected {self.usual.up!r}: {law}")
         return found
 
     def noted(self, answer: ClipAnswer) -> ClipAnswer:

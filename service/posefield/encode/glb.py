@@ -22,12 +22,11 @@ import numpy.typing as npt
 import orjson
 
 from posefield.common.units import Floats, Singles
-from posefield.encode import conventions
 from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig, RestPose
-from posefield.encode.conventions import METRES, Convention
+from posefield.encode.conventions import Convention
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import CurveValues
@@ -284,11 +283,7 @@ MOST_NAME = 80
 
 
 def glb(answer: SampledClip, said: Convention) -> bytes:
-    """Return the glTF file of one clip, with the provenance in `asset.extras.posefield`.
-
-    Raises InvalidField for a convention other than metres with Y up.
-    """
-    conventions.check_convention(said, METRES, "glb")
+    """Return the glTF file of one clip, with the provenance in `asset.extras.posefield`."""
     store = GlbBuffer()
     rig, clip = character.rig_and_clip(answer.clip, said.body)
     resting = character.rest_pose(rig, clip.translations[:1])

@@ -5,7 +5,6 @@ import numpy as np
 import orjson
 import pytest
 
-from posefield.encode import conventions
 from posefield.encode.conventions import CENTIMETRES, METRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import skeleton
@@ -90,15 +89,15 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
 
 
 @pytest.mark.parametrize(
-    ("unit", "up", "usual", "meant"),
+    ("extension", "unit", "up", "meant"),
     [
-        (None, None, CENTIMETRES, CENTIMETRES),
-        ("m", None, CENTIMETRES, METRES),
-        ("cm", "z", METRES, STAGE),
+        ("bvh", None, None, CENTIMETRES),
+        ("bvh", "m", None, METRES),
+        ("usda", "cm", "z", STAGE),
     ],
 )
-def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):
-    assert conventions.requested_convention(unit, up, None, usual) == meant
+def test_what_is_not_asked_for_is_as_usual(extension, unit, up, meant):
+    assert CLIP_ENCODERS[extension].convention(unit, up) == meant
 
 
 @pytest.mark.parametrize("extension", CLIP_ENCODERS)

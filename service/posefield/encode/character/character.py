@@ -4,6 +4,7 @@ With a colon, hyphen, space or leading digit in a joint name some readers of USD
 whole skeleton; readers that identify joints by their leaf name alone merge joints with equal names.
 """
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -177,7 +178,7 @@ def _translation_matrices(convention: Convention, metres: Floats) -> Floats:
     """Return translation matrices (..., 4, 4) for row vectors, as in USD."""
     made = np.zeros((*metres.shape[:-1], 4, 4))
     made[...] = np.eye(4)
-    made[..., 3, :3] = conventions.rounded_lengths(
-        convention, conventions.convert_positions(convention, metres)
-    )
+    # To a tenth of a micrometre: short as decimals, and still near their float32 values.
+    decimals = 7 + math.floor(math.log10(convention.metres_per_unit))
+    made[..., 3, :3] = conventions.convert_positions(convention, metres).round(decimals) + 0.0
     return made

@@ -61,13 +61,20 @@ def _facts(grid: SigmaGrid) -> dict[str, Any]:
 
 def explanation(found: Explanation) -> dict[str, Any]:
     """Return the reasons in the schema Reasons of the API."""
+    backing = found.backing
     return {
         "model": found.model,
         "controls": found.controls,
         "performer": found.performer,
         **_labels(found.labels),
         "warnings": list(found.warnings),
-        "support": _support_facts(found.backing),
+        "support": {
+            "supported": backing.supported,
+            "beyond": {name: round(share, DECIMALS) for name, share in backing.beyond.items()},
+            "most_beyond": backing.most,
+            "variance": round(backing.variance, DECIMALS),
+            "most_variance": round(backing.limit, DECIMALS),
+        },
         "nearest": [_clip_facts(clip) for clip in found.nearest],
         "others": {
             "count": found.others,
@@ -88,16 +95,6 @@ def _clip_facts(clip: CapturedClip) -> dict[str, Any]:
 def _labels(labels: Mapping[str, Any]) -> dict[str, Any]:
     """Return labels by their key; nothing where there are none."""
     return {"labels": dict(labels)} if labels else {}
-
-
-def _support_facts(found: SupportReport) -> dict[str, Any]:
-    return {
-        "supported": found.supported,
-        "beyond": {name: round(share, DECIMALS) for name, share in found.beyond.items()},
-        "most_beyond": found.most,
-        "variance": round(found.variance, DECIMALS),
-        "most_variance": round(found.limit, DECIMALS),
-    }
 
 
 def explanation_text(found: Explanation) -> str:
@@ -146,13 +143,11 @@ def suggestions(found: Suggestions) -> dict[str, Any]:
         "performer": found.performer,
         **_labels(found.labels),
         "candidates": found.candidates,
-        "suggestions": [_suggestion_facts(each) for each in found.suggestions],
+        "suggestions": [
+            vars(own) | {n: round(getattr(own, n), DECIMALS) for n in ("gain", "variance", "gap")}
+            for own in found.suggestions
+        ],
     }
-
-
-def _suggestion_facts(found: Suggestion) -> dict[str, Any]:
-    rounded = {n: round(getattr(found, n), DECIMALS) for n in ("gain", "variance", "gap")}
-    return {**vars(found), **rounded}
 
 
 def suggestions_text(found: Suggestions) -> str:

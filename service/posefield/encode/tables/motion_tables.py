@@ -1,6 +1,5 @@
 """Clips, poses and crowds as plain arrays: JSON and tables, crowds with a row per character."""
 
-from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common import atomic_files
-from posefield.common.units import Floats, Singles
+from posefield.common.units import Floats
 from posefield.encode import conventions
 from posefield.encode.conventions import Convention
 from posefield.encode.tables import table as tables
@@ -169,33 +168,22 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
         np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
         for part in (*_MOTION_ARRAYS, *(["curves"] if crowd.curves else []))
     )
-    turned, moved = _world_motion(crowd, rotations, roots)
+    turns = crowd.placement.turns[:, None]
+    rotations[:, :, 0] = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
+    moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
+    named: dict[str, Any] = {"curve_names": np.array(crowd.curves)} if curves else {}
+    named |= {"curves": values for values in curves}
     content = BytesIO()
     np.savez(
         content,
-        rotations=turned,
-        root_position=moved,
+        rotations=rotations,
+        root_position=moved.astype(np.float32),
         bone_offsets=bones,
         rate=crowd.rate,
         joints=np.array(crowd.skeleton.names),
-        **_curve_arrays(crowd, curves),
+        **named,
     )
     atomic_files.write(content.getvalue(), path)
 
 
 _MOTION_ARRAYS = ("rotations", "root_position", "bone_offsets")
-
-
-def _curve_arrays(crowd: CrowdClip, curves: Sequence[Singles]) -> dict[str, Any]:
-    """Return the curves (N, F, C), if there are any, and their names."""
-    return {"curves": curves[0], "curve_names": np.array(crowd.curves)} if curves else {}
-
-
-def _world_motion(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:
-    """Return rotations and root positions of all characters in the world."""
-    turns = crowd.placement.turns[:, None]
-    own = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
-    moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
-    placed = rotations.copy()
-    placed[:, :, 0] = own
-    return placed, moved.astype(np.float32)

@@ -35,11 +35,6 @@ ROUNDING = 1e-6
 """Largest rounding of a time in the report, s."""
 
 
-def segment_name(index: int) -> str:
-    """Return the name of a segment's prim."""
-    return f"s{index:03}"
-
-
 def usda(answer: PerformanceAnswer, convention: Convention) -> bytes:
     """Return the layer as text."""
     text: str = _layer(answer, convention).ExportToString()
@@ -87,7 +82,7 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
 
 def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
     paths = arrays.rig.paths
-    prim = character_prims.animation(group, segment_name(index), paths, arrays.curves)
+    prim = character_prims.animation(group, f"s{index:03}", paths, arrays.curves)
     prim.customData = {layers.FACTS: layers.usd_dictionary(facts)}
     frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
     rows = slice(frames.start, frames.stop)

@@ -236,7 +236,8 @@ LEVEL_ATTRIBUTE = "posefield:level"
 def add_to_references(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
     """Add extents to a crowd of references to one prototype, and levels to its motions."""
     _placed_boxes(made, crowd, notes)
-    every = _enlarged_float32([note.box for note in notes])
+    boxes = np.array([note.box for note in notes])
+    every = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     with Sdf.ChangeBlock():
         for path in (PROTOTYPE, PROTOTYPE.AppendChild("Body")):
             _set_extent(made, path, every)
@@ -264,11 +265,6 @@ def _placed_boxes(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -
     whole = layers.float3_array(placed_box(crowd.placement, own))
     for path in (ROOT, CHARACTERS):
         _attribute(made, path.AppendProperty("extentsHint"), ValueTypes.Float3Array).default = whole
-
-
-def _enlarged_float32(boxes: Sequence[Floats]) -> Floats:
-    corners = np.array(boxes)
-    return np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
 
 def _set_extent(made: Any, prim: Any, box: Floats) -> None:

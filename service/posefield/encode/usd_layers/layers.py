@@ -2,7 +2,7 @@
 
 import errno
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, Self, TypeVar
@@ -313,10 +313,6 @@ def set_time_samples(prim: Any, values: Samples, first: int = 0) -> None:
     kinds = {"translations": Vt.Vec3fArray, "rotations": Vt.QuatfArray, WEIGHTS: Vt.FloatArray}
     for name, kind in kinds.items():
         if name in values:
-            _set_attribute_samples(prim, name, map(kind.FromNumpy, values[name]), first)
-
-
-def _set_attribute_samples(prim: Any, name: str, values: Iterable[Any], first: int) -> None:
-    layer, path = prim.layer, prim.path.AppendProperty(name)
-    for frame, value in enumerate(values, first):
-        layer.SetTimeSample(path, frame, value)
+            path = prim.path.AppendProperty(name)
+            for frame, value in enumerate(map(kind.FromNumpy, values[name]), first):
+                prim.layer.SetTimeSample(path, frame, value)
