@@ -171,8 +171,9 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
     turns = crowd.placement.turns[:, None]
     rotations[:, :, 0] = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
     moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
-    named: dict[str, Any] = {"curve_names": np.array(crowd.curves)} if curves else {}
-    named |= {"curves": values for values in curves}
+    named: dict[str, Any] = {}
+    if curves:
+        named = {"curves": curves[0], "curve_names": np.array(crowd.curves)}
     content = BytesIO()
     np.savez(
         content,
