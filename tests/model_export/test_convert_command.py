@@ -55,7 +55,7 @@ def test_the_unit_of_other_files_is_asked_for(posefield, tmp_path):
 def test_one_of_several_animations_is_written(posefield, tmp_path):
     (tmp_path / "a.glb").write_bytes(two_animations())
     words = ("convert", tmp_path / "a.glb", "-o", tmp_path / "a.bvh")
-    assert "2 animations ('left', 'ahead')" in posefield(*words)[2]
+    assert "2 animations (1 'left', 2 'ahead')" in posefield(*words)[2]
     assert posefield(*words, "--animation", "ahead")[0] == 0
     path = motion_readers.read(tmp_path / "a.bvh").translations[:, 0]
     assert np.abs(path[-1] - [0, 0, 100 * 59 / 30]).max() < 1e-3

@@ -158,7 +158,9 @@ def test_one_of_several_animations_is_chosen_by_name(read):
     for wanted in ("slide", "2"):
         found = read(file, animation=wanted)
         assert np.abs(found.translations[:, 0] - np.outer(TIMES, X)).max() < 1e-6
-    with pytest.raises(MotionFileError, match=r"2 animations \('walk', 'slide'\), expected one"):
+    with pytest.raises(
+        MotionFileError, match=r"2 animations \(1 'walk', 2 'slide'\), expected one"
+    ):
         read(file)
     with pytest.raises(MotionFileError, match="'walk', 'slide', expected one 'run'"):
         read(file, animation="run")

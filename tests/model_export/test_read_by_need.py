@@ -181,7 +181,7 @@ def instances(made):
         (missing_layer, "/ refers to what cannot be read, which was left out.*none.usda"),
         (missing_look, "/Looks refers to what cannot be read, which was left out.*none.usda"),
         (narrow, "time codes 2 to 5: all samples, 0 to 12, were read"),
-        (second_skeleton, None),
+        (second_skeleton, "skeleton /Root/Skel was read: /Prop/Skel left out"),
         (illegal, None),
         (smiling, r"curves \(smile\) are no joints"),
         (instances, None),

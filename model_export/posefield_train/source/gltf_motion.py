@@ -89,10 +89,10 @@ def _chosen(document: GltfDocument, wanted: str | None) -> tuple[str, Any, list[
         return names[chosen], animations[chosen], []
     found = _of_skeletons(document) if len(animations) > 1 else [0]
     if len(found) > 1:
-        listed = ", ".join(repr(names[index]) for index in found[:20])
+        listed = ", ".join(f"{index + 1} {names[index]!r}" for index in found[:20])
         raise document.error(
             f"found {len(found)} animations ({listed}), expected one: export each to a file of its "
-            "own, or give name or number from 1 of one in the column clips.animation"
+            "own, or give name or number of one (--animation, the column clips.animation)"
         )
     name = names[found[0]]
     others = [repr(other) for index, other in enumerate(names) if index != found[0]]
@@ -112,20 +112,14 @@ def _of_skeletons(document: GltfDocument) -> list[int]:
     for index, own in enumerate(animations):
         moved = {channel.target.node for channel in own.channels}
         found += [index] if moved & joints or (not joints and len(moved) > 1) else []
-    for fits in (_is_moving, _is_of_person):
-        if len(found) > 1:
-            curves = {index: gltf_curves.tracks(document, animations[index]) for index in found}
-            found = [index for index in found if fits(document, curves[index])] or found
+    if len(found) > 1:
+        curves = {index: gltf_curves.tracks(document, animations[index]) for index in found}
+        found = [index for index in found if _changing(curves[index])] or found
+    if len(found) > 1:
+        trees = {index: _joints(document, curves[index], None).tree for index in found}
+        is_person = joint_recognition.is_person
+        found = [index for index in found if is_person(*trees[index][1:])] or found
     return found or list(range(len(animations)))
-
-
-def _is_moving(_: GltfDocument, curves: Tracks) -> bool:
-    return bool(_changing(curves))
-
-
-def _is_of_person(document: GltfDocument, curves: Tracks) -> bool:
-    joints = _joints(document, curves, None)
-    return joint_recognition.is_person(joints.tree.names, joints.tree.parents)
 
 
 def _joints(document: GltfDocument, curves: Tracks, wanted: str | None) -> GltfJoints:

@@ -76,14 +76,9 @@ class SkelMotion(SkelJoints):
         if not known:
             raise self.opened.error(f"{self.path} moves no joint of {self.prim.GetPath()}")
         targets, columns = map(list, zip(*known, strict=True))
-        prim, parts, lacking = UsdSkel.Animation(self.animation.GetPrim()), [], []
-        attributes = {
-            "rotations": prim.GetRotationsAttr(),
-            "translations": prim.GetTranslationsAttr(),
-            "scales": prim.GetScalesAttr(),
-        }
-        for index, (name, attribute) in enumerate(attributes.items()):
-            values = [attribute.Get(code) for code in codes]
+        prim, parts, lacking = self.animation.GetPrim(), list[Floats](), list[str]()
+        for index, name in enumerate(("rotations", "translations", "scales")):
+            values = [prim.GetAttribute(name).Get(code) for code in codes]
             is_missing = values[0] is None
             if still is None and (is_missing or len(known) < len(order)):
                 raise self.opened.error(
@@ -197,7 +192,7 @@ def _chosen(opened: SkelStage, options: ReadOptions) -> tuple[SkelMotion, list[s
         listed = ", ".join(map(str, paths[:SHOWN]))
         raise opened.error(
             f"found {len(found)} animations ({listed}), expected one: export each to a file of its "
-            "own, or give path or number from 1 of one in the column clips.animation"
+            "own, or give path or number of one (--animation, the column clips.animation)"
         )
     tokens = UsdSkel.Animation(found[0]).GetJointsAttr().Get() or ()
     named = {str(token).rpartition("/")[2] for token in tokens}

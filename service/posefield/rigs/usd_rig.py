@@ -55,7 +55,8 @@ class SkelStage:
         """Return the one of some skeletons that has named joints or roles, and a note on others."""
         trees = list(map(joint_tree, prims))
         own = prims[rest_joints.one_skeleton(self.source, trees, named)]
-        others = ", ".join(str(prim.GetPath()) for prim in prims[:SHOWN] if prim != own)
+        skeletons = self.prims(UsdSkel.Skeleton)
+        others = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN] if prim != own)
         said = f"skeleton {own.GetPath()} was read: {others} left out"
         return own, [said] if others else []
 

@@ -90,6 +90,14 @@ def test_a_body_that_is_no_question_is_named(form, content, path, said):
     assert str(caught.value) == (f"{path}: {said}" if path else said)
 
 
+def test_a_byte_order_mark_is_left_out():
+    content = b'{"segments":[{"kind":"walk","model":"a","seconds":1}]}'
+    marked = "\ufeff".encode() + content
+    assert decode_question(PerformanceQuestion, marked) == decode_question(
+        PerformanceQuestion, content
+    )
+
+
 def test_whole_numbers_may_be_written_as_json_writes_them():
     for level in ("1", "1.0", "10e-1"):
         body = f'{{"controls":{{"a":1.0}},"level":{level}}}'.encode()
