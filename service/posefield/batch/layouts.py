@@ -15,6 +15,7 @@ from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
+from posefield.encode.character import extent
 from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles
@@ -127,10 +128,9 @@ def _animation_layers(answers: Sequence[ClipAnswer], convention: Convention) -> 
 
 def _clip_box(name: str, file: str, answer: ClipAnswer) -> ManifestEntry:
     """Return the corners, m, of a box that contains the character throughout a clip."""
-    from posefield.encode.usd import usd_library
-
-    entry = usd_library.library_entry(name, file, answer)
-    return {"low": entry.low, "high": entry.high}
+    clip = answer.clip
+    box = extent.pose_independent_box(clip.skeleton, clip.translations[0], clip.root_path)
+    return {"low": tuple(box[0].tolist()), "high": tuple(box[1].tolist())}
 
 
 def _library_stage(

@@ -59,16 +59,11 @@ class BvhLayout:
     clip: Clip
     metres_per_unit: float
 
-    @property
-    def skeleton(self) -> Skeleton:
-        """Return the clip's skeleton."""
-        return self.clip.skeleton
-
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Return the names of the joints, each one word."""
         return joint_roles.clean_names(
-            self.skeleton.names, lambda name: BLANKS.sub("_", name) or "_"
+            self.clip.skeleton.names, lambda name: BLANKS.sub("_", name) or "_"
         )
 
     @cached_property
@@ -88,7 +83,7 @@ class BvhLayout:
         """Return the lines of all joints, from the root to its closing brace."""
         lines: list[str] = []
         levels: list[int] = []
-        for joint, level in depth_first(self.skeleton):
+        for joint, level in depth_first(self.clip.skeleton):
             while levels and levels[-1] >= level:
                 lines.append("\t" * levels.pop() + "}")
             lines += ["\t" * level + line for line in self.joint_lines(joint)]
@@ -113,9 +108,9 @@ class BvhLayout:
 
     def end_sites(self, joint: int) -> list[Vector]:
         """Return the offsets of the joint's end sites; one of zero length for a bare leaf."""
-        sites = zip(self.skeleton.tip_joints, self.skeleton.tip_offsets, strict=True)
+        sites = zip(self.clip.skeleton.tip_joints, self.clip.skeleton.tip_offsets, strict=True)
         tips = [offset for owner, offset in sites if owner == joint]
-        return tips if tips or joint in self.skeleton.parents else [np.zeros(3)]
+        return tips if tips or joint in self.clip.skeleton.parents else [np.zeros(3)]
 
     def format_lengths(self, metres: Vector) -> str:
         """Return three lengths as text, in the unit of the file."""
@@ -133,7 +128,7 @@ class BvhLayout:
         angles = np.rad2deg(unwrap_euler(quat.to_euler(self.clip.rotations, AXES)))
         lengths = self.clip.translations / self.metres_per_unit
         blocks = []
-        for joint, _ in depth_first(self.skeleton):
+        for joint, _ in depth_first(self.clip.skeleton):
             blocks += [lengths[:, joint]] if self.has_position_channels[joint] else []
             blocks.append(angles[:, joint])
         return format_numbers(np.concatenate(blocks, axis=1), self.decimals)

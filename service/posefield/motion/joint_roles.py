@@ -113,8 +113,9 @@ def clean_names(names: Iterable[str], clean: Callable[[str], str]) -> tuple[str,
     return tuple(n if n in taken else free_name(clean(n), taken, counts) for n in given)
 
 
-def free_name(name: str, taken: set[str], counts: Counter[str]) -> str:
+def free_name(name: str, taken: set[str], counts: Counter[str] | None = None) -> str:
     """Return a name that is not taken; counts: the last ending tried, by name."""
+    counts = Counter() if counts is None else counts
     while True:
         counts[name] += 1
         found = name if counts[name] == 1 else f"{name}_{counts[name]}"

@@ -3,7 +3,6 @@
 Bob, sway and lean stay in the hips, and no other joint moves in the world.
 """
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,7 @@ SAME_POSE = 1e-4
 
 def with_root(joints: Skeleton) -> Skeleton:
     """Return the skeleton with a root bone at the origin, above the hips."""
-    name = joint_roles.free_name("root", set(joints.names), Counter())
+    name = joint_roles.free_name("root", set(joints.names))
     return Skeleton(
         (name, *joints.names),
         (-1, *(parent + 1 for parent in joints.parents)),

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
+from posefield.encode.character import extent
 from posefield.encode.conventions import Convention
 from posefield.encode.formats import CENTIMETRES, METRES
 from posefield.encode.usd import usd_clip, usd_library
@@ -35,7 +36,10 @@ def build(folder, answers, convention=METRES, rate=30.0):
         file = f"clips/00@/{name}.usdc"
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_bytes(layer)
-        entries.append(usd_library.library_entry(name, file, answer))
+        clip = answer.clip
+        box = extent.pose_independent_box(clip.skeleton, clip.translations[0], clip.root_path)
+        ends = map(tuple, box.tolist())
+        entries.append(usd_library.LibraryEntry(name, file, len(clip), clip.rate, *ends))
     path = folder / "character.usd"
     path.write_bytes(usd_library.library_stage(conftest.person(), convention, rate, entries))
     return path

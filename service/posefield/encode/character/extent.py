@@ -83,7 +83,11 @@ def bounding_boxes(tree: PointTree, moves: AnimationSamples, balls: Floats) -> F
 
     balls (M, P): radii about joints and tips, m. The boxes of the motions are independent.
     """
-    found = [_point_boxes(tree, part) for part in moves.parts(FRAMES_AT_ONCE)]
+    found = []
+    for part in moves.parts(FRAMES_AT_ONCE):
+        places = _point_positions(tree, part)
+        ends = (np.minimum, np.maximum)
+        found.append(np.stack([e.reduceat(places, part.starts[:-1], axis=-1) for e in ends]))
     (low, high), radii = np.concatenate(found, axis=-1), balls.T[tree.order]
     return enlarged_box((low - radii).min(axis=1).T, (high + radii).max(axis=1).T)
 
@@ -131,13 +135,6 @@ def _as_slice(places: PointIndices) -> PointIndices | slice:
     return slice(first, first + count) if np.all(np.diff(places) == 1) else places
 
 
-def _point_boxes(tree: PointTree, moves: AnimationSamples) -> Singles:
-    """Return the lowest and highest position (2, 3, P, M) of each point."""
-    places = _point_positions(tree, moves)
-    low = np.minimum.reduceat(places, moves.starts[:-1], axis=-1)
-    return np.stack([low, np.maximum.reduceat(places, moves.starts[:-1], axis=-1)])
-
-
 def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     """Return the positions (3, P, N) of points in the tree's order, m.
 
@@ -147,7 +144,10 @@ def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     in the arrays.
     """
     turns = _joint_rotations(tree, moves)
-    arms = np.repeat(_parent_offsets(tree, moves.offsets), np.diff(moves.starts), axis=-1)
+    # Offsets of points from their parents, as x y z x y, m.
+    tips = np.broadcast_to(tree.tips.astype(np.float32), (len(moves), *tree.tips.shape))
+    arms = np.concatenate([moves.offsets, tips], axis=1)[:, tree.order].transpose(2, 1, 0)
+    arms = np.repeat(arms[[0, 1, 2, 0, 1]], np.diff(moves.starts), axis=-1)
     if moves.hips is not None:
         arms[:, np.flatnonzero(tree.order == 1)[0]] = moves.hips.T[[0, 1, 2, 0, 1]]
     places = np.empty((3, *arms.shape[1:]), np.float32)
@@ -179,13 +179,6 @@ def _joint_rotations(tree: PointTree, moves: AnimationSamples) -> Singles:
         made[:3, :, first:last], made[5, :, first:last] = turning[:3], turning[3]
     made[3:5] = made[:2]
     return made
-
-
-def _parent_offsets(tree: PointTree, offsets: Singles) -> Singles:
-    """Return the offsets (5, P, M) of points from their parents, as x y z x y, m."""
-    tips = np.broadcast_to(tree.tips.astype(np.float32), (len(offsets), *tree.tips.shape))
-    arms = np.concatenate([offsets, tips], axis=1)[:, tree.order]
-    return arms.transpose(2, 1, 0)[[0, 1, 2, 0, 1]]
 
 
 def _multiply_quaternions(a: Singles, b: Singles) -> None:

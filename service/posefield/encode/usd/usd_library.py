@@ -21,13 +21,11 @@ from pxr import Sdf
 from posefield.common.units import Floats
 from posefield.encode import conventions
 from posefield.encode.character import character
-from posefield.encode.character import extent as reach
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import layers
 from posefield.motion.skeleton import Skeleton
-from posefield.question.results import SampledClip
 
 ROOT = Sdf.Path("/Character")
 CLIPS = ROOT.AppendChild("Clips")
@@ -49,15 +47,6 @@ class LibraryEntry:
     rate: float
     low: Corner
     high: Corner
-
-
-def library_entry(name: str, file: str, answer: SampledClip) -> LibraryEntry:
-    """Return the entry of a result; its box holds for any rotations of the joints."""
-    clip = answer.clip
-    low, high = reach.pose_independent_box(
-        clip.skeleton, clip.translations[0], clip.root_path
-    ).tolist()
-    return LibraryEntry(name, file, len(clip), clip.rate, tuple(low), tuple(high))
 
 
 def library_stage(

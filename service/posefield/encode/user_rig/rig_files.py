@@ -18,7 +18,7 @@ from posefield.encode.formats import ClipEncoder
 from posefield.encode.glb import GlbBuffer
 from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
-from posefield.motion import quat, root_bone
+from posefield.motion import joint_roles, quat, root_bone
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import BodyKind, ClipQuestion
 from posefield.question.performance_question import PerformanceQuestion
@@ -64,15 +64,9 @@ def _nodes(rest: RestJoints) -> dict[str, Any]:
     root = 0
     if outer:
         root = len(nodes)
-        nodes.append({"name": _free_name(rest.names), **outer, "children": [0]})
+        name = joint_roles.free_name(OUTER, set(rest.names))
+        nodes.append({"name": name, **outer, "children": [0]})
     return {"scenes": [{"nodes": [root]}], "nodes": nodes}
-
-
-def _free_name(taken: tuple[str, ...]) -> str:
-    found = OUTER
-    while found in taken:
-        found += "_"
-    return found
 
 
 def _outer_node(rest: RestJoints) -> dict[str, Any]:

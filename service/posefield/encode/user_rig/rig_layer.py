@@ -24,7 +24,7 @@ from posefield.encode.usd_layers import layers
 from posefield.encode.usd_layers.layers import ValueTypes
 from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
-from posefield.motion import quat
+from posefield.motion import joint_roles, quat
 from posefield.question.results import SampledClip
 from posefield.rigs import usd_rig
 from posefield.rigs.rest_joints import RestJoints
@@ -58,21 +58,12 @@ def read_stage(path: Path, skeleton: str, joints: tuple[str, ...]) -> RigStage:
     return RigStage(
         skeleton,
         str(skel_root.GetPath()),
-        f"{root.GetPath()}/{_free_name(root)}",
+        f"{root.GetPath()}/{joint_roles.free_name(ANIMATION, set(root.GetAllChildrenNames()))}",
         joints,
         np.array(to_root, float),
         _radii(UsdSkel.Skeleton(prim), skel_root, joints),
         tuple(_lost_targets(root)),
     )
-
-
-def _free_name(root: Any) -> str:
-    """Return a name that no child of the root prim has."""
-    taken, found, count = set(root.GetAllChildrenNames()), ANIMATION, 1
-    while found in taken:
-        count += 1
-        found = f"{ANIMATION}_{count}"
-    return found
 
 
 def _radii(skeleton: Any, skel_root: Any, joints: tuple[str, ...]) -> Floats:
