@@ -177,7 +177,10 @@ def archive_members(order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
         cancellation.check()
         answer, content = order.file(own)
         lines += manifest_line(manifest_entry(own.name, own.file, content, answer))
+        # Not in memory while the next one is made.
+        del answer
         yield own.file, content
+        del content
     yield MANIFEST, bytes(lines)
 
 

@@ -44,6 +44,8 @@ def bvh(answer: SampledClip, convention: Convention) -> bytes:
 
 
 A = TypeVar("A", contravariant=True)
+WORKING = 165
+"""Largest number of bytes of memory of a joint in a frame while a file is made."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +54,16 @@ class ClipEncoder(Format):
 
     write: returns the files of several results, in their order; those of one model and length are
     computed together. bytes_per_joint: largest number of bytes of a joint in a frame, without the
-    parts that all frames share. usual: the format's default convention, which its readers expect.
-    convention_fixed: whether the format allows no other convention. inline_limit: number of frames
-    up to which a file is written in a millisecond or two, so that other requests may wait for it.
-    has_body, has_curves: whether the format carries a body and curves.
+    parts that all frames share. working: the same of memory, measured for long performances. usual:
+    the format's default convention, which its readers expect. convention_fixed: whether the format
+    allows no other convention. inline_limit: number of frames up to which a file is written in a
+    millisecond or two, so that other requests may wait for it. has_body, has_curves: whether the
+    format carries a body and curves.
     """
 
     write: Callable[[Sequence[SampledClip], Convention], list[bytes]]
     bytes_per_joint: int
+    working: int = WORKING
     usual: Convention = METRES
     convention_fixed: bool = False
     inline_limit: int = 200
@@ -118,9 +122,19 @@ def left_out(curves: Sequence[str], extension: str) -> str:
     )
 
 
-def max_poses(size: int, joints: int, per_joint: int, curves: int = 0) -> int:
-    """Return how many poses fit in `size` bytes; the root position counts as a joint."""
-    return size // ((joints + 1 + math.ceil(curves / CURVES_PER_JOINT)) * per_joint)
+ANSWER_MEMORY = 480_000_000
+"""Bytes for making one answer; a process with shipped models takes 200 MB beside it."""
+
+
+def max_poses(
+    size: int, joints: int, encoder: "ClipEncoder | TableEncoder[Any]", curves: int = 0
+) -> int:
+    """Return how many poses fit in a file of `size` bytes and in the memory for making it.
+
+    The root position counts as a joint.
+    """
+    parts = joints + 1 + math.ceil(curves / CURVES_PER_JOINT)
+    return min(size // encoder.bytes_per_joint, ANSWER_MEMORY // encoder.working) // parts
 
 
 def sequential_writer(
@@ -165,7 +179,7 @@ def _lazy_usd_writer(name: str) -> Callable[[Sequence[SampledClip], Convention],
 CLIP_ENCODERS = by_extension(
     # usd-core takes milliseconds, and tens of them for the first template of a binary layer.
     ClipEncoder(
-        "usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0, has_body=True
+        "usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, 290, inline_limit=0, has_body=True
     ),
     # Unlike those of usda and usdz, not registered with IANA, but in common use.
     ClipEncoder(
@@ -174,9 +188,9 @@ CLIP_ENCODERS = by_extension(
     ClipEncoder(
         "usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0, has_body=True
     ),
-    ClipEncoder("json", JSON, sequential_writer(motion_tables.clip_json), 96),
+    ClipEncoder("json", JSON, sequential_writer(motion_tables.clip_json), 96, 180),
     ClipEncoder(
-        "bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES, has_curves=False
+        "bvh", "application/x-bvh", sequential_writer(bvh), 72, 360, CENTIMETRES, has_curves=False
     ),
     ClipEncoder(
         "glb",
@@ -199,13 +213,14 @@ class TableEncoder(Format, Generic[A]):
     table: returns the table of a result. write: returns its bytes. inline_limit: number of poses or
     grid points up to which a result is computed and written in about a millisecond, so that other
     requests may wait for it. bytes_per_joint: largest number of bytes of a joint of a character.
-    most: largest number of characters.
+    working: the same of memory. most: largest number of characters.
     """
 
     table: Callable[[A], Table]
     write: Callable[[Table], bytes]
     inline_limit: int = 0
     bytes_per_joint: int = 40
+    working: int = WORKING
     most: float = math.inf
 
     def encode(self, answer: A) -> bytes:

@@ -72,7 +72,7 @@ def decode_order(
     if order is not None:
         _check_delivery(model, queries, order)
         joints = max(joints, order.joints)
-    sizes = joints, encoder.bytes_per_joint, len(card.curves)
+    sizes = joints, encoder, len(card.curves)
     within = max_poses(settings.output_limit, *sizes)
     prospects = _check_prospects(model, queries, min(within, MAX_POSES), settings.clips_poses)
     return ArchiveOrder(model, encoder, convention, queries, prospects, order)
@@ -174,7 +174,7 @@ async def validate(context: Clips, question: FileQuestion) -> ClipTask:
         convention = encoder.convention(question.unit, question.up, question.body)
     else:
         convention, joints = delivery.convention, max(joints, delivery.joints)
-    sizes = joints, encoder.bytes_per_joint, len(card.curves)
+    sizes = joints, encoder, len(card.curves)
     fits = max_poses(context.service.settings.output_limit, *sizes)
     corrected = not clip_batch.is_predicted(model, question)
     return ClipTask(question, min(fits, MAX_POSES), convention, corrected, delivery)
@@ -196,7 +196,7 @@ def _delivery(context: Clips, question: FileQuestion) -> Delivery | None:
 def places(context: Clips, task: ClipTask) -> AbstractAsyncContextManager[None]:
     """Return the limit on requests that the constraint solver answers."""
     long = task.corrected or task.delivery is not None
-    return worker_threads.SOLVER_LIMITER if long else nullcontext()
+    return worker_threads.SYNTHESIS_LIMITER if long else nullcontext()
 
 
 async def synthesise(context: Clips, task: ClipTask) -> SynthesisedClip:

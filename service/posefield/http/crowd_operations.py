@@ -306,7 +306,7 @@ async def limit_crowd(context: Crowds, content: bytes) -> CrowdTask:
     """Return the body with the limits of the settings and the format."""
     settings, encoder = context.service.settings, context.form
     card = context.model.session.card
-    sizes = len(card.skeleton), encoder.bytes_per_joint, len(card.curves)
+    sizes = len(card.skeleton), encoder, len(card.curves)
     fits = max_poses(settings.output_limit, *sizes)
     return CrowdTask(content, min(settings.crowd_limit, encoder.most, fits))
 

@@ -1,5 +1,6 @@
 """Steps of requests for performances: one motion through a script, and an archive of many."""
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
@@ -27,14 +28,17 @@ from posefield.http.api.problems import BAD_PARAMETER, RequestError
 from posefield.http.api.settings import Settings
 from posefield.http.steps import Context, Steps, query_pairs, unlimited
 from posefield.performance import composition
+from posefield.performance.passage import RATE
 from posefield.performance.script import Script, resolve_script
 from posefield.question import json_decoding
 from posefield.question.json_decoding import json_pointer
 from posefield.question.performance_question import (
+    Act,
     NamedScript,
     PerformanceLayout,
     PerformanceQuestion,
     PerformancesQuestion,
+    Walk,
 )
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.registry.model_registry import ModelRegistry
@@ -143,7 +147,7 @@ def _planned(
             convention = encoder.convention(question.unit, question.up, question.body)
             script = resolve_script(question, library.find)
             joints = max(len(script.character.skeleton), own_joints)
-            most = max_poses(settings.output_limit, joints, encoder.bytes_per_joint)
+            most = max_poses(settings.output_limit, joints, encoder)
             report = composition.plan(script, most)
         except QueryError as error:
             raise problems.nested_error(error, json_pointer("scripts", str(index))) from None
@@ -157,6 +161,10 @@ def _planned(
 
 
 MAX_SCRIPT_BYTES = 256 * 1024
+LONG_SECONDS = 60.0
+"""Duration at the rate of plans beyond which a performance takes tenths of a second and more."""
+ACT_SECONDS, SLOW_WALK = 5.0, 0.5
+"""Estimates of the duration of an act, s, and of the speed of a walk to a place, m/s."""
 PLAN_FORMAT = "json"
 
 Performances = Context[ClipEncoder]
@@ -241,7 +249,7 @@ async def validate(context: Performances, asked: ScriptRequest) -> PerformanceTa
     if order is not None:
         order.check(question, script.character.skeleton, script.character.roles)
         joints = max(joints, order.joints)
-    most = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
+    most = max_poses(context.service.settings.output_limit, joints, encoder)
     return PerformanceTask(script, asked.plan, most, convention, write, order)
 
 
@@ -268,8 +276,22 @@ def _encoder(form: ClipEncoder, layout: PerformanceLayout) -> PerformanceEncoder
 
 
 def places(context: Performances, task: PerformanceTask) -> AbstractAsyncContextManager[None]:
-    """Return the limit on requests that the constraint solver answers."""
-    return worker_threads.SOLVER_LIMITER
+    """Return the limit on short or on long performances, by an estimate of their frames."""
+    question = task.script.question
+    frames = max(question.fps, RATE) * _expected_seconds(question)
+    long = frames > LONG_SECONDS * RATE
+    return worker_threads.LONG_LIMITER if long else worker_threads.PERFORMANCE_LIMITER
+
+
+def _expected_seconds(question: PerformanceQuestion) -> float:
+    """Return a rough upper bound of the duration, s, that is known before it is planned."""
+    found, place = 0.0, question.start.position
+    for own in question.segments:
+        found += ACT_SECONDS if isinstance(own, Act) else own.seconds or 0.0
+        ways = [*(own.along or ()), *([own.to] if own.to else [])] if isinstance(own, Walk) else []
+        for point in ways:
+            found, place = found + math.dist(place, point) / SLOW_WALK, point
+    return found
 
 
 async def synthesise(

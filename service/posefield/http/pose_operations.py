@@ -38,7 +38,7 @@ async def validate(context: Poses, question: PoseQuestion) -> PoseTask:
     if question.targets:
         # Open controls are inferred from predictions of every captured clip, which takes time.
         asked = await worker_threads.run_in_thread(
-            poses.prepare, model, question, places=worker_threads.SOLVER_LIMITER
+            poses.prepare, model, question, places=worker_threads.POSE_LIMITER
         )
     else:
         asked = poses.prepare(model, question)
@@ -48,9 +48,7 @@ async def validate(context: Poses, question: PoseQuestion) -> PoseTask:
 
 def places(context: Poses, task: PoseTask) -> AbstractAsyncContextManager[None]:
     """Return the limit on requests that take a thread."""
-    if not task.apart:
-        return nullcontext()
-    return worker_threads.SOLVER_LIMITER if task.constraints else worker_threads.SYNTHESIS_LIMITER
+    return worker_threads.POSE_LIMITER if task.apart else nullcontext()
 
 
 async def synthesise(context: Poses, task: PoseTask) -> PoseAnswer[Any]:

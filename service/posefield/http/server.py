@@ -34,7 +34,7 @@ from uvicorn.supervisors.multiprocess import Process
 
 from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
-from posefield.http import metrics, telemetry
+from posefield.http import metrics, telemetry, worker_threads
 from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
 from posefield.http.readiness import Readiness
@@ -248,6 +248,7 @@ def open_models(
 def _application(
     shelf: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
 ) -> App:
+    sys.setswitchinterval(worker_threads.SWITCH_INTERVAL)
     lines = telemetry.to_standard_error() if settings.log == "on" else None
     beside = partial(lifespan, shelf=shelf, announcement=announcement)
     return create_app(

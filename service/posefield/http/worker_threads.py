@@ -19,14 +19,22 @@ Result = TypeVar("Result")
 Arguments = TypeVarTuple("Arguments")
 
 CORES = os.cpu_count() or 1
-SYNTHESIS_LIMITER = CapacityLimiter(CORES)
-"""Limit on threads for work of up to tenths of a second: long clips, lists of times, grids,
-compression. More threads than cores would delay the event loop several times as long (decision
-0030)."""
-SOLVER_LIMITER = CapacityLimiter(CORES)
-CROWD_LIMITER = CapacityLimiter(CORES)
-ARCHIVE_LIMITER = CapacityLimiter(CORES)
-"""Limits on threads for work of seconds, separate so that other work does not wait for it."""
+HALF = max(1, CORES // 2)
+POSE_LIMITER = CapacityLimiter(CORES)
+"""Limit on threads for poses that take milliseconds, which wait for no other work."""
+SYNTHESIS_LIMITER = CapacityLimiter(HALF)
+"""Limit on threads for work of up to tenths of a second: clips with targets or standing feet, long
+clips, grids, compression. More threads would delay the event loop and poses several times as long:
+each holds Python's lock in turn (decision 0030)."""
+PERFORMANCE_LIMITER = CapacityLimiter(HALF)
+LONG_LIMITER = CapacityLimiter(1)
+CROWD_LIMITER = CapacityLimiter(HALF)
+ARCHIVE_LIMITER = CapacityLimiter(HALF)
+"""Limits on threads for work of seconds, separate so that other work does not wait for it. Long
+performances are made one at a time: each may take all memory for answers."""
+SWITCH_INTERVAL = 0.001
+"""Seconds after which a thread lets others run Python, such as the event loop that answers poses;
+Python's default of 5 ms is that long for each thread before it."""
 
 # The limiters above count the threads; anyio's own limit must not apply.
 _UNBOUNDED = CapacityLimiter(math.inf)

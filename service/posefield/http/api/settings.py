@@ -29,7 +29,9 @@ class Settings:
     memory of the bodies of all open requests, beyond 64 KiB of each; 503 above it. url_limit: size
     of a URL. head_limit: size of all header lines, at most 100 of them. idle_time: time until an
     idle connection is closed. output_limit: size of a clip, of a performance, of a crowd's poses
-    and of a walking crowd, estimated before it is made.
+    and of a walking crowd, estimated before it is made. Independent of it, a clip or a performance
+    that would take more than 480 MB of memory to make is refused, so that a process stays below 700
+    MB.
 
     crowd_limit: characters of a crowd. crowd_poses: poses of all motions of a walking crowd.
     crowd_frames: frames of each motion of a walking crowd. clips_limit: clips of an archive.
