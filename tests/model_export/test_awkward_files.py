@@ -132,9 +132,9 @@ CASES = [
         "one file without end sites",
         family(without_end_sites),
         TRAIN,
-        ("end sites of Head, LeftHand: left out, since not all 4 clips have them",),
+        ("end sites Head_end, LeftHand_end: left out, since not all 4 clips have them",),
     ),
-    Case("BVH and GLB", mixed, TRAIN, ("end sites of Head, LeftHand: left out",)),
+    Case("BVH and GLB", mixed, TRAIN, ("end sites Head_end, LeftHand_end: left out",)),
     Case("siblings in another order", siblings_exchanged, TRAIN),
     Case(
         "one frame more than stated",

@@ -97,7 +97,7 @@ def _proposed(report: "ProbeReport", folder: Path) -> list[str]:
             "clips in long takes, and strides with --strides",
             err=True,
         )
-    names = [Path(file.path).relative_to(folder).as_posix() for file in report.files]
+    names = [Path(file.file).relative_to(folder).as_posix() for file in report.files]
     rows = [
         FamilyRow(name, 0, file.frames - 1, "", name)
         for name, file in zip(names, report.files, strict=True)

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ SHOWN_JOINTS, SHOWN_FAULTS = 40, 20
 class FileFacts:
     """Format, frames and rate of a motion file; rate None if it states none."""
 
-    path: str
+    file: str
     format: str
     frames: int
     fps: float | None
@@ -63,27 +63,11 @@ class ProbeReport:
     def facts(self) -> dict[str, Any]:
         """Return the report as JSON values."""
         return {
-            "files": [
-                {
-                    "file": one.path,
-                    "format": one.format,
-                    "frames": one.frames,
-                    "fps": one.fps,
-                    "seconds": one.seconds,
-                }
-                for one in self.files
-            ],
+            "files": [{**asdict(one), "seconds": one.seconds} for one in self.files],
             "joints": list(self.joints),
             "roles": self.roles,
-            "role_confidence": {
-                role: {
-                    "joint": guess.joint,
-                    "confidence": guess.confidence,
-                    "reasons": guess.reasons,
-                }
-                for role, guess in self.guesses.items()
-            },
-            "proposed": {name: found.facts() for name, found in self.proposed.items()},
+            "role_confidence": {role: asdict(guess) for role, guess in self.guesses.items()},
+            "proposed": {name: asdict(found) for name, found in self.proposed.items()},
             "warnings": list(self.warnings),
             "refused": self.refused,
         }

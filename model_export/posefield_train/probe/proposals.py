@@ -136,14 +136,6 @@ class Proposal:
     confidence: Confidence
     evidence: tuple[str, ...]
 
-    def facts(self) -> dict[str, Any]:
-        """Return the proposal as JSON values."""
-        return {
-            "value": self.value,
-            "confidence": self.confidence,
-            "evidence": list(self.evidence),
-        }
-
 
 def propose_unit(figures: Sequence[Figure]) -> Proposal:
     """Return the length of the files' unit in metres: as they state, else from the legs."""

@@ -29,7 +29,7 @@ def table_text(report: ProbeReport, folder: Path) -> str:
     writer = csv.writer(lines, lineterminator="\n")
     writer.writerow(OWN_COLUMNS)
     for one in report.files:
-        name = Path(one.path).relative_to(folder).as_posix()
+        name = Path(one.file).relative_to(folder).as_posix()
         writer.writerow([name, 0, one.frames - 1])
     return lines.getvalue()
 

@@ -119,30 +119,17 @@ def ordered_as(clip: Clip, names: Sequence[str]) -> Clip | None:
 
 def _with_common_sites(clips: Sequence[Clip]) -> tuple[list[Clip], list[str]]:
     """Return the clips of one tree with the end sites that all of them have, and a note."""
-    sites = [_numbered_sites(clip.skeleton) for clip in clips]
-    common = [site for site in sites[0] if all(site in other for other in sites)]
+    sites = [end_site_names(clip.skeleton) for clip in clips]
+    common = [name for name in sites[0] if name and all(name in others for others in sites)]
     found = []
-    for clip, numbered in zip(clips, sites, strict=True):
-        own, kept = clip.skeleton, [numbered[site] for site in common]
+    for clip, names in zip(clips, sites, strict=True):
+        own, kept = clip.skeleton, [names.index(name) for name in common]
         tips = tuple(own.tip_joints[at] for at in kept)
         skeleton = replace(own, tip_joints=tips, tip_offsets=own.tip_offsets[kept])
         found.append(replace(clip, skeleton=skeleton))
-    names = clips[0].skeleton.names
-    lost = sorted({joint for own in sites for joint, _ in own.keys() - set(common)})
-    if not lost:
-        return found, []
-    listed = ", ".join(names[joint] for joint in lost[:MAX_LISTED])
-    return found, [f"end sites of {listed}: left out, since not all {len(clips)} clips have them"]
-
-
-def _numbered_sites(joints: Skeleton) -> dict[tuple[int, int], int]:
-    """Return the index of each end site by its joint and its number there."""
-    counts: Counter[int] = Counter()
-    found = {}
-    for at, joint in enumerate(joints.tip_joints):
-        found[joint, counts[joint]] = at
-        counts[joint] += 1
-    return found
+    lost = sorted({name for names in sites for name in names} - {*common, ""})
+    said = f"{', '.join(lost[:MAX_LISTED])}: left out, since not all {len(clips)} clips have them"
+    return found, [f"end sites {said}"] if lost else []
 
 
 ENDING = "_end"

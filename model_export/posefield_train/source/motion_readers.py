@@ -1,6 +1,5 @@
-"""Readers of motion files by suffix, and the files of a run, each content read once."""
+"""Readers of motion files by suffix, and the files of a run, each read once."""
 
-import hashlib
 import shutil
 import tempfile
 from collections import OrderedDict
@@ -21,7 +20,6 @@ from posefield_train.source.motion_file import (
 
 MAX_GLTF_BYTES = 1_000_000_000
 """Limit of a glTF file or buffer: the project's own take 0.5 MB for a minute."""
-CHUNK_BYTES = 1_000_000
 
 Read = Callable[[FileLocation, ReadOptions], MotionFile]
 
@@ -189,26 +187,19 @@ def _files_with(folder: Path, suffixes: Container[str]) -> list[Path]:
 
 @dataclass
 class MotionFiles:
-    """Motion files of a run by place and content, each content read once.
+    """Motion files of a run by place, each read once.
 
     most_poses: frames times joints that are kept, the files asked for last; None keeps all files. A
     file that was dropped is read again.
     """
 
     most_poses: int | None = None
-    _kept: "OrderedDict[tuple[str, ...], MotionFile]" = field(default_factory=OrderedDict)
-    _digests: dict[str, str] = field(default_factory=dict)
+    _kept: "OrderedDict[tuple[str, ReadOptions], MotionFile]" = field(default_factory=OrderedDict)
     _poses: int = 0
 
     def read(self, place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
         """Return the motion of a file, as `read`."""
-        named, suffix = str(place), _suffix(place.name)
-        if named not in self._digests:
-            self._digests[named] = _digest(place)
-        # Other formats refer to files beside them, and are known by their place too.
-        alone = suffix in (".bvh", ".glb", ".usdz")
-        told = (str(options.rate), str(options.animation))
-        key = (suffix, self._digests[named], *told, "" if alone else named)
+        key = (str(place), options)
         found = self._kept.pop(key, None)
         if found is None:
             found = read(place, options)
@@ -219,15 +210,3 @@ class MotionFiles:
             _, oldest = self._kept.popitem(last=False)
             self._poses -= oldest.poses
         return found
-
-
-def _digest(place: FileLocation) -> str:
-    """Return the SHA-256 of a file's content; MotionFileError if it cannot be read."""
-    found = hashlib.sha256()
-    try:
-        with place.open("rb") as file:
-            while piece := file.read(CHUNK_BYTES):
-                found.update(piece)
-    except OSError as fault:
-        raise MotionFileError(str(place), f"cannot be read: {fault.strerror}") from fault
-    return found.hexdigest()

@@ -276,11 +276,9 @@ class Recipe(RecipePart):
 MAX_BYTES = 128_000
 """Size of a recipe; those of the project take 3 kB."""
 
-MAX_DOTS = 1_000
-"""Dots in one key: far more than MAX_DEPTH, and few enough to parse quickly."""
-
-MAX_DEPTH = 16
-"""Nesting depth of tables and arrays; a recipe needs five."""
+MAX_DOTS = 100
+"""Dots in one key, few enough to parse quickly."""
+TOO_DEEP = "tables or arrays nested too deep, expected at most five levels"
 
 
 def read(path: Path) -> Recipe:
@@ -294,19 +292,15 @@ def read(path: Path) -> Recipe:
     if any(line.partition("=")[0].count(".") > MAX_DOTS for line in text.splitlines()):
         raise RecipeError(path, TOO_DEEP)
     try:
-        found = tomllib.loads(text)
+        return Recipe.model_validate(tomllib.loads(text), context={"folder": path.parent})
+    except ValidationError as fault:
+        raise recipe_error(path, text, Recipe, fault) from fault
     except RecursionError as fault:
         raise RecipeError(path, TOO_DEEP) from fault
     except ValueError as fault:
         # ValueError covers TOMLDecodeError and int's error for a number of thousands of digits.
         line = re.search(r"at line (\d+)", str(fault))
         raise RecipeError(path, f"not TOML: {fault}", int(line[1]) if line else None) from fault
-    if _nesting_depth(found) > MAX_DEPTH:
-        raise RecipeError(path, TOO_DEEP)
-    try:
-        return Recipe.model_validate(found, context={"folder": path.parent})
-    except ValidationError as fault:
-        raise recipe_error(path, text, Recipe, fault) from fault
 
 
 def read_accepted(path: Path) -> Recipe:
@@ -319,20 +313,6 @@ def read_accepted(path: Path) -> Recipe:
             f"{path.parent} --accept NUMBER, or write accepted = true",
         )
     return found
-
-
-TOO_DEEP = f"tables or arrays nested deeper than {MAX_DEPTH} levels, expected at most that many"
-
-
-def _nesting_depth(found: dict[str, Any]) -> int:
-    """Return the nesting depth of tables and arrays, at most MAX_DEPTH + 1."""
-    inside: list[Any] = [found]
-    for level in range(MAX_DEPTH + 1):
-        if not inside:
-            return level
-        parts = (one.values() if isinstance(one, dict) else one for one in inside)
-        inside = [one for part in parts for one in part if isinstance(one, dict | list)]
-    return MAX_DEPTH + 1
 
 
 def json_schema() -> str:
