@@ -194,5 +194,7 @@ def test_the_skeleton_of_a_usd_file_is_read(tmp_path, change, note):
     found = motion_readers.read(tmp_path / "a.usda")
     assert np.abs(places(found)[:, 1] - HAND).max() < 1e-6
     assert_noted(found, note)
+    # Clients of the service read such notes of characters.
+    assert str(tmp_path) not in "".join(found.notes)
     if change is smiling:
         assert np.allclose(found.curves["smile"], 0.5 * CODES / FRAMES)

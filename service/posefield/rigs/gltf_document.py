@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,9 @@ IGNORED_EXTENSIONS = (
     *("KHR_physics", "KHR_collision", "KHR_rigid", "KHR_implicit_shapes", "OMI_", "MOZ_", "VRM"),
 )
 """Beginnings of required extensions that leave joints and animations as they are, or are read."""
+
+MAX_DEPTH = 2000
+"""Limit of nodes in one another, of which bones are at most half."""
 
 Beside = Callable[[str], bytes]
 """Function that returns the content of a file beside the document; MotionError if there is none."""
@@ -64,13 +66,15 @@ class GltfDocument:
                 if child in found or not 0 <= child < count:
                     raise self.error(f"node {child} is no child of one node, expected a tree")
                 found[child] = parent
+        ended: set[int] = set()
         for node in range(count):
-            seen, own = {node}, node
-            while own in found:
+            path, own = {node}, node
+            while own in found and own not in ended:
                 own = found[own]
-                if own in seen:
+                if own in path:
                     raise self.error(f"node {own} is its own ancestor, expected a tree")
-                seen.add(own)
+                path.add(own)
+            ended |= path
         return found
 
     def ancestors(self, node: int) -> list[int]:
@@ -78,6 +82,8 @@ class GltfDocument:
         found = [node]
         while found[-1] in self.above:
             found.append(self.above[found[-1]])
+            if len(found) > MAX_DEPTH:
+                raise self.error(f"node {node} lies below more than {MAX_DEPTH} others")
         return found
 
     def below(self, root: int) -> list[int]:
@@ -91,9 +97,11 @@ class GltfDocument:
 
     def common_ancestor(self, nodes: Iterable[int]) -> int | None:
         """Return the last node that is each of the nodes or an ancestor of it, if there is one."""
-        chains = [self.ancestors(node)[::-1] for node in nodes]
-        levels = takewhile(lambda level: len(set(level)) == 1, zip(*chains, strict=False))
-        return next((level[0] for level in reversed(list(levels))), None)
+        shared: list[int] | None = None
+        for own in map(self.ancestors, nodes):
+            among = set(own)
+            shared = own if shared is None else [node for node in shared if node in among]
+        return shared[0] if shared else None
 
     def node_name(self, node: int) -> str:
         """Return the name of a node for messages."""

@@ -82,10 +82,14 @@ def outer_transform(document: GltfDocument, outer: Sequence[int]) -> Transform:
 def skeletons(document: GltfDocument) -> list[list[int]]:
     """Return the joints, parents first, of the skeletons of skins, with the nodes between them."""
     groups: list[set[int]] = []
+    if len(document.parts.skins) > MAX_JOINTS:
+        raise document.error(f"found {len(document.parts.skins)} skins, expected {MAX_JOINTS}")
     for skin in document.parts.skins:
         own = set(skin.joints or ())
-        if not own or not own <= set(range(len(document.parts.nodes))):
-            raise document.error("found a skin without joints, expected some")
+        if not 0 < len(own) <= MAX_JOINTS or not own <= set(range(len(document.parts.nodes))):
+            raise document.error(
+                f"found a skin of {len(own)} joints, expected 1 to {MAX_JOINTS} of its nodes"
+            )
         tree = _between(document, own)
         joined = [group for group in groups if group & tree]
         groups = [group for group in groups if not group & tree] + [tree.union(*joined)]

@@ -42,8 +42,11 @@ class SkelStage:
         prims: skeleton and animation that are read.
         """
         found, needed = [], [prim.GetPath() for prim in prims]
+        # Clients of the service read the notes: they do not tell where the folder is.
+        folder = f"{Path(self.stage.GetRootLayer().realPath).parent}/"
         for fault in self.stage.GetCompositionErrors():
-            site, said = fault.rootSite.path, " ".join(str(fault).split())[:200]
+            site = fault.rootSite.path
+            said = " ".join(str(fault).replace(folder, "").split())[:200]
             # A layer as a whole has the root's path.
             is_part = any(path.HasPrefix(site) or site.HasPrefix(path) for path in needed)
             if is_part and not site.IsAbsoluteRootPath():
