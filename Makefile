@@ -44,11 +44,13 @@ $(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f)
 # The service's answer to `/docs`: Swagger UI as its package holds it, within one file of HTML.
 DOCS := service/posefield/http/pages/docs/index.html
 SWAGGER := clients/node_modules/swagger-ui-dist
-$(DOCS): $(NODE) clients/docs/index.html
+VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' service/posefield/__init__.py)
+$(DOCS): $(NODE) clients/docs/index.html service/posefield/__init__.py
 	mkdir -p $(@D)
 	cat $(addprefix $(SWAGGER)/,LICENSE NOTICE swagger-ui-bundle.js.LICENSE.txt) > $(@D)/LICENSES.txt
 	sed -e '/^.. swagger-ui.css/{r $(SWAGGER)/swagger-ui.css' -e 'd}' \
-		-e '/^.. swagger-ui-bundle.js/{r $(SWAGGER)/swagger-ui-bundle.js' -e 'd}' clients/docs/index.html > $@
+		-e '/^.. swagger-ui-bundle.js/{r $(SWAGGER)/swagger-ui-bundle.js' -e 'd}' \
+		-e 's/@VERSION@/$(VERSION)/' clients/docs/index.html > $@
 
 .PHONY: page
 page: $(PAGE) $(DOCS) ## build the pages that the service shows at / and /docs

@@ -211,9 +211,10 @@ export class Client {
     return this.#file(asked, `${model}.${as}`, options);
   }
 
-  /** The link to a clip's file, to be sent on. */
-  url(model: string, format: ClipFormat, question: ClipQuestion): string {
-    const path = link(under(model, `/clip.${format}`), question);
+  /** The link to the file of a clip or, without controls, of a crowd that walks. */
+  url(model: string, format: ClipFormat, question: ClipQuestion | WalkQuestion): string {
+    const kind = "controls" in question ? "clip" : "crowd";
+    const path = link(under(model, `/${kind}.${format}`), question);
     return (this.base || (globalThis.location?.origin ?? "")) + path;
   }
 

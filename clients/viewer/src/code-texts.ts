@@ -1,6 +1,6 @@
-/** A question for a clip as a link, and as text for curl and Python. */
+/** A question for a file as a link, and as text for curl and Python. */
 
-import { Client, type ClipFormat, type ClipQuestion } from "@posefield/client";
+import { Client, type ClipFormat, type ClipQuestion, type WalkQuestion } from "@posefield/client";
 
 /** A question, its model and its service. */
 export interface Wanted {
@@ -8,11 +8,16 @@ export interface Wanted {
   readonly base: string;
   readonly model: string;
   readonly format: ClipFormat;
-  readonly question: ClipQuestion;
+  /** For a clip or, without controls, for a crowd that walks. */
+  readonly question: ClipQuestion | WalkQuestion;
 }
 
-export const fileName = ({ model, format }: Wanted): string =>
-  `${model.replace(/[^A-Za-z0-9_-]/g, "_")}.${format}`;
+export function ofCrowd(question: Wanted["question"]): question is WalkQuestion {
+  return !("controls" in question);
+}
+
+export const fileName = (wanted: Wanted): string =>
+  `${ofCrowd(wanted.question) ? "crowd" : wanted.model.replace(/[^A-Za-z0-9_-]/g, "_")}.${wanted.format}`;
 
 export function link({ base, model, format, question }: Wanted): string {
   return new Client(base).url(model, format, question);
@@ -24,6 +29,7 @@ export function curl(wanted: Wanted): string {
 
 export function python(wanted: Wanted): string {
   const { base, model, question } = wanted;
+  const [name, method] = ofCrowd(question) ? ["crowd", "crowd_walk"] : ["clip", "clip"];
   const lines = Object.entries(question)
     .filter(([, value]) => value !== null && value !== undefined)
     .map(([name, value]) => `        ${name}=${literal(value)},`);
@@ -31,10 +37,10 @@ export function python(wanted: Wanted): string {
     "from posefield_client import Client",
     "",
     `with Client(${literal(base)}) as client:`,
-    `    clip = client.model(${literal(model)}).clip(`,
+    `    ${name} = client.model(${literal(model)}).${method}(`,
     ...lines,
     "    )",
-    `    clip.save(${literal(fileName(wanted))})`,
+    `    ${name}.save(${literal(fileName(wanted))})`,
     "",
   ].join("\n");
 }

@@ -27,7 +27,7 @@ export function mount(host: HTMLElement, session: Session): void {
   if (card.presets?.length) host.append(presets(card.presets, session));
   host.append(...sliders.map(([, slider]) => slider.element));
   const choose = (set: string, names: readonly string[], take: (name: string) => void) =>
-    chooser([["", `Unknown ${set}`], ...names.map((name) => [name, name] as const)], "", take);
+    chooser([["", `Unseen ${set}`], ...names.map((name) => [name, name] as const)], "", take);
   if (card.performers.length) {
     const list = choose("performer", card.performers, (name) =>
       store.set({ performer: name || null }),

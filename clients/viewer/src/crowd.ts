@@ -1,16 +1,6 @@
 /** The view of a crowd, coloured by level of detail, each character at the coarsest that does not show. */
 
-import {
-  BufferAttribute,
-  BufferGeometry,
-  Frustum,
-  Group,
-  LineBasicMaterial,
-  LineSegments,
-  Matrix4,
-  Sphere,
-  Vector3,
-} from "three";
+import { Frustum, GridHelper, Group, Matrix4, Sphere, Vector3 } from "three";
 
 import { CrowdDrawing } from "./crowd-drawing.ts";
 import { Crowd, fetchMotions, half, type Motions, TAKES } from "./crowd-motions.ts";
@@ -50,11 +40,11 @@ class CrowdView {
   #loading = false;
   #crowd: Crowd | null = null;
   #drawing: CrowdDrawing | null = null;
-  #ground: LineSegments<BufferGeometry, LineBasicMaterial> | null = null;
+  #ground: GridHelper | null = null;
   /** Camera of the view before. */
   #before: { position: Vector3; target: Vector3 } | null = null;
-  /** Since the last change of the numbers: its time, the frames, and milliseconds of own work. */
-  #read = { since: 0, frames: 0, spent: 0 };
+  /** Time of the last change of the numbers, and frames since then. */
+  #read = { since: 0, frames: 0 };
 
   constructor(host: HTMLElement, session: Session) {
     this.#session = session;
@@ -163,8 +153,7 @@ class CrowdView {
 
   #disposeDrawing(): void {
     this.#drawing?.dispose();
-    this.#ground?.geometry.dispose();
-    this.#ground?.material.dispose();
+    this.#ground?.dispose();
     this.#ground?.removeFromParent();
   }
 
@@ -209,30 +198,25 @@ class CrowdView {
   #showNumbers(begun: number, seen: number): void {
     const read = this.#read;
     read.frames++;
-    read.spent += performance.now() - begun;
     if (begun - read.since < 1000 * READING) return;
-    this.#panel.count(this.#crowd!.counts, seen);
-    if (this.#session.store.state.playing && read.since)
-      this.#panel.showTimes((begun - read.since) / read.frames, read.spent / read.frames);
-    this.#read = { since: begun, frames: 0, spent: 0 };
+    const playing = this.#session.store.state.playing && read.since;
+    const frame = playing ? (begun - read.since) / read.frames : null;
+    this.#panel.count(this.#crowd!.counts, seen, frame);
+    this.#read = { since: begun, frames: 0 };
   }
 }
 
-function ground(half: number): LineSegments<BufferGeometry, LineBasicMaterial> {
-  const ends: number[] = [];
-  const side = Math.ceil(half / GROUND) * GROUND;
-  for (let at = -side; at <= side; at += GROUND)
-    ends.push(at, 0, -side, at, 0, side, -side, 0, at, side, 0, at);
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(new Float32Array(ends), 3));
-  return new LineSegments(geometry, new LineBasicMaterial());
+function ground(half: number): GridHelper {
+  const lines = Math.ceil(half / GROUND);
+  const grid = new GridHelper(2 * lines * GROUND, 2 * lines);
+  grid.material.vertexColors = false;
+  return grid;
 }
 
 /** Settings of the crowd, and its counts and times. */
 class Panel {
   readonly #host = el("section", { class: "crowd", hidden: true, "aria-label": "Crowd" });
   readonly #status = el("p", { class: "about" });
-  readonly #time = el("p", { class: "about" });
   readonly #seen = el("p", { class: "about" });
   readonly #progress = el("progress", { max: 1, hidden: true, "aria-label": "Motions computed" });
   readonly #counts: readonly HTMLElement[];
@@ -263,7 +247,7 @@ class Panel {
       el("p", { class: "about" }, about),
       ...[this.#status, this.#progress, count, varied, limit],
       el("ul", {}, ...levels),
-      ...[this.#seen, this.#time],
+      this.#seen,
     );
     host.append(this.#host);
   }
@@ -282,17 +266,14 @@ class Panel {
     this.#progress.value = share ?? 0;
   }
 
-  count(counts: Int32Array, seen: number): void {
+  /** frame: milliseconds from a frame to the next; null where nothing moves. */
+  count(counts: Int32Array, seen: number, frame: number | null): void {
     this.#counts.forEach((element, level) => {
       element.textContent = String(counts[level]);
     });
-    this.#seen.textContent = `${seen} in view`;
-  }
-
-  /** Show the milliseconds from a frame to the next, and those of this page's own work in them. */
-  showTimes(frame: number, spent: number): void {
-    this.#host.dataset["frame"] = frame.toFixed(2);
-    this.#time.textContent = `${figure(frame)} ms a frame (${Math.round(1000 / frame)} a second); moving all: ${spent.toFixed(1)} ms`;
+    const rate = frame ? `, ${Math.round(1000 / frame)} frames a second` : "";
+    this.#seen.textContent = `${seen} in view${rate}`;
+    if (frame) this.#host.dataset["frame"] = frame.toFixed(2);
   }
 }
 

@@ -85,6 +85,27 @@ export function labelled(word: string, field: HTMLElement): HTMLDivElement {
   return el("div", { class: "field" }, el("label", { for: field.id }, word), field);
 }
 
+/** A field for a number; others than those of the range are not taken, nor fractions for step 1. */
+export function numberField(
+  word: string,
+  range: Readonly<Record<"min" | "max" | "step", number>>,
+  take: (value: number) => void,
+): HTMLElement & { set(value: number): void } {
+  const field = el("input", { type: "number", ...range });
+  let shown = 0;
+  field.addEventListener("change", () => {
+    const { rangeOverflow, rangeUnderflow, stepMismatch } = field.validity;
+    const wrong = rangeOverflow || rangeUnderflow || (range.step === 1 && stepMismatch);
+    if (field.value && !wrong) take(field.valueAsNumber);
+    else field.value = String(shown);
+  });
+  const set = (value: number) => {
+    shown = value;
+    if (field.valueAsNumber !== value) field.value = String(value);
+  };
+  return Object.assign(labelled(word, field), { set });
+}
+
 /** A list to choose from: values and their names. */
 export function chooser(
   options: readonly (readonly [string, string])[],

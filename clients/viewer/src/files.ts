@@ -1,12 +1,23 @@
-/** Downloads: the shown clip as a file, a video, and text that asks for the same. */
+/** Downloads: the shown clip or crowd as a file, a video, and text that asks for the same. */
 
-import { type ClipFormat, type ClipQuestion, PosefieldError } from "@posefield/client";
+import {
+  type ClipFormat,
+  type ClipQuestion,
+  type CrowdFormat,
+  PosefieldError,
+  type WalkQuestion,
+} from "@posefield/client";
 
-import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
-import { checkbox, chooser, el, labelled, saveFile, textButton } from "./dom.ts";
-import type { Control } from "./examples.ts";
+import { curl, fileName, link, ofCrowd, python, type Wanted } from "./code-texts.ts";
+import { checkbox, chooser, el, labelled, numberField, saveFile, textButton } from "./dom.ts";
 import type { Session } from "./player.ts";
-import { TAKE_AND_FEET, takeAndFeet, targetFields } from "./questions.ts";
+import {
+  LARGEST_SEED,
+  standsByDefault,
+  TAKE_AND_FEET,
+  takeAndFeet,
+  targetFields,
+} from "./questions.ts";
 import { type Changes, has, valuesOf } from "./state.ts";
 import { videoButton } from "./video.ts";
 import { figure, title } from "./written.ts";
@@ -20,6 +31,7 @@ export const FORMATS = [
   ["npz", "NumPy (.npz)"],
   ["json", "JSON (.json)"],
 ] as const;
+const CROWDS: readonly string[] = ["usdc", "usda", "usdz"] satisfies CrowdFormat[];
 const NAMES = [
   ["own", "as captured"],
   ["mixamo", "Mixamo"],
@@ -31,17 +43,18 @@ const BODY: ReadonlySet<string> = new Set(["leg_length", "stature"]);
 const DEFAULT = ["", "default"] as const;
 const UNITS = [DEFAULT, ["m", "metres"], ["cm", "centimetres"]] as const;
 const UPS = [DEFAULT, ["y", "Y"], ["z", "Z"]] as const;
-const TEXTS = { curl, python, link } as const;
-const TEXT_NAMES = [
-  ["curl", "curl"],
-  ["python", "Python"],
-  ["link", "Link"],
-] as const;
+const TEXTS = { curl, Python: python, Link: link } as const;
+
+const PATHS = "The seed decides the paths of the file, which are not those of the stage.";
+const STANDING = "There is no file of this crowd: this model does not walk.";
 
 /** Settings of this part; the rest of the question is as the page shows it. */
 interface Choice {
   format: ClipFormat;
   fps: number;
+  /** Of a crowd. */
+  seconds: number;
+  seed: number;
   loop: boolean;
   names: (typeof NAMES)[number][0];
   unit: (typeof UNITS)[number][0];
@@ -59,17 +72,25 @@ class Files {
   readonly #choice: Choice;
   readonly #get = textButton("", () => this.#getOrStop(), "act files-get");
   readonly #status = el("p", { class: "files-said", role: "status" });
+  readonly #paths = el("p", { class: "about" });
   readonly #code = el("pre", { tabindex: 0, "aria-label": "Text to copy" });
   /** Each shows a field as the choice and the state are now. */
   readonly #shows: (() => void)[] = [];
+  /** Controls that are measured on a motion, not on the performer's body. */
+  readonly #measured: readonly string[];
   #request: AbortController | null = null;
 
   constructor(host: HTMLElement, session: Session) {
     this.#session = session;
     const { card, signal, store } = session;
+    this.#measured = card.controls
+      .filter(({ measure }) => measure && !BODY.has(measure.quantity))
+      .map(({ name }) => name);
     this.#choice = {
       format: "usdc",
       fps: card.rate >= 1 && card.rate <= 60 ? card.rate : 30,
+      seconds: 5,
+      seed: 0,
       loop: false,
       names: "own",
       unit: "",
@@ -77,9 +98,8 @@ class Files {
       exact: true,
       text: "curl",
     };
-    const texts = TEXT_NAMES.map(([text, name]) => {
-      const element = textButton(name, () => this.#take({ text }));
-      element.dataset["text"] = text;
+    const texts = (Object.keys(TEXTS) as (keyof typeof TEXTS)[]).map((text) => {
+      const element = textButton(text, () => this.#take({ text }));
       this.#shows.push(() =>
         element.setAttribute("aria-pressed", String(this.#choice.text === text)),
       );
@@ -97,7 +117,7 @@ class Files {
           this.#get,
           videoButton(session, (text) => this.#say(text)),
         ),
-        this.#status,
+        ...[this.#status, this.#paths],
         el("div", { class: "files-fields" }, ...this.#fields()),
         ...this.#options(),
         el("h3", {}, "The same from a program"),
@@ -116,9 +136,28 @@ class Files {
 
   get #wanted(): Wanted {
     const { model } = this.#session.store.state;
+    const { format } = this.#choice;
     // Files come from the service that the page comes from.
-    const base = location.origin;
-    return { base, model, format: this.#choice.format, question: this.#question };
+    const rest = { base: location.origin, model };
+    if (!this.#crowd) return { ...rest, format, question: this.#question };
+    return { ...rest, format: CROWDS.includes(format) ? format : "usdc", question: this.#walk };
+  }
+
+  get #crowd(): boolean {
+    return this.#session.store.state.view === "crowd";
+  }
+
+  /** The question for the crowd of the stage, on paths that the service chooses. */
+  get #walk(): WalkQuestion {
+    const { card, store } = this.#session;
+    const { crowd: count, level, stands, varied } = store.state;
+    const { fps, seconds, seed } = this.#choice;
+    return {
+      ...{ count, seconds, fps, seed },
+      ...(varied && { take: "index" as const }),
+      ...(level && { level }),
+      ...(stands !== standsByDefault(card) && { feet: stands ? "stand" : "as_predicted" }),
+    };
   }
 
   /** The question with the values that differ from defaults, so that texts stay short. */
@@ -146,15 +185,9 @@ class Files {
     };
   }
 
-  /** Controls that are measured on a motion, not on the performer's body. */
-  get #measured(): string[] {
-    const of = ({ measure }: Control) => measure?.quantity ?? "stature";
-    const { controls } = this.#session.card;
-    return controls.filter((c) => !BODY.has(of(c))).map(({ name }) => name);
-  }
-
   #update(changed: Changes): void {
-    if (has(changed, "root", "level", "target", ...TAKE_AND_FEET)) this.#show();
+    if (has(changed, "view", "crowd", "varied", "root", "level", "target", ...TAKE_AND_FEET))
+      this.#show();
     else if (has(changed, "controls", "inferred", "performer", "labels")) this.#showTexts();
   }
 
@@ -165,6 +198,11 @@ class Files {
 
   #show(): void {
     for (const show of this.#shows) show();
+    const { cyclic, root } = this.#session.card;
+    const walks = cyclic && root === "travelling";
+    this.#get.disabled = this.#crowd && !walks;
+    this.#paths.textContent = walks ? PATHS : STANDING;
+    this.#paths.hidden = !this.#crowd;
     this.#showTexts();
   }
 
@@ -185,25 +223,34 @@ class Files {
 
   #fields(): HTMLElement[] {
     const { card } = this.#session;
-    const fps = el("input", { type: "number", min: 1, max: 1000, step: "any" });
-    fps.addEventListener("change", () => {
-      const value = Number(fps.value);
-      this.#take(value >= 1 && value <= 1000 ? { fps: value } : {});
-    });
-    this.#shows.push(() => {
-      fps.value = String(this.#choice.fps);
-    });
+    const formats = this.#choose("Format", "format", FORMATS);
+    const seconds = this.#number("Seconds", "seconds", { min: 0.1, max: 600, step: 0.1 });
+    const seed = this.#number("Seed", "seed", { min: 0, max: LARGEST_SEED, step: 1 });
+    const names = this.#choose("Joint names", "names", NAMES);
     const measures = [this.#choose("Unit", "unit", UNITS), this.#choose("Up axis", "up", UPS)];
-    // The units and axes of glTF are fixed.
     this.#shows.push(() => {
-      for (const field of measures) field.hidden = this.#choice.format === "glb";
+      // The units and axes of glTF are fixed.
+      for (const field of measures) field.hidden = this.#crowd || this.#choice.format === "glb";
+      names.hidden = this.#crowd || !Object.keys(card.roles).length;
+      seconds.hidden = seed.hidden = !this.#crowd;
+      const list = formats.querySelector("select")!;
+      for (const option of list.options)
+        option.hidden = this.#crowd && !CROWDS.includes(option.value);
+      list.value = this.#wanted.format;
     });
-    return [
-      this.#choose("Format", "format", FORMATS),
-      labelled("Frames a second", fps),
-      ...(Object.keys(card.roles).length ? [this.#choose("Joint names", "names", NAMES)] : []),
-      ...measures,
-    ];
+    const fps = this.#number("Frames a second", "fps", { min: 1, max: 1000, step: 0.01 });
+    return [formats, fps, seconds, seed, names, ...measures];
+  }
+
+  /** A number of the choice. */
+  #number(
+    word: string,
+    key: "fps" | "seconds" | "seed",
+    range: Parameters<typeof numberField>[1],
+  ): HTMLElement {
+    const field = numberField(word, range, (value) => this.#take({ [key]: value }));
+    this.#shows.push(() => field.set(this.#choice[key]));
+    return field;
   }
 
   #options(): HTMLElement[] {
@@ -227,6 +274,9 @@ class Files {
       });
       rows.push(line);
     }
+    this.#shows.push(() => {
+      for (const row of rows) row.hidden = this.#crowd;
+    });
     return rows;
   }
 
@@ -259,7 +309,9 @@ class Files {
     try {
       const { model, format, question } = wanted;
       const either = AbortSignal.any([signal, request.signal]);
-      const { content, mediaType } = await service.client.file(model, format, question, either);
+      const { content, mediaType } = await (ofCrowd(question)
+        ? service.performances.crowdFile(model, format as CrowdFormat, question, { signal: either })
+        : service.client.file(model, format, question, either));
       saveFile(name, new Blob([content], { type: mediaType }));
       this.#say(savedText(name, content.length));
     } catch (fault) {

@@ -47,6 +47,10 @@ export class Header {
       el("dt", {}, el("kbd", {}, key)),
       el("dd", {}, text),
     ]);
+    const links = [
+      ["/docs", "API"],
+      ["/problems", "Errors"],
+    ].map(([href, name]) => el("a", { href: href! }, name!));
     const help = el(
       "div",
       { popover: "auto", id: id(), class: "help", role: "dialog", "aria-label": "Keys" },
@@ -62,6 +66,7 @@ export class Header {
       shareButton(),
       button(icon("light"), "Light or dark (T)", theme.toggle),
       el("button", { type: "button", popovertarget: help.id, class: "sign" }, "Keys"),
+      el("nav", { class: "links", "aria-label": "Documentation" }, ...links),
       help,
     );
   }
@@ -116,20 +121,36 @@ const SECTIONS = [
   ["detail", "Detail"],
 ] as const;
 
-/** Buttons that scroll to sections, always in view. */
-export function mountJumps(host: HTMLElement): void {
+/** Buttons that scroll to sections, always in view; that of the section on top is marked. */
+export function mountJumps(host: HTMLElement, { signal, store }: Session): void {
+  const side = host.parentElement!;
+  const section = (part: string) => side.querySelector<HTMLElement>(`[data-part="${part}"]`)!;
+  /** Sections near the end cannot come to the top. */
+  let chosen = { part: "", scroll: -1 };
   const buttons = SECTIONS.map(([part, name]) => {
     const element = textButton(name, () => {
-      const section = host.parentElement?.querySelector<HTMLElement>(`[data-part="${part}"]`);
-      if (!section) return;
       // The keyboard goes on from there.
-      section.tabIndex = -1;
-      section.focus({ preventScroll: true });
-      section.scrollIntoView();
+      section(part).tabIndex = -1;
+      section(part).focus({ preventScroll: true });
+      section(part).scrollIntoView();
+      chosen = { part, scroll: side.scrollTop };
+      mark();
     });
     element.dataset["to"] = part;
     return element;
   });
+  const mark = () => {
+    const edge = host.getBoundingClientRect().bottom + 60;
+    const begun = SECTIONS.filter(([part]) => section(part).getBoundingClientRect().top < edge);
+    const top = chosen.scroll === side.scrollTop ? chosen.part : (begun.at(-1)?.[0] ?? "controls");
+    for (const button of buttons)
+      button.setAttribute("aria-current", String(button.dataset["to"] === top));
+  };
+  buttons[0]!.setAttribute("aria-current", "true");
+  side.addEventListener("scroll", mark, { signal });
+  store.listen((_, changed) => {
+    if (changed.has("view")) side.scrollTop = 0;
+  }, signal);
   host.append(el("nav", { class: "jumps", "aria-label": "Sections" }, ...buttons));
 }
 

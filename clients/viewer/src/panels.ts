@@ -1,6 +1,16 @@
 /** Small panels: display of the body, takes and floor, curves, and level of detail. */
 
-import { button, checkbox, choice, chooser, el, labelled, titled, toggle } from "./dom.ts";
+import {
+  button,
+  checkbox,
+  choice,
+  chooser,
+  el,
+  labelled,
+  numberField,
+  titled,
+  toggle,
+} from "./dom.ts";
 import type { Session } from "./player.ts";
 import {
   floorOf,
@@ -52,8 +62,8 @@ export function mountTakes(host: HTMLElement, session: Session): void {
     store.set({ take: nextSeed(store.state.take) }),
   );
   const back = button("Prediction", "Prediction, no take (P)", () => store.set({ take: 0 }));
-  const seed = numberField(session, "take", "Seed", 0, LARGEST_SEED, 1);
-  const floor = numberField(session, "floor", "Floor, m", -HIGHEST_FLOOR, HIGHEST_FLOOR, 0.05);
+  const seed = stateNumber(session, "take", "Seed", { min: 0, max: LARGEST_SEED, step: 1 });
+  const floor = stateNumber(session, "floor", "Floor, m", FLOOR);
   floor.hidden = whyFeetCannotStand(card) !== null;
   const detail = checkbox("Detail: sampled by the seed, not predicted", (on) =>
     store.set({ detail: on }),
@@ -87,28 +97,19 @@ export function mountTakes(host: HTMLElement, session: Session): void {
   });
 }
 
+const FLOOR = { min: -HIGHEST_FLOOR, max: HIGHEST_FLOOR, step: 0.05 };
 const TAKES =
   "A take deviates from the prediction as captured clips do. Equal seeds give equal takes. Sigma is that of the prediction.";
 
-function numberField(
+function stateNumber(
   { signal, store }: Session,
   key: "take" | "floor",
   label: string,
-  least: number,
-  most: number,
-  step: number,
+  range: Readonly<Record<"min" | "max" | "step", number>>,
 ): HTMLElement {
-  const field = el("input", { type: "number", min: least, max: most, step });
-  field.addEventListener("change", () => {
-    const value = Number(field.value);
-    const whole = key === "floor" || Number.isInteger(value);
-    if (field.value !== "" && whole && value >= least && value <= most) store.set({ [key]: value });
-    else field.value = String(store.state[key]);
-  });
-  store.follow((state) => {
-    if (Number(field.value) !== state[key] || field.value === "") field.value = String(state[key]);
-  }, signal);
-  return labelled(label, field);
+  const field = numberField(label, range, (value) => store.set({ [key]: value }));
+  store.follow((state) => field.set(state[key]), signal);
+  return field;
 }
 
 /** A bar for each curve of the model, such as weights of blend shapes. */

@@ -1,6 +1,7 @@
 /** Time of a clip that plays, and its pose and curves between two frames. */
 
 import type { Motion } from "@posefield/client";
+import { Quaternion } from "three";
 
 export interface Moment {
   readonly time: number;
@@ -34,6 +35,8 @@ export type Track = Pick<Motion, "rate" | "times" | "rotations" | "rootPosition"
 export function sample(out: Pose, clip: Track, time: number): Pose {
   const joints = out.rotations.length / 4;
   const [first, second, share] = around(clip, time);
+  // Its types know no typed arrays.
+  const [to, from] = [out.rotations, clip.rotations] as unknown as [number[], number[]];
   for (let i = 0; i < 3; i++)
     out.root[i] = mixed(
       clip.rootPosition[3 * first + i]!,
@@ -41,13 +44,9 @@ export function sample(out: Pose, clip: Track, time: number): Pose {
       share,
     );
   for (let joint = 0; joint < joints; joint++)
-    slerp(
-      out.rotations,
-      4 * joint,
-      clip.rotations,
-      4 * (joints * first + joint),
-      4 * (joints * second + joint),
-      share,
+    Quaternion.slerpFlat(
+      ...[to, 4 * joint, from, 4 * (joints * first + joint)],
+      ...[from, 4 * (joints * second + joint), share],
     );
   return out;
 }
@@ -113,23 +112,6 @@ export function turned(x: number, z: number, turn: number): readonly [number, nu
 /** Angle of a rotation about +Y. */
 function heading(q: Float32Array, at: number): number {
   return 2 * Math.atan2(q[at + 2]!, q[at]!);
-}
-
-function slerp(
-  out: Float32Array,
-  to: number,
-  q: Float32Array,
-  a: number,
-  b: number,
-  share: number,
-): void {
-  let cosine = 0;
-  for (let i = 0; i < 4; i++) cosine += q[a + i]! * q[b + i]!;
-  const angle = Math.acos(Math.min(1, Math.abs(cosine)));
-  const sine = Math.sin(angle);
-  const near = sine < 1e-5 ? 1 - share : Math.sin((1 - share) * angle) / sine;
-  const far = (sine < 1e-5 ? share : Math.sin(share * angle) / sine) * (cosine < 0 ? -1 : 1);
-  for (let i = 0; i < 4; i++) out[to + i] = near * q[a + i]! + far * q[b + i]!;
 }
 
 function mixed(a: number, b: number, share: number): number {

@@ -56,11 +56,8 @@ export async function mismatch(): Promise<string | null> {
 }
 
 export function differs({ contract }: { readonly contract?: string }): string | null {
-  const page = `this page speaks ${CONTRACT}`;
-  if (!contract)
-    return `The service is older: it does not say which contract it speaks, and ${page}. Some things may be missing.`;
-  if (contract.split(".")[0] === CONTRACT.split(".")[0]) return null;
-  return `The service is of another version: it speaks contract ${contract}, and ${page}. Reload the page; if that does not help, what it shows may be wrong.`;
+  if (contract?.split(".")[0] === CONTRACT.split(".")[0]) return null;
+  return `The service is of another version: it speaks contract ${contract ?? "unsaid"}, and this page speaks ${CONTRACT}. Reload the page; if that does not help, what it shows may be wrong.`;
 }
 
 /** Milliseconds between two checks while all is well; first and longest wait while it is not. */

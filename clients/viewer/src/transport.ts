@@ -69,7 +69,7 @@ export function mount(host: HTMLElement, session: Session): void {
   const factor = el("span");
   speed.addEventListener("input", () => store.set({ speed: Number(speed.value) }));
   host.append(back, bar.play, forward, bar.scrubber, bar.time, bar.loop);
-  host.append(el("span", { class: "pace" }, speed, factor));
+  host.append(el("span", { class: "field pace" }, speed, factor));
   const show = () => {
     const { state } = store;
     bar.show({ ...state, duration: player.duration });

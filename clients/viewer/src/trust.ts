@@ -74,7 +74,7 @@ export function mount(host: HTMLElement, session: Session): void {
     const facts = marks(trust);
     const text = trustSentence(trust);
     sigma.textContent = written.centimetres(trust.sigma);
-    band.textContent = trust.band ? bandName(trust.band) : "";
+    band.textContent = bandName(bandOf(trust) ?? "");
     meter.value = Math.min(1, trust.sigma / SCALE);
     // The signs differ in shape, for users who do not tell the colours apart.
     known.replaceChildren(
@@ -101,10 +101,14 @@ export function mount(host: HTMLElement, session: Session): void {
 
 const bandName = (band: string): string => (band === "guess" ? "a guess" : band);
 
-function trustSentence({ sigma, supported, band }: Trust): string {
-  const text = `A captured clip here would lie about ${written.centimetres(sigma)} away, joint by joint.`;
-  if (supported === false) return `${text} That is a guess.`;
+/** Return the worse of the band of sigma and that of the support. */
+const bandOf = ({ supported, band }: Trust) => (supported === false ? "guess" : band);
+
+function trustSentence(trust: Trust): string {
+  const text = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
+  const band = bandOf(trust);
   if (!band) return text;
+  if (band !== trust.band) return `${text} That is a guess: nothing like it was captured.`;
   const limits = LIMITS[band];
   return `${text} That is ${limits ? `${bandName(band)}: ${limits}` : band}.`;
 }

@@ -7,7 +7,7 @@ import type { Browser, Page } from "playwright-core";
 
 import { broken } from "./axe.ts";
 import { browser, SERVICE } from "./harness.ts";
-import { settled, slider } from "./look.ts";
+import { settled, slider, until } from "./look.ts";
 
 const REACH =
   "/#reaching?stature=1.75&hip_height=0.9&turn=20&target_height=1.1&~playing=no&~ghost=yes&~feet=yes";
@@ -93,6 +93,41 @@ test("nothing lies beside the screen, and everything is reached by Tab", async (
     const reached = await tabbed(page);
     for (const part of ["options", "controls", "trust", "target", "map", "files", "time", "bar"])
       assert.ok(reached.has(part), `${part} of ${[...reached]}`);
+    await page.close();
+  }
+});
+
+test("targets are of 32 pixels, and of 44 for fingers; the section on top is the marked one", async () => {
+  for (const [least, width, hasTouch] of [
+    [32, 1440, false],
+    [44, 390, true],
+  ] as const) {
+    const page = await chromium.newPage({ viewport: { width, height: 844 }, hasTouch });
+    for (const view of ["one", "crowd", "performance"]) {
+      await page.goto(`${SERVICE}/#cmu_walk?~playing=no&~view=${view}`);
+      await page.locator("#stage[data-clip]").waitFor();
+      const small = await page.evaluate((least) => {
+        const all = [...document.querySelectorAll("button, select, input, a, summary")];
+        const targets = all
+          .filter((it) => it.checkVisibility())
+          .map((it) => it.closest(".check") ?? it);
+        const sizes = (it: Element) =>
+          [it.getBoundingClientRect()].flatMap((it) => [it.width, it.height]);
+        return targets
+          .filter((it) => Math.min(...sizes(it)) < least - 0.5)
+          .map((it) => it.outerHTML);
+      }, least);
+      assert.deepEqual(small, [], `${view}, ${width}`);
+    }
+    await page.getByRole("button", { name: "Single" }).click();
+    const marked = () => page.locator(".jumps [aria-current=true]").allTextContents();
+    assert.deepEqual(await marked(), ["Controls"]);
+    for (const name of ["Detail", "Download", "Map"]) {
+      await page.getByRole("button", { name, exact: true }).click();
+      await until(async () => (await marked()).join() === name, `${name} is marked`);
+    }
+    await page.getByRole("button", { name: "Crowd" }).click();
+    await until(async () => (await marked()).join() === "Controls", "a view begins at its top");
     await page.close();
   }
 });

@@ -6,12 +6,12 @@ import { curl, fileName, link, python, type Wanted } from "../src/code-texts.ts"
 
 /** Names that would be something else to a shell, to a URL or to Python. */
 const ODD = ["it's", 'a "b"', "$(touch /tmp/x)", "a&b=c", "lambda", "für\n", "fps", "\\", "`x`"];
-const WANTED: Wanted = {
+const WANTED = {
   base: "http://127.0.0.1:8000",
   model: "cmu_walk@0123456789abcdef",
   format: "usdc",
   question: { controls: Object.fromEntries(ODD.map((name, i) => [name, i - 0.5])), loop: true },
-};
+} satisfies Wanted;
 
 describe("texts that ask for a clip", () => {
   it("a link says every control as it is", () => {
@@ -55,6 +55,14 @@ describe("texts that ask for a clip", () => {
     });
   });
 
+  it("a crowd that walks has a link and a method of its own", () => {
+    const question = { count: 50, seconds: 5, seed: 2, take: "index" } as const;
+    const wanted: Wanted = { ...WANTED, question };
+    assert.match(link(wanted), /crowd\.usdc\?count=50&seconds=5&seed=2&take=index$/);
+    assert.equal(fileName(wanted), "crowd.usdc");
+    assert.deepEqual(called(python(wanted)), question);
+  });
+
   it("a file's name holds nothing that a path could mean", () => {
     assert.equal(fileName({ ...WANTED, model: "../it's" }), "___it_s.usdc");
   });
@@ -75,6 +83,7 @@ class Any:
     def __exit__(self, *a): pass
     def model(self, name): return self
     def clip(self, **given): print(json.dumps(given)); return self
+    crowd_walk = clip
     def save(self, name): pass
 sys.modules["posefield_client"] = types.SimpleNamespace(Client=Any)
 exec(sys.stdin.read())

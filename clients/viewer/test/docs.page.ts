@@ -36,6 +36,8 @@ test("it draws all operations, loads nothing from elsewhere, and tries one", asy
   const items = Object.values(contract.paths as Record<string, object>);
   const operations = items.flatMap((item) => ["get", "post"].filter((method) => method in item));
   assert.equal(await page.locator(".opblock").count(), operations.length);
+  const title = (await page.locator(".info .title").innerText()).replace(/\s+/g, " ");
+  assert.match(title, /^posefield \d+\.\d+\.\d+ contract \d+\.\d+\.\d+ /);
   const block = page.locator("#operations-poses-getPose");
   await block.locator(".opblock-summary-control").click();
   await block.getByPlaceholder("model").fill("reaching");

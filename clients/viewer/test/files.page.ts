@@ -9,7 +9,7 @@ import { after, before, describe, it } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
-import { browser, opened } from "./harness.ts";
+import { browser, opened, SERVICE } from "./harness.ts";
 
 const PYTHON = join(
   dirname(process.env["POSEFIELD_COMMAND"] ?? "../../.venv/bin/posefield"),
@@ -129,6 +129,41 @@ describe("files", () => {
     assert.equal(saved, 0);
     await download();
     assert.equal(saved, 1);
+  });
+
+  it("of a crowd is the crowd, and curl and Python get the same", async () => {
+    const { page: crowd } = await opened(from, "/#cmu_walk?~view=crowd&~crowd=50&~varied=yes");
+    const files = crowd.locator(".files");
+    await files.getByLabel("Format", { exact: true }).selectOption("usdz");
+    assert.ok(await files.locator("option[value=glb]").evaluate((it: HTMLElement) => it.hidden));
+    for (const [name, value] of [
+      ["Seconds", "1"],
+      ["Seed", "7"],
+    ] as const) {
+      await files.getByLabel(name).fill(value);
+      await files.getByLabel(name).press("Tab");
+    }
+    const [got] = await Promise.all([
+      crowd.waitForEvent("download"),
+      crowd.locator(".files-get", { hasText: "Download crowd.usdz" }).click(),
+    ]);
+    const found = readFileSync(await got.path());
+    assert.equal(got.suggestedFilename(), "crowd.usdz");
+    const own = mkdtempSync(join(tmpdir(), "posefield-crowd-"));
+    for (const [kind, program, ...words] of [
+      ["curl", "sh", "-c"],
+      ["Python", PYTHON, "-c"],
+    ] as const) {
+      await files.getByRole("button", { name: kind, exact: true }).click();
+      const text = await files.locator("pre").innerText();
+      assert.match(text, /count=50.*seconds=1.*seed=7.*take="?index/s);
+      execFileSync(program, [...words, text], { cwd: own, stdio: "pipe" });
+      assert.deepEqual(readFileSync(join(own, "crowd.usdz")), found, kind);
+    }
+    await crowd.goto(`${SERVICE}/#reaching?~view=crowd`);
+    await crowd.getByText("There is no file of this crowd: this model does not walk.").waitFor();
+    assert.ok(await crowd.locator(".files-get").isDisabled());
+    await crowd.close();
   });
 
   it("and nothing else went wrong unnoticed", () => {

@@ -254,6 +254,7 @@ test("outside of what was sampled is marked, and inside is not", () =>
     assert.notEqual(await control.getAttribute("data-outside"), null);
     assert.match((await slider(page, "turn").getAttribute("aria-valuetext"))!, /outside/);
     await page.getByText("That is a guess").first().waitFor();
+    assert.equal(await page.locator("[data-band]").textContent(), "a guess");
     // A quarter of the range outside a value acts as it is; beyond, the slider says what is given.
     const [field, given] = [control.getByRole("textbox"), control.locator("[data-given]")];
     assert.equal(await given.textContent(), "");

@@ -60,6 +60,7 @@ test("the shipped walk alone is a performance at once: timeline, contacts and du
   on(EMPTY, async (page, asked) => {
     await performedOn(page);
     assert.deepEqual(await bars(page), ["1 cmu_walk"]);
+    assert.equal(await page.locator("[data-note]").count(), 0);
     assert.equal(asked.at(-1)!.segments.length, 1);
     const duration = Number.parseFloat((await page.locator("[data-duration]").textContent())!);
     assert.ok(duration > 4 && duration < 15, String(duration));

@@ -78,7 +78,7 @@ export class Performance {
         ...{ kind: "walk", model, start: "standing", stop: "standing" },
         along: [
           [0, 2],
-          [1, 5],
+          [0, 5],
         ],
       };
       const walks = card.cyclic && card.root === "travelling";
