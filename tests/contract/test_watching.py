@@ -14,7 +14,6 @@ from prometheus_client.parser import text_string_to_metric_families
 from posefield.http import telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.telemetry import Telemetry
 
 
 def value(page, name, **labels):
@@ -69,7 +68,7 @@ def told(loaded):
     def asked(*args, **given):
         source, target = os.pipe()
         lines = telemetry.LogBuffer(target)
-        answer = asker(create_app(loaded, Settings(), Telemetry(lines)))(*args, **given)
+        answer = asker(create_app(loaded, Settings(), lines))(*args, **given)
         lines.flush()
         os.close(target)
         with os.fdopen(source, "rb") as found:

@@ -27,7 +27,6 @@ from posefield.http.app import build_app
 from posefield.http.server import StartAnnouncement, lifespan
 from posefield.http.operations import OPERATIONS
 from posefield.http.api.settings import Settings
-from posefield.http.telemetry import NO_TELEMETRY
 async def block_the_loop(service, request):
     time.sleep(100)
 own = socket.create_server(("127.0.0.1", 0))
@@ -36,7 +35,7 @@ beside = partial(lifespan, shelf=ReloadingRegistry([], VersionLimits()), announc
 handlers = {**OPERATIONS, "listModels": block_the_loop}
 settings = Settings(unresponsive=2)
 agreed = contract.load_contract()
-app = build_app(agreed, handlers, ModelRegistry({}), settings, NO_TELEMETRY, beside)
+app = build_app(agreed, handlers, ModelRegistry({}), settings, None, beside)
 uvicorn.Server(uvicorn.Config(app, log_level="critical", lifespan="on")).run([own])
 """
 

@@ -49,7 +49,6 @@ EXTRAS = {
     "dask": ("distributed",),
     "store": ("obstore",),
     "jwt": ("jwt", "cryptography"),
-    "trace": ("opentelemetry",),
     "parquet": ("pyarrow",),
     "mcp": ("mcp",),
 }

@@ -24,7 +24,7 @@ from posefield.http.readiness import Readiness
 from posefield.http.request_cycle import ServerState
 from posefield.http.routing import Route, RouteTree
 from posefield.http.steps import Handler, Service, Steps
-from posefield.http.telemetry import NO_TELEMETRY, Telemetry
+from posefield.http.telemetry import LogBuffer
 from posefield.registry.model_registry import FixedRegistry, ModelRegistry
 
 log = logging.getLogger(__name__)
@@ -39,14 +39,14 @@ def no_background_tasks(site: ServerState) -> AbstractAsyncContextManager[None]:
 def create_app(
     models: ModelRegistry | Readiness,
     settings: Settings,
-    telling: Telemetry = NO_TELEMETRY,
+    log: LogBuffer | None = None,
     lifespan: Lifespan = no_background_tasks,
 ) -> "App":
     """Return the application of the contract for some models.
 
-    telling: log and traces of requests. lifespan: context of the background tasks of the server.
+    log: of requests; None for none. lifespan: context of the background tasks of the server.
     """
-    return build_app(contract.load_contract(), OPERATIONS, models, settings, telling, lifespan)
+    return build_app(contract.load_contract(), OPERATIONS, models, settings, log, lifespan)
 
 
 def build_app(
@@ -54,7 +54,7 @@ def build_app(
     handlers: Mapping[str, Handler],
     models: ModelRegistry | Readiness,
     settings: Settings,
-    telling: Telemetry = NO_TELEMETRY,
+    log: LogBuffer | None = None,
     lifespan: Lifespan = no_background_tasks,
 ) -> "App":
     """Return the application of a contract and the handlers of its operations.
@@ -74,7 +74,7 @@ def build_app(
         static_page.static_pages(agreed),
         rules,
         origins,
-        telling,
+        log,
         characters=_characters(settings),
     )
     places = RouteTree(

@@ -140,7 +140,6 @@ class Exchange:
         self.tag: str | None = None
         self.lifetime = b""
         self.status = self.size = 0
-        self.span = site.service.telling.begin(self.headers)
 
     async def sent(self, message: Message) -> None:
         """Pass a message on to the server, and note its status or size."""
@@ -356,9 +355,8 @@ def record(exchange: Exchange) -> None:
     operation = exchange.route.operation.id if exchange.route else "none"
     form = exchange.scope.get("format")
     metrics.count_request(operation, form or "", exchange.status, took, exchange.size)
-    telling = exchange.service.telling
-    if telling.enabled:
-        telling.end(exchange.span, _log_line(exchange, operation, took))
+    if exchange.service.log is not None:
+        exchange.service.log.add(_log_line(exchange, operation, took))
 
 
 def _log_line(exchange: Exchange, operation: str, took: float) -> dict[str, Any]:

@@ -39,7 +39,6 @@ from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
 from posefield.http.readiness import Readiness
 from posefield.http.request_cycle import ServerState
-from posefield.http.telemetry import Telemetry
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry.model_registry import ReloadingRegistry, VersionLimits
 
@@ -137,7 +136,8 @@ async def lifespan(
         announcement.write()
         yield
     beat.cancel()
-    service.telling.close()
+    if service.log is not None:
+        service.log.flush()
     # A thread that does not stop must not keep the process alive.
     faulthandler.dump_traceback_later(FORCED_EXIT_DELAY, exit=True)
 
@@ -249,11 +249,9 @@ def _application(
     shelf: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
 ) -> App:
     sys.setswitchinterval(worker_threads.SWITCH_INTERVAL)
-    lines = telemetry.to_standard_error() if settings.log == "on" else None
+    log = telemetry.to_standard_error() if settings.log == "on" else None
     beside = partial(lifespan, shelf=shelf, announcement=announcement)
-    return create_app(
-        Readiness(shelf), settings, Telemetry(lines, telemetry.environment_tracer()), beside
-    )
+    return create_app(Readiness(shelf), settings, log, beside)
 
 
 def _config(app: partial[App], settings: Settings, count: int) -> uvicorn.Config:

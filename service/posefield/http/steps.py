@@ -20,7 +20,7 @@ from posefield.http.api.settings import Settings
 from posefield.http.batching import ClipBatcher, PoseBatcher
 from posefield.http.readiness import Readiness
 from posefield.http.static_page import StaticPage
-from posefield.http.telemetry import NO_TELEMETRY, Telemetry
+from posefield.http.telemetry import LogBuffer
 from posefield.question import json_decoding, text_decoding
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
@@ -106,8 +106,8 @@ class Service:
     """Shared state of all operations.
 
     contract: version of the contract. pages: by operationId. rules: access policy. origins: for
-    CORS. telling: log and traces. code: digest for entity tags. batcher: of pose requests. desk: of
-    file requests. characters: of users.
+    CORS. log: of requests; None for none. code: digest for entity tags. batcher: of pose requests.
+    desk: of file requests. characters: of users.
     """
 
     readiness: Readiness
@@ -116,7 +116,7 @@ class Service:
     pages: Mapping[str, StaticPage]
     access_policy: AccessPolicy
     origins: frozenset[bytes] = frozenset()
-    telling: Telemetry = NO_TELEMETRY
+    log: LogBuffer | None = None
     code: bytes = field(default_factory=header_fields.code_digest)
     pose_batcher: PoseBatcher = field(default_factory=PoseBatcher)
     clip_batcher: ClipBatcher = field(default_factory=ClipBatcher)
