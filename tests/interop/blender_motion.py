@@ -12,7 +12,6 @@ from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion.clip import Clip
 from posefield.question.results import ClipAnswer
 from posefield_train.convert import converted_file
-from posefield_train.convert.converted_file import Conventions
 
 FURTHEST = 5e-4
 """Largest distance of a joint from its expected place, m."""
@@ -40,7 +39,7 @@ def _written(python: Path, answer: ClipAnswer, folder: Path) -> dict[str, Clip]:
     words = [python, script, source, str(answer.clip.rate), folder]
     subprocess.run(words, capture_output=True, check=True)
     return {
-        file: converted_file.convert(folder / file, Conventions(blender=python)).clip
+        file: converted_file.convert(folder / file, blender=python).clip
         for file in ("blender.fbx", "blender.glb", "blender.usdc")
     }
 

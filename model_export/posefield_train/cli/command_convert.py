@@ -73,7 +73,6 @@ def convert(
     FBX files are read by an installed Blender, 4.2 or later.
     """
     from posefield_train.convert import converted_file
-    from posefield_train.convert.converted_file import Conventions
     from posefield_train.source.motion_file import ReadOptions
 
     if output.suffix.lower() != ".bvh":
@@ -81,9 +80,8 @@ def convert(
     for name, value in (("unit", source.unit), ("rate", source.rate)):
         if value is not None and not 0.0 < value < float("inf"):
             raise InvalidField(name, f"{value}, expected a positive number")
-    options = ReadOptions(source.rate, source.animation, source.skeleton)
-    said = Conventions(source.unit, source.up, options, source.blender)
-    found = converted_file.convert(source.file, said)
+    options = ReadOptions(source.rate, source.animation, source.skeleton, source.unit, source.up)
+    found = converted_file.convert(source.file, options, source.blender)
     atomic_files.write(found.content, output)
     facts = {
         "file": str(output),

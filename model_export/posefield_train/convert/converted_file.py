@@ -11,7 +11,6 @@ import numpy as np
 
 from posefield.common.array_shapes import Positions
 from posefield.common.errors import FileError, MotionFileError
-from posefield.common.units import UpAxis
 from posefield.motion import bvh_writer
 from posefield.motion.clip import Clip
 from posefield_train.source import motion_file, motion_readers
@@ -94,19 +93,6 @@ ROUNDING = 1e-5
 
 
 @dataclass(frozen=True)
-class Conventions:
-    """Conventions of a file as a user gives them; None for those that the file states.
-
-    metres_per_unit, up: of the file. options: rate and animation. blender: program for FBX files.
-    """
-
-    metres_per_unit: float | None = None
-    up: UpAxis | None = None
-    options: ReadOptions = AS_STATED
-    blender: Path | None = None
-
-
-@dataclass(frozen=True)
 class ConvertedFile:
     """A motion as the content of a BVH file. clip: in metres with Y up. notes: on assumptions."""
 
@@ -115,22 +101,19 @@ class ConvertedFile:
     notes: tuple[str, ...]
 
 
-def convert(path: Path, said: Conventions) -> ConvertedFile:
-    """Return a motion file as BVH.
+def convert(
+    path: Path, options: ReadOptions = AS_STATED, blender: Path | None = None
+) -> ConvertedFile:
+    """Return a motion file as BVH. blender: program for FBX files.
 
     Raises MotionFileError for a file that cannot be read, and for one whose unit or up axis neither
     the file nor the user states; FileError for FBX without Blender.
     """
-    file, notes = _read(path, said)
-    unit = said.metres_per_unit if said.metres_per_unit is not None else file.metres_per_unit
-    up = said.up or file.up
+    file, notes = _read(path, options, blender)
+    unit, up = file.metres_per_unit, file.up
     if unit is None or up is None:
-        lacks = "--unit" if unit is None else "--up"
-        raise file.error(
-            f"states no {'unit' if unit is None else 'up axis'}, expected {lacks}; posefield probe "
-            "proposes it"
-        )
-    file = motion_file.overrule(file, metres_per_unit=unit, up=up)
+        lacks = "unit, expected --unit" if unit is None else "up axis, expected --up"
+        raise file.error(f"states no {lacks}; posefield probe proposes it")
     clip = motion_file.to_clip(file, metres_per_unit=unit, up=up)
     clip = replace(clip, translations=_rigid_bones(clip))
     try:
@@ -151,18 +134,20 @@ def _rigid_bones(clip: Clip) -> Positions:
     return np.where(rigid[:, None], clip.translations.mean(axis=0), clip.translations)
 
 
-def _read(path: Path, said: Conventions) -> tuple[MotionFile, tuple[str, ...]]:
+def _read(
+    path: Path, options: ReadOptions, blender: Path | None
+) -> tuple[MotionFile, tuple[str, ...]]:
     """Return the motion of a file, and the note on Blender if it was needed."""
     if path.suffix.lower() != FBX:
-        return motion_readers.read(path, said.options), ()
+        return motion_readers.read(path, options), ()
     if not path.is_file():
         raise MotionFileError(str(path), "no such file")
-    program = find(said.blender)
+    program = find(blender)
     with tempfile.TemporaryDirectory() as folder:
         between = Path(folder, f"{path.stem}.glb")
         program.glb_of_fbx(path, between)
         try:
-            found = motion_readers.read(between, said.options)
+            found = motion_readers.read(between, options)
         except MotionFileError as fault:
             raise MotionFileError(str(path), fault.message) from fault
     return found, (f"{path.name}: read by Blender {program.version}",)

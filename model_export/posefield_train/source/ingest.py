@@ -187,11 +187,11 @@ def _as_stated(file: MotionFile, source: Source, others: Collection[MotionFile])
     silent = [_bone_length(other) for other in others if other.metres_per_unit is None]
     unit, up, stated = source.metres_per_unit, source.up, file.metres_per_unit
     if stated is None or not silent:
-        return motion_file.overrule(file, metres_per_unit=unit, up=up)
+        return motion_file.overrule(file, ReadOptions(metres_per_unit=unit, up=up))
     usual, own = unit * float(np.median(silent)), _bone_length(file)
     apart = [abs(np.log(max(own * each, TINY) / max(usual, TINY))) for each in (stated, unit)]
     if apart[0] >= apart[1]:
-        return motion_file.overrule(file, metres_per_unit=unit, up=file.up or up)
+        return motion_file.overrule(file, ReadOptions(metres_per_unit=unit, up=file.up or up))
     note = f"states a unit of {stated:g} m, kept: with it the bones are as long as those of others"
     return replace(file, up=file.up or up, notes=(*file.notes, note))
 

@@ -123,15 +123,17 @@ class MotionFile:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Settings of a recipe for reading a file; None for those that it does not have.
+    """Settings of a user for reading a file; None for those that are not given.
 
     rate: source.rate, frames a second. animation: name of one of several in the file. skeleton:
-    the same, or the name of one of its joints.
+    the same, or the name of one of its joints. rate, metres_per_unit and up overrule the file.
     """
 
     rate: float | None = None
     animation: str | None = None
     skeleton: str | None = None
+    metres_per_unit: float | None = None
+    up: UpAxis | None = None
 
 
 AS_STATED = ReadOptions()
@@ -229,32 +231,25 @@ SAME = 1e-4
 """Largest relative difference of two numbers that state the same unit or rate."""
 
 
-def overrule(
-    file: MotionFile,
-    *,
-    rate: float | None = None,
-    metres_per_unit: float | None = None,
-    up: UpAxis | None = None,
-) -> MotionFile:
+def overrule(file: MotionFile, options: ReadOptions) -> MotionFile:
     """Return a file with what a user states of it, and a note on each that it states otherwise."""
+    rate, unit, up = options.rate, options.metres_per_unit, options.up
     notes = list(file.notes)
-    if rate is not None:
-        if file.rate is not None and abs(file.rate - rate) > SAME * rate:
-            notes.append(
-                f"states {file.rate:.5g} frames a second ({file.evidence}), overruled: read at "
-                f"{rate:g}"
-            )
-        file = replace(file, rate=rate)
-    if metres_per_unit is not None:
-        stated = file.metres_per_unit
-        if stated is not None and abs(stated - metres_per_unit) > SAME * stated:
-            notes.append(f"states a unit of {stated:g} m, overruled: read as {metres_per_unit:g} m")
-        file = replace(file, metres_per_unit=metres_per_unit)
-    if up is not None:
-        if file.up is not None and file.up != up:
-            notes.append(f"states {file.up} as its up axis, overruled: read as {up}")
-        file = replace(file, up=up)
-    return replace(file, notes=tuple(notes))
+    if rate and file.rate and abs(file.rate - rate) > SAME * rate:
+        stated = f"{file.rate:.5g} frames a second ({file.evidence})"
+        notes.append(f"states {stated}, overruled: read at {rate:g}")
+    if unit and file.metres_per_unit and abs(file.metres_per_unit - unit) > SAME * unit:
+        stated = f"a unit of {file.metres_per_unit:g} m"
+        notes.append(f"states {stated}, overruled: read as {unit:g} m")
+    if up and file.up and file.up != up:
+        notes.append(f"states {file.up} as its up axis, overruled: read as {up}")
+    return replace(
+        file,
+        rate=rate or file.rate,
+        metres_per_unit=unit or file.metres_per_unit,
+        up=up or file.up,
+        notes=tuple(notes),
+    )
 
 
 def to_clip(

@@ -152,7 +152,7 @@ def read(place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
             f"found animation {options.animation!r}, but {own.name} files hold one motion: "
             "expected an empty cell",
         )
-    file = overrule(own.read(place, options), rate=options.rate)
+    file = overrule(own.read(place, options), options)
     _, doubt = doubted_rate(file.rate) if file.rate else (None, "")
     return replace(file, notes=(*file.notes, doubt)) if doubt else file
 
