@@ -72,8 +72,7 @@ def _radii(skeleton: Any, skel_root: Any, joints: tuple[str, ...]) -> Floats:
     cache.Populate(skel_root, Usd.PrimDefaultPredicate)
     query = cache.GetSkelQuery(skeleton)
     order = [str(token) for token in query.GetJointOrder()]
-    bound = query.GetJointWorldBindTransforms()
-    matrices = np.array(bound or query.ComputeJointSkelTransforms(0.0, atRest=True), float)
+    matrices = np.array(query.GetJointWorldBindTransforms(), float)
     if len(matrices) != len(order):
         path = skeleton.GetPath()
         raise ValueError(f"{path} has {len(matrices)} bindTransforms, expected {len(order)}")
