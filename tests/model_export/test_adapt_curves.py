@@ -17,7 +17,7 @@ from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points
-from posefield_train.source import ingest, skeleton_checks
+from posefield_train.source import ingest
 
 SHOWN = [(0.2, 0.3), (0.5, 0.8), (0.85, 0.4)]
 ASKED = {"smile": 0.6, "openness": 0.5}
@@ -156,8 +156,3 @@ def test_a_cycle_is_adapted_with_its_curves(models_trained):
         true = models_trained.sole_pressure(shares, 4.0 / 3.6)
         missed = np.sqrt(np.mean(np.square(found - true)))
         assert missed < 0.03 if in_phase else missed > 0.1
-
-
-def test_collapsed_roots_keep_the_curves():
-    clip = face_motion.expression(0.5, 0.5)
-    assert skeleton_checks.collapse_roots(clip, 1).curves is clip.curves

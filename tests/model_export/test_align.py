@@ -82,8 +82,8 @@ def to_the_prediction(family):
     return lambda v: v - kriging_tuning.tune(TuningProblem(laid, v), "matern52", 1).residuals
 
 
-def aligned(family, rounds=2, basis=BASIS, weights=WEIGHTS, predict=to_the_mean):
-    return time_alignment.align(family, FRAMES, basis, weights, Refinement(rounds, predict))
+def aligned(family, rounds=2, weights=WEIGHTS, predict=to_the_mean):
+    return time_alignment.align(family, FRAMES, BASIS, weights, Refinement(rounds, predict))
 
 
 def disagreement(found, true):
@@ -107,14 +107,16 @@ def found(request, family):
     return aligned(family, predict=predict)
 
 
-def test_known_warps_are_recovered(found, logs):
+def test_known_warps_are_recovered_and_their_mean_is_the_identity(found, logs):
     # Paths go from frame to frame of 100.
     assert disagreement(found.logs, logs) < 0.006
     assert disagreement(np.zeros_like(logs), logs) > 0.04
-
-
-def mean_inverse(logs):
-    return np.mean([BASIS.invert(log, FIT_TIMES) for log in logs], axis=0)
+    means = (
+        np.mean([BASIS.invert(log, FIT_TIMES) for log in own], axis=0) for own in (found.logs, logs)
+    )
+    warped, plain = (np.max(np.abs(mean - FIT_TIMES)) for mean in means)
+    # What six increments cannot follow of the correction.
+    assert warped < 0.004 and plain > 0.02
 
 
 def test_what_others_predict_aligns_better_than_the_mean_where_clips_differ(logs):
@@ -130,16 +132,6 @@ def test_what_others_predict_aligns_better_than_the_mean_where_clips_differ(logs
     # Negative control: predicted from sizes of others, of which neighbours differ most.
     shuffled = to_the_prediction(own[::2] + own[1::2])
     assert disagreement(aligned(own, predict=shuffled).logs, logs) > 0.98 * to_mean
-
-
-def test_mean_warp_is_the_identity(found, logs):
-    # What six increments cannot follow of the correction.
-    assert np.max(np.abs(mean_inverse(found.logs) - FIT_TIMES)) < 0.004
-    assert np.max(np.abs(mean_inverse(logs) - FIT_TIMES)) > 0.02
-
-
-def positions(rotations, path):
-    return clip.assemble(JOINTS, rotations, path, JOINTS.offsets, 1.0).positions()
 
 
 def test_weights_of_joints_decide_what_is_aligned(rng):
@@ -174,16 +166,6 @@ def test_landmark_is_met_by_every_clip(family, logs, rng):
 
     assert spread([replace(e, landmarks=(m,)) for e, m in zip(family, marks, strict=True)]) < 0.03
     assert spread(family) > 0.05, "negative control: without landmarks"
-
-
-def test_the_medoid_of_a_large_family_is_that_of_a_sample():
-    """It lies in the middle of the family."""
-    sizes = np.linspace(0.2, 1.4, 320)
-    mixed = np.random.Generator(np.random.PCG64(5)).permutation(sizes)
-    clips = [example(float(size), CANONICAL) for size in mixed]
-    assert abs(mixed[aligned(clips, 0).reference] - 0.8) < 0.1
-    # Negative control: most clips lie farther from the middle.
-    assert np.mean(np.abs(mixed - 0.8) < 0.1) < 0.2
 
 
 def raised(posture, count):

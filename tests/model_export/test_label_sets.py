@@ -52,24 +52,7 @@ def mixtures(rng, count):
     return found
 
 
-def least_eigenvalue(hyper, points):
-    """Least eigenvalue of the joint covariance of points, with their prior variances."""
-    joint = kriging_model.covariances(hyper, points, points)
-    np.fill_diagonal(joint, kriging_model.prior_variances(hyper, points))
-    return np.linalg.eigvalsh(joint)[0]
-
-
 # --- the covariance -------------------------------------------------------------------------------
-
-
-def test_covariance_is_a_product_of_correlations_and_a_sum_of_offsets():
-    hyper = Hyper("matern52", (0,), np.array([0.5, 0.9]), 0.1, 0.0, KERNELS)
-    who = ["ann calm", "ann tired", "bob calm", "bob tired", " calm", "ann ", " "]
-    asked = [dict(zip(SETS, pair.split(" "), strict=True)) for pair in who]
-    points = np.hstack([np.zeros((7, 2)), weights(asked)])
-    found = kriging_model.covariances(hyper, points, points[:1])[:, 0]
-    expected = [1.0 + 1.6, 0.3 + 0.4, 0.6 + 1.2, 0.18, 0.6 + 1.2, 0.3 + 0.4, 0.18]
-    assert np.abs(found - expected).max() < 1e-12
 
 
 def test_covariance_is_stationary_with_offsets_and_a_trend(hyper, laid):
@@ -104,6 +87,12 @@ def test_a_performer_left_out_is_a_stranger(hyper, laid, named, rng):
 
 def test_joint_covariance_of_names_mixtures_and_open_sets_is_positive_definite(hyper, laid, rng):
     points = np.vstack([laid, mixtures(rng, 30)])
+
+    def least_eigenvalue(hyper, points):
+        joint = kriging_model.covariances(hyper, points, points)
+        np.fill_diagonal(joint, kriging_model.prior_variances(hyper, points))
+        return np.linalg.eigvalsh(joint)[0]
+
     assert least_eigenvalue(hyper, points) > -1e-9
     # The samples' own covariance, which is inverted, needs no nugget.
     assert np.linalg.eigvalsh(kriging_model.covariances(hyper, laid, laid))[0] > 0.0
@@ -126,23 +115,12 @@ def test_a_mixture_lies_between_its_names_and_is_less_certain(hyper, laid, rng):
     assert named < mixture < unknown
 
 
-# --- tuning ---------------------------------------------------------------------------------------
-
-
 def test_gradient_of_the_loss_is_that_of_both_sets(laid, rng):
     samples = SamplePoints(laid, 2, np.arange(COUNT) // 2, (3, 2))
     problem = TuningProblem(samples, rng.normal(size=(COUNT, 4)))
-    names = (
-        ("nugget", 0),
-        ("correlation", 0),
-        ("correlation", 1),
-        ("offset", 0),
-        ("offset", 1),
-        ("trend", 0),
-    )
-    base = Hyper(
-        "matern52", (0,), np.ones(2), 0.0, 0.0, (LabelKernel(3, 1, 0), LabelKernel(2, 1, 0))
-    )
+    kernels = [(name, index) for name in ("correlation", "offset") for index in (0, 1)]
+    base = Hyper("matern52", (0,), np.ones(2), 0.0, 0.0, KERNELS)
+    names = (("nugget", 0), *kernels, ("trend", 0))
     loss = LeaveOneOutLoss(problem, base, names, own_scales=True)
     at = np.array([-0.5, -0.2, -2.0, 0.4, -0.7, -1.0, 0.3, 0.2])
     away = check_grad(
@@ -153,9 +131,6 @@ def test_gradient_of_the_loss_is_that_of_both_sets(laid, rng):
     # Negative control: the slopes of the two correlations are not each other's.
     slope = loss.value_and_slope(at)[1]
     assert abs(slope[3] - slope[4]) > 1e-2 * size
-
-
-# --- the graph ------------------------------------------------------------------------------------
 
 
 def test_the_graph_weights_names_and_mixtures_as_the_reference_does(laid, rng):

@@ -20,18 +20,13 @@ def test_a_line_says_how_much_is_finished(capsys):
     assert second.endswith(" left") and " a second, " in second
 
 
-def test_lines_are_some_seconds_apart(capsys):
+def test_lines_are_some_seconds_apart_and_short_work_shows_nothing(capsys):
     """Negative control of `interval`: a thousand updates at once write nothing."""
-    with ProgressBar("clips", 1000) as bar:
+    with ProgressBar("clips", 1000) as bar, LateProgress("points") as late:
         for _ in range(1000):
             bar.advance(1)
-    assert capsys.readouterr().err == ""
-
-
-def test_progress_of_short_work_shows_nothing(capsys):
-    with LateProgress("points") as bar:
-        assert [*bar.count("abc")] == ["a", "b", "c"]
-        bar.update(3, 3)
+        assert [*late.count("abc")] == ["a", "b", "c"]
+        late.update(3, 3)
     assert capsys.readouterr().err == ""
 
 

@@ -59,14 +59,8 @@ def test_systems_have_the_same_bytes_alone_and_beside_larger_ones(rng):
         own, right = system(rng, size)[1], rng.normal(size=(2, size))
         bands[:, :size, place], goal[:, :size, place] = own, right
         known[:size, place] = False
-        alone.append(
-            banded_systems.solve(
-                own[:, :, None],
-                right[:, :, None],
-                np.zeros((size, 1), bool),
-                np.zeros((2, size, 1)),
-            )[:, :, 0]
-        )
+        sides = (right[:, :, None], np.zeros((size, 1), bool), np.zeros((2, size, 1)))
+        alone.append(banded_systems.solve(own[:, :, None], *sides)[:, :, 0])
     found = banded_systems.solve(bands, goal, known, nothing)
     for place, (size, own) in enumerate(zip(sizes, alone, strict=True)):
         assert np.array_equal(found[:, :size, place], own)

@@ -80,11 +80,6 @@ def content(folder):
     }
 
 
-def checksum(content):
-    """Size and SHA-256 of a file's content."""
-    return len(content), hashlib.sha256(content).hexdigest()
-
-
 def lines(path):
     """Values of a file of JSON Lines."""
     return [orjson.loads(line) for line in path.read_bytes().splitlines()]

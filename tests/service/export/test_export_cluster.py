@@ -66,11 +66,6 @@ def begun(words, cluster, tmp_path):
         process.kill()
 
 
-def python(code, *words):
-    own = [sys.executable, "-c", code, *words]
-    return subprocess.run(own, capture_output=True, text=True, check=False)
-
-
 def test_a_worker_killed_in_the_middle_loses_nothing(undisturbed, cluster, begun):
     process, target = begun
     cluster.kill(0)
@@ -100,6 +95,8 @@ def test_an_export_that_ends_early_is_resumed(words, undisturbed, cluster, begun
 
 
 def test_workers_of_another_version_are_refused(words, cluster, tmp_path):
-    done = python(OTHER, *words(tmp_path / "made", "--scheduler", cluster.address))
+    asked = words(tmp_path / "made", "--scheduler", cluster.address)
+    command = [sys.executable, "-c", OTHER, *asked]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert re.search(r"posefield: tcp://\S+: posefield \S+, expected 0; finished", done.stderr)

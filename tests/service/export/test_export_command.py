@@ -32,7 +32,9 @@ def export(model_path, posefield):
     return run
 
 
-def test_a_table_becomes_files(export, table, tmp_path):
+def test_a_table_becomes_files(export, table, tmp_path, monkeypatch):
+    # A CI system that asks for colours gets no control sequences.
+    monkeypatch.setenv("FORCE_COLOR", "1")
     code, out, err = export(table, "-o", tmp_path / "made", "--format", "json")
     assert (code, err) == (0, "")
     assert out.startswith(f"{tmp_path}/made: 3 clips, ")
@@ -57,17 +59,6 @@ def test_damage_is_told_and_mended_to_verify(export, table, tmp_path):
     assert (code, err) == (0, f"{clip}: missing or damaged; the export is made again\n")
     assert ": 3 clips, " in out and "complete before" not in out
     assert clip.read_bytes() == content
-
-
-def test_lines_tell_of_a_resumed_export_where_there_is_no_terminal(export, tmp_path, monkeypatch):
-    """And no control sequences, though a CI system asks for colours."""
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    words = ("--sample", "9", "--chunk", "3", "-o", tmp_path / "made")
-    (tmp_path / "made").mkdir()
-    assert export(*words, "--shard", "0/3")[0] == 0
-    code, out, err = export(*words)
-    assert (code, err) == (0, "resumed: 3 of 9 clips were finished\n")
-    assert ": 9 clips, " in out
 
 
 def test_rows_at_fault_are_told_of_by_line(export, table, tmp_path):
@@ -101,17 +92,8 @@ def test_what_makes_no_sense_is_refused(words, said, export, table, tmp_path):
 @pytest.mark.system
 def test_a_terminal_sees_a_bar(model_path, tmp_path):
     ours, its = pty.openpty()
-    words = [
-        POSEFIELD,
-        "export",
-        model_path,
-        "--sample",
-        "200",
-        "--chunk",
-        "4",
-        "-o",
-        tmp_path / "t",
-    ]
+    sample = ["--sample", "200", "--chunk", "4"]
+    words = [POSEFIELD, "export", model_path, *sample, "-o", tmp_path / "t"]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100"}
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=its, env=environment) as process:
         os.close(its)

@@ -65,11 +65,6 @@ def reached(target, number, process):
     return process.poll() is None
 
 
-def wait_for_parts(target, number, process):
-    """Wait until so many chunks are done; the process must still be at work then."""
-    assert reached(target, number, process), process.communicate()
-
-
 def workers_of(process):
     """Process ids of the workers of an export."""
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
@@ -115,7 +110,7 @@ def test_killed_ten_times_it_ends_with_the_same_bytes(command, undisturbed, tmp_
 def test_told_to_stop_it_says_how_to_go_on(told, workers, after, command, undisturbed, tmp_path):
     process = begun(command(tmp_path, "--workers", workers))
     # After none, its workers have hardly begun.
-    wait_for_parts(tmp_path, after, process)
+    assert reached(tmp_path, after, process), process.communicate()
     while after == 0 and process.poll() is None and len(workers_of(process)) < 2:
         time.sleep(0.001)
     # As a terminal does: the whole group is told.
@@ -139,7 +134,7 @@ def test_told_to_stop_it_says_how_to_go_on(told, workers, after, command, undist
 @pytest.mark.parametrize("place", [0, 1])
 def test_a_worker_that_dies_ends_it_clearly(place, after, command, undisturbed, tmp_path):
     process = begun(command(tmp_path, "--workers", 2))
-    wait_for_parts(tmp_path, after, process)
+    assert reached(tmp_path, after, process), process.communicate()
     # After none, the worker is killed as it starts.
     while len(workers_of(process)) <= place:
         assert process.poll() is None

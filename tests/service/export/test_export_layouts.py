@@ -49,7 +49,7 @@ def unpacked(folder, layout):
 
 
 @pytest.mark.parametrize("layout", ["tar", "zip"])
-def test_an_archive_for_each_chunk_holds_the_files_of_the_folders(layout, made):
+def test_an_archive_for_each_chunk_holds_its_files_and_then_its_manifest(layout, made):
     names = {path.name for path in made[layout].iterdir()}
     archives = {f"clips-{n:06d}.{layout}" for n in range(3)}
     assert names == {*archives, "manifest.jsonl", "export.json"}
@@ -57,16 +57,10 @@ def test_an_archive_for_each_chunk_holds_the_files_of_the_folders(layout, made):
     found = {name: content for name, content in members if not name.startswith("manifest")}
     loose = exporting.content(made["folder"])
     assert found == {path: content for path, content in loose.items() if path.startswith("clips")}
-
-
-@pytest.mark.parametrize("layout", ["tar", "zip"])
-def test_the_manifest_of_an_archive_is_its_last_member(layout, made):
-    members = list(unpacked(made[layout], layout))
     places = [index for index, (name, _) in enumerate(members) if name.startswith("manifest")]
     assert places == [CHUNK, 2 * CHUNK + 1, ROWS + 2]
     assert [members[place][0] for place in places] == [f"manifest-{n:06d}.jsonl" for n in range(3)]
-    together = b"".join(members[place][1] for place in places)
-    assert together == (made["folder"] / "manifest.jsonl").read_bytes()
+    assert b"".join(members[place][1] for place in places) == loose["manifest.jsonl"]
 
 
 def test_a_library_is_one_character_that_can_play_every_clip(made, source, model_path):

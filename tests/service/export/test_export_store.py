@@ -5,16 +5,13 @@ import pytest
 import stores
 
 from posefield.batch import process_pool, run
-from posefield.batch.run import Shard
 from posefield.batch.store_target import StoreTarget
 from posefield.common.errors import FileError
 from posefield.registry import object_store
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.usefixtures("store_environment")]
 
 ROWS = 30
-
-pytestmark = pytest.mark.usefixtures("store_environment")
 
 
 @pytest.fixture
@@ -71,13 +68,6 @@ def test_what_was_stopped_goes_on_in_a_store(source, model_path, bucket, local):
     assert watch.begun == (ROWS, 16)
     assert content(bucket) == local["folder"]
     assert run.run(work, source, watch).already_complete
-
-
-def test_shards_meet_in_a_store(source, model_path, bucket, local):
-    work = exporting.work(model_path, source, bucket)
-    for index in (1, 0):
-        run.run(work, source, exporting.Recorder(), shard=Shard(index, 2))
-    assert content(bucket) == local["folder"]
 
 
 def test_a_bucket_that_there_is_not_is_named(source, model_path):

@@ -3,6 +3,7 @@
 import hashlib
 import json
 
+import exporting
 import pytest
 
 from posefield.batch import scripts as many
@@ -31,25 +32,13 @@ def batch(models, tmp_path):
     return PerformanceBatch((models,), str(tmp_path / "out"), "bvh")
 
 
-def entries(folder):
-    return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
-
-
-def contents(folder):
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
 def test_each_script_has_a_file_and_a_line(batch, scripts, tmp_path):
     told = []
     outcome = many.run(batch, many.read_scripts(scripts), advance=lambda count: told.append(count))
     out = tmp_path / "out"
-    found = entries(out)
+    found = exporting.lines(out / "manifest.jsonl")
     assert [each["name"] for each in found] == ["slow", "000002", "take"]
-    assert sorted(contents(out)) == [
+    assert sorted(exporting.content(out)) == [
         "manifest.jsonl",
         *(f"performances/{name}.bvh" for name in ("000002", "slow", "take")),
     ]
@@ -67,15 +56,15 @@ def test_only_what_changed_is_made_again(batch, scripts, tmp_path):
     out = tmp_path / "out"
     rows = many.read_scripts(scripts)
     many.run(batch, rows)
-    whole = contents(out)
+    whole = exporting.content(out)
     assert many.run(batch, rows).before == 3
     (out / "performances/take.bvh").unlink()
     assert many.run(batch, rows).before == 2
-    assert contents(out) == whole
+    assert exporting.content(out) == whole
     scripts.write_text(lines(walk(name="slow", fps=60), walk(fps=24)))
     outcome = many.run(batch, many.read_scripts(scripts))
     assert outcome.before == 1 and [each["name"] for each in outcome.entries] == ["slow", "000002"]
-    assert contents(out)["performances/slow.bvh"] != whole["performances/slow.bvh"]
+    assert exporting.content(out)["performances/slow.bvh"] != whole["performances/slow.bvh"]
 
 
 def test_all_scripts_at_fault_are_named_and_nothing_is_written(batch, tmp_path):
@@ -113,7 +102,7 @@ def test_processes_give_the_same_bytes(batch, scripts, tmp_path, models):
     many.run(batch, rows)
     several = PerformanceBatch((models,), str(tmp_path / "several"), "bvh")
     many.run(several, rows, workers=2)
-    assert contents(tmp_path / "several") == contents(tmp_path / "out")
+    assert exporting.content(tmp_path / "several") == exporting.content(tmp_path / "out")
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,12 @@ from posefield.question.motion_question import ClipQuestion, NamedClipQuestion, 
 from posefield.registry import model_registry
 from posefield.synthesis import clips
 
-WRITERS = {"csv": write_csv, "jsonl": write_jsonl, "parquet": write_parquet}
+# Writers of tables, and the places of their rows.
+WRITERS = {
+    "csv": (write_csv, "q.csv:{}".format),
+    "jsonl": (write_jsonl, "q.jsonl:{}".format),
+    "parquet": (write_parquet, "q.parquet row {}".format),
+}
 USUAL = Defaults(
     "bvh",
     ClipQuestion(controls={}, fps=24.0, start=0.1, end=0.9, performer="short", level=1),
@@ -79,13 +84,9 @@ BOUND = 6e6
 MANY = 30_000
 
 
-def named_model(path):
-    return model_registry.load([path]).models[path.stem]
-
-
 @pytest.fixture(scope="module")
 def model(labelled_path):
-    return named_model(labelled_path)
+    return model_registry.load([labelled_path]).models["labelled"]
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +97,7 @@ def walk(walk_path):
 
 @pytest.fixture(scope="module")
 def styled(styled_path):
-    return named_model(styled_path)
+    return model_registry.load([styled_path]).models["styled"]
 
 
 @pytest.fixture(scope="module")
@@ -131,25 +132,17 @@ def bodies(model, table, usual=USUAL):
 
 @given(table=st.lists(ROWS, min_size=1, max_size=8))
 @settings(max_examples=60, deadline=None)
-def test_rows_of_all_files_are_bodies_over_http(model, folder, table):
+def test_rows_of_all_files_are_bodies_over_http_and_faults_are_named_by_line(model, folder, table):
     """Oracle: decoding and validation of a request."""
-    expected = bodies(model, table)
-    for ending, write in WRITERS.items():
+    expected, said = bodies(model, table), {}
+    for ending, (write, place) in WRITERS.items():
         found = rows(model, write(folder / f"q.{ending}", table), USUAL)
         plain = [None if isinstance(r, RowFault) else (r.name, r.format, r.question) for r in found]
         assert plain == expected, ending
-
-
-@given(table=st.lists(ROWS, min_size=2, max_size=8))
-@settings(max_examples=30, deadline=None)
-def test_faults_are_named_by_line_or_row(model, folder, table):
-    found = {
-        e: faults(model, write(folder / f"f.{e}", table), USUAL) for e, write in WRITERS.items()
-    }
-    at_fault = [int(place.removeprefix("f.jsonl:")) for place, _ in found["jsonl"]]
-    assert [place for place, _ in found["csv"]] == [f"f.csv:{n + 1}" for n in at_fault]
-    assert [place for place, _ in found["parquet"]] == [f"f.parquet row {n}" for n in at_fault]
-    assert [said for _, said in found["jsonl"]] == [said for _, said in found["parquet"]]
+        at_fault = [(n, row) for n, row in enumerate(found, start=1) if isinstance(row, RowFault)]
+        assert all(row.place == f"{folder}/{place(n)}" for n, row in at_fault)
+        said[ending] = [row.message for _, row in at_fault]
+    assert said["jsonl"] == said["parquet"]
 
 
 def test_controls_may_be_left_open(model, tmp_path):
@@ -206,7 +199,7 @@ def test_targets_are_text_or_objects(model, tmp_path):
     words = "RightHand@end:-0.2,1.1,0.5; LeftFoot@0.25:0.1,0,0.5"
     objects = [HAND, {"joint": "LeftFoot", "position": [0.1, 0, 0.5], "time": 0.25}]
     table = [{**POINT, "exact": "none", "targets": words}, {**POINT, "exact": None}]
-    for ending, write in WRITERS.items():
+    for ending, (write, _) in WRITERS.items():
         first, second = rows(model, write(tmp_path / f"q.{ending}", table))
         assert (first.question.targets, first.question.exact) == (TARGETS, "none")
         assert (second.question.targets, second.question.exact) == ((), "auto")
@@ -332,16 +325,6 @@ def test_a_file_that_changes_while_it_is_read_is_refused(model, tmp_path):
         run.check_rows(opened, skip=True)
 
 
-def peak(work):
-    """Return the bytes that work holds at most, beyond those there were."""
-    tracemalloc.start()
-    try:
-        work()
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-
-
 @pytest.mark.system
 @pytest.mark.parametrize("kind", ["csv", "jsonl", "sample", "grid"])
 def test_rows_are_not_held(model, tmp_path, kind):
@@ -352,4 +335,8 @@ def test_rows_are_not_held(model, tmp_path, kind):
     asked = {"sample": {"sample": MANY}, "grid": {"grid": ("turn=0:50:200", "stature=1.7:1.8:150")}}
     ask = asked.get(kind) or {"path": text(tmp_path / f"q.{kind}", *lines[kind])}
     opened = source(model, **ask)
-    assert peak(lambda: sum(1 for _ in opened.rows())) < BOUND
+    tracemalloc.start()
+    assert sum(1 for _ in opened.rows()) == MANY
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < BOUND

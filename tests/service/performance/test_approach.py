@@ -85,7 +85,7 @@ def test_a_walk_ends_where_a_placed_act_goes_on(script, act, end):
     assert_leads(script, plan, staged)
 
 
-@pytest.mark.parametrize("goal", [6.0 + 0.5j, 4.0 - 1.0j, 5.0 + 2.0j])
+@pytest.mark.parametrize("goal", [4.0 - 1.0j, 5.0 + 2.0j])
 def test_an_act_without_a_heading_faces_the_way_the_walk_comes(script, act, goal):
     turned = StagedAct(1, act, None, goal, lambda angle: act.motion_to(goal, angle))
     plan, staged = lead(script, turned)

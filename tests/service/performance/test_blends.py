@@ -159,11 +159,6 @@ def test_a_motion_goes_on_into_itself_wherever_it_lies():
     assert found.motion.shift == pytest.approx(back.shift)
 
 
-def test_nothing_to_search_is_refused():
-    with pytest.raises(ValueError, match="0 exits and 5 entries"):
-        joins.find_cut(character(), smooth(1), smooth(2), range(0), range(5))
-
-
 def test_a_motion_after_another_and_back_is_none():
     first, second = FloorMotion(0.4, 1.0 + 2.0j), FloorMotion(-1.1, 0.5j)
     points = np.random.default_rng(1).normal(size=(5, 3))
@@ -185,11 +180,6 @@ def test_a_placed_passage_moves_as_one_body():
     before = own.roots + quat.rotate(own.rotations[:, 0], point)
     assert np.allclose(found.roots + quat.rotate(found.rotations[:, 0], point), by.place(before))
     assert np.array_equal(found.rotations[:, 1:], own.rotations[:, 1:])
-    assert len(found.part(1, 3)) == 2
     assert found.part(1, 3).phases is None
-    assert replace_phase(own).part(1, 3).phases == pytest.approx([0.25, 0.5])
-
-
-def replace_phase(own):
-    """Return a passage with phases."""
-    return Passage(own.rotations, own.roots, own.contacts, own.sigmas, np.arange(4) / 4)
+    phased = replace(own, phases=np.arange(4) / 4).part(1, 3)
+    assert len(phased) == 2 and phased.phases == pytest.approx([0.25, 0.5])

@@ -14,8 +14,8 @@ CUT = CutFacts(0.05, 0.02, "dead", UsualMotion(4.0, "captured"))
 EASY = JoinFacts(CUT, 8.0)
 
 
-def judged(before, after, kind, motion=None):
-    cut = joins.find_cut(character(), before, after, range(30, 50), range(8), motion)
+def judged(before, after, kind):
+    cut = joins.find_cut(character(), before, after, range(30, 50), range(8))
     after = after.placed(cut.motion)
     joined = joins.join(before, after, cut, kind)
     found = join_quality.usual_acceleration(character(), [before, after])
@@ -23,14 +23,14 @@ def judged(before, after, kind, motion=None):
     facts = join_quality.describe_cut((before, after), cut, kind, usual)
     sent = PlacedFrames(joined.rotations, joined.roots)
     (judgement,) = join_quality.judge(character(), [(cut.exit, facts)], sent)
-    return judgement, cut
+    return judgement
 
 
 def test_a_plain_cut_is_hard():
-    facts, _ = judged(smooth(3), smooth(4), "cut")
+    facts = judged(smooth(3), smooth(4), "cut")
     assert facts.hard
     assert facts.peak > 10.0 * facts.cut.usual.acceleration
-    blended, _ = judged(smooth(3), smooth(4), "dead")
+    blended = judged(smooth(3), smooth(4), "dead")
     assert blended.peak < 0.3 * facts.peak
 
 

@@ -60,7 +60,7 @@ def test_a_target_within_reach_is_met_and_the_rest_of_the_body_stays(body):
     assert hardest(found) < GENTLE
 
 
-@pytest.mark.parametrize("way", [(0, 0, 3), (3, 0, 0), (0, 2, -1), (0, -0.3, 0), (-1, 3, -1)])
+@pytest.mark.parametrize("way", [(0, 0, 3), (0, -0.3, 0), (-1, 3, -1)])
 def test_a_target_out_of_reach_is_missed_without_a_jerk(body, way):
     own = standing(0.01)
     place = path(own, LEFT)[0] + way

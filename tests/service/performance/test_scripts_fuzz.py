@@ -33,13 +33,11 @@ def casts(walk_path):
     return {"stroll": cast_of(walk_path), "cmu_walk": cast_of(shipped)}
 
 
-def outcomes(cast, count):
-    return [random_scripts.check(own, cast.find) for own in random_scripts.scripts(cast, count)]
-
-
 @pytest.mark.parametrize("name", COUNTS)
 def test_random_scripts_are_performed_or_refused_with_a_pointer(casts, name):
-    found = outcomes(casts[name], COUNTS[name])
+    cast = casts[name]
+    drawn = random_scripts.scripts(cast, COUNTS[name])
+    found = [random_scripts.check(own, cast.find) for own in drawn]
     assert [fault for own in found for fault in own.faults] == []
     assert sum(own.answer is not None for own in found) > 0.5 * COUNTS[name]
 
@@ -61,10 +59,6 @@ def walked(casts):
     return script, random_scripts.check(document, cast.find).answer
 
 
-def spoiled(answer, **changed):
-    return replace(answer, clip=replace(answer.clip, **changed))
-
-
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
@@ -77,8 +71,8 @@ def spoiled(answer, **changed):
 )
 def test_a_spoiled_answer_has_a_fault(walked, spoil, said):
     script, answer = walked
-    found = " ".join(random_scripts.faults(script, spoiled(answer, **spoil(answer))))
-    assert said in found
+    spoiled = replace(answer, clip=replace(answer.clip, **spoil(answer)))
+    assert said in " ".join(random_scripts.faults(script, spoiled))
 
 
 def lowered(translations):

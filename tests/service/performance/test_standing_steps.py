@@ -20,7 +20,7 @@ from posefield.performance import (
     walk_steps,
 )
 from posefield.performance.act_motion import Act, StagedAct
-from posefield.performance.passage import RATE, FloorMotion, Passage
+from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.script import resolve_script
 from posefield.performance.standing_steps import StandingEnds, Travel
 from posefield.performance.timeline import Timeline
@@ -33,7 +33,6 @@ from posefield.synthesis.synthesizer import Synthesizer
 
 SHIPPED = Path(__file__).parents[3] / "service/posefield/shipped/cmu_walk.onnx"
 BOTH = {"start": "standing", "stop": "standing"}
-KNEES = ("LeftLeg", "RightLeg")
 
 
 @cache
@@ -67,12 +66,6 @@ def accelerations(passage):
 def walked(request, phase=0.1):
     plan = plan_walk(walk().gait, request, FloorMotion(), phase)
     return plan, walk_entries.walk_passage(walk(), plan)
-
-
-def bends(passage):
-    """Return the bends of both knees (F, 2), degrees."""
-    places = [walk().session.card.skeleton.names.index(name) for name in KNEES]
-    return np.degrees(2.0 * np.arccos(np.abs(passage.rotations[:, places, 0])))
 
 
 def test_the_standing_pose_has_its_feet_beside_each_other():
@@ -151,32 +144,11 @@ def test_steps_are_no_more_sudden_than_walking():
     sudden[len(made) - own.closing :] = still
     assert accelerations(replace(made, rotations=sudden)).max() > usual
     # Knees turn smoothly, too.
-    bent = np.abs(np.diff(bends(made), n=2, axis=0)).max(axis=1)
+    places = [walk().session.card.skeleton.names.index(name) for name in ("LeftLeg", "RightLeg")]
+    bends = np.degrees(2.0 * np.arccos(np.abs(made.rotations[:, places, 0])))
+    bent = np.abs(np.diff(bends, n=2, axis=0)).max(axis=1)
     assert bent[: own.opening].max() < bent[own.opening : -own.closing].max()
     assert bent[-own.closing :].max() < bent[own.opening : -own.closing].max()
-
-
-def backwards(own):
-    """Return a passage in the other order, in which no contact is likely."""
-    none = np.zeros_like(own.contacts)
-    return Passage(*(array[::-1] for array in (own.rotations, own.roots, none, own.sigmas)))
-
-
-def test_an_opening_step_is_a_closing_step_backwards():
-    plan, _ = walked(WalkRequest(1.1, to=(0.0, 4.0), start="standing"))
-    count = plan.standing.opening
-    part = plan.part(0, count)
-    bare = walk_entries.walk_passage(walk(), replace(part, standing=None))
-    travel = Travel(part.places, part.headings, part.phases)
-    opened = standing_steps.add_standing_ends(bare, travel, StandingEnds(pose(), opening=count))
-    closed = standing_steps.add_standing_ends(
-        backwards(bare),
-        Travel(*(array[::-1] for array in (part.places, part.headings, part.phases))),
-        StandingEnds(pose(), closing=count),
-    )
-    for name in ("rotations", "roots", "contacts"):
-        assert np.array_equal(getattr(opened, name), getattr(closed, name)[::-1])
-    assert not np.array_equal(opened.roots, bare.roots)
 
 
 def performed(*segments):
@@ -185,7 +157,7 @@ def performed(*segments):
     return composition.perform(resolve_script(asked, lambda _: walk()), 10_000)
 
 
-@pytest.mark.parametrize("speed", [0.6, 0.8, 1.1, 1.3])
+@pytest.mark.parametrize("speed", [0.6, 1.3])
 def test_placed_feet_skate_no_more_in_starts_and_stops(speed):
     way = {"kind": "walk", "to": [0, 10], "speed": speed}
     steady, both = performed(way).trust, performed(way | BOTH).trust
@@ -195,7 +167,7 @@ def test_placed_feet_skate_no_more_in_starts_and_stops(speed):
     assert len(both.segments[0].notes) == 2
 
 
-@pytest.mark.parametrize("way", [6.0, 6.5, 7.0, 7.5])
+@pytest.mark.parametrize("way", [6.0, 6.5])
 def test_an_act_goes_on_from_where_a_walk_stands(way):
     own = {"kind": "walk", "model": "cmu_walk", "seconds": 2.0, "stop": "standing"}
     content = msgspec.json.encode({"segments": [own, own]})

@@ -1,8 +1,6 @@
 """Tests of the plans and poses of walks, with the shipped model of captured walks."""
 
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from posefield.common.errors import InvalidField
 from posefield.constraints.take_variation import TakeSettings
 from posefield.inference import session
 from posefield.locomotion import floor_plane, gait
-from posefield.motion import quat
 from posefield.performance import reporting, walk_entries
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.walk_entries import SynthesisSettings
@@ -21,7 +18,6 @@ from posefield.performance.walk_plan import plan_walk
 from posefield.performance.walk_request import Disc, WalkRequest
 from posefield.synthesis.synthesizer import Synthesizer
 
-SHIPPED = Path(__file__).parents[3] / "service/posefield/shipped/cmu_walk.onnx"
 ORIGIN = FloorMotion()
 BENDS = np.array([[0, 0], [1, 4], [0, 8], [-1, 12], [0, 16], [0, 22]], dtype=float)
 CHANGES = ((0.0, 0.8), (7.0, 0.8), (10.0, 1.4), (16.0, 1.4), (18.0, 1.0))
@@ -48,26 +44,14 @@ WALKS = {
 }
 
 
-@cache
-def shipped() -> Synthesizer:
-    """Return the shipped model of captured walks."""
-    return Synthesizer("cmu_walk", session.load(SHIPPED))
-
-
-@cache
-def shipped_gait() -> gait.Gait:
-    """Return its gait."""
-    return gait.fit_gait(shipped().session)
+@pytest.fixture(scope="module")
+def walk(shipped_walk):
+    return shipped_walk
 
 
 @pytest.fixture(scope="module")
-def walk() -> Synthesizer:
-    return shipped()
-
-
-@pytest.fixture(scope="module")
-def walking() -> gait.Gait:
-    return shipped_gait()
+def walking(walk):
+    return gait.fit_gait(walk.session)
 
 
 def planned(walking, request, start=ORIGIN, phase=0.1):
@@ -182,41 +166,17 @@ def test_takes_and_details_differ_and_stay_on_the_path(walk, walking):
     assert np.allclose(same.rotations, mean.rotations, atol=1e-4)
 
 
-def test_a_steady_cycle_closes_and_is_that_of_a_walk(walk, walking):
-    plan = planned(walking, WalkRequest(1.2, to=(0.0, 6.0)), phase=0.0)
-    frames = 60
-    cycle = walk_entries.cycle_passage(walk, plan.walker, plan.controls[0], frames)
-    own = plan.walker.strides(plan.controls[:1])
-    step = np.linalg.norm(np.diff(cycle.roots, axis=0), axis=1)
-    closing = cycle.roots[0] + floor_plane.at_height(own.travels, np.zeros(1))[0] - cycle.roots[-1]
-    assert np.linalg.norm(closing) < 1.5 * step.max()
-    assert cycle.phases == pytest.approx(np.arange(frames) / frames)
-    walked = walk_entries.walk_passage(walk, plan)
-    at = int(np.argmin(np.abs(plan.phases - 0.5)))
-    assert np.abs(cycle.rotations[30, 1:] - walked.rotations[at, 1:]).max() < 0.02
-    assert np.abs(cycle.rotations[15, 1:] - walked.rotations[at, 1:]).max() > 0.1
-
-
 REFUSED = [
-    (WalkRequest(2.5, to=(0, 5)), "speed", "2.5 m/s, expected 0.4"),
-    (WalkRequest(float("nan"), to=(0, 5)), "speed", "finite"),
     (WalkRequest(((0, 1.0), (5, 3.0)), to=(0, 5)), "speed/1", "3 m/s"),
     (WalkRequest(((0, 0.6), (0.1, 1.6)), to=(0, 5)), "speed/1", "m/s² from the pair before"),
     (WalkRequest(((0, 1.0, 2.0),), to=(0, 5)), "speed/0", "a pair of numbers"),
-    (WalkRequest(1.0), "along", "none given"),
     (WalkRequest(1.0, to=(0, 5), seconds=3.0), "seconds", "to and seconds given"),
     (WalkRequest(1.0, seconds=3.0, end=ORIGIN), "end", "given with seconds"),
-    (WalkRequest(1.0, to=(0, 5), turn=0.1), "turn", "without seconds"),
     (WalkRequest(1.0, seconds=3.0, arrive_heading=0.1), "arrive_heading", "without to"),
-    (WalkRequest(1.0, seconds=3.0, turn=1.5), "turn", "expected -0."),
     (WalkRequest(1.0, to=(0, 5), entry_speed=1.0, start="standing"), "entry_speed", "standing"),
     (WalkRequest(1.0, to=(0, float("inf"))), "to/1", "finite"),
-    (WalkRequest(1.0, along=np.array([[0, 0], [0, 4.0], [0.2, 0]])), "along/1", "it turns by"),
-    (WalkRequest(1.0, along=np.array([[0, 0], [0, 4.0], [0, 4.0]])), "along/2", "0.000 m from the"),
     (WalkRequest(1.0, along=np.array([[0, 0.0, 1.0]])), "along", "pairs of finite numbers"),
     (WalkRequest(1.0, along=np.array([[0, 0.0], [0, 1e9]])), "along/1", "1e+09 m away"),
-    (WalkRequest(1.0, to=(0, 9000.0)), "speed", "a walk of 9000 s"),
-    (WalkRequest(1.0, to=(0, 5), controls={"speeed": 1.0}), "controls/speeed", "did you mean"),
     (WalkRequest(1.0, to=(0, 5), controls={"stride_length": 9}), "controls/stride_length", "9 m"),
     (WalkRequest(1.0, to=(0, 9), obstacles=(Disc(0.1, 4, 0.5),)), "obstacles/0", "within 0.10 m"),
     (WalkRequest(1.0, seconds=3.0, detour=True), "detour", "along or seconds"),
@@ -268,8 +228,7 @@ def test_models_without_contacts_and_performers_walk(request, fixture):
     kind=st.sampled_from(["to", "end", "along", "seconds"]),
     ends=st.tuples(*[st.sampled_from(["rolling", "standing"])] * 2),
 )
-def test_valid_walks_end_where_they_should(seed, kind, ends):
-    walk, walking = shipped(), shipped_gait()
+def test_valid_walks_end_where_they_should(walk, walking, seed, kind, ends):
     rng = np.random.default_rng(seed)
     start = FloorMotion(rng.uniform(-3, 3), complex(*rng.uniform(-5, 5, 2)))
     way = rng.uniform(6.0, 20.0) * np.exp(1j * (start.turn + rng.uniform(-3, 3)))
@@ -289,7 +248,7 @@ def test_valid_walks_end_where_they_should(seed, kind, ends):
         assert np.isfinite(array).all()
     assert np.all(np.diff(plan.phases) >= 0.0)
     assert np.all(np.diff(plan.distances) >= -1e-12)
-    assert abs(quat_norms(made) - 1.0).max() < 1e-4
+    assert abs(np.linalg.norm(made.rotations, axis=-1) - 1.0).max() < 1e-4
     if kind in ("to", "end"):
         assert abs(plan.end.shift - place) < 0.01
     if kind == "end":
@@ -309,8 +268,3 @@ def gentle_waypoints(rng, start):
     turns = start.turn + np.cumsum(rng.uniform(-0.3, 0.3, 4))
     places = start.shift + np.cumsum(5.0 * np.exp(1j * turns))
     return np.column_stack([places.imag, places.real])
-
-
-def quat_norms(passage):
-    """Return the norms of all rotations."""
-    return np.linalg.norm(quat.unroll(passage.rotations), axis=-1)

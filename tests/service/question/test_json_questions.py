@@ -132,18 +132,16 @@ def test_an_unknown_name_is_answered_with_those_that_are_known(body, said):
 HUGE = "1" + "0" * 400
 
 
-@pytest.mark.parametrize("number", [HUGE, f"-{HUGE}", "1e300", "9223372036854775808"])
+@pytest.mark.parametrize("number", [HUGE, "1e300", "9223372036854775808"])
 @pytest.mark.parametrize(
     ("form", "body", "field"),
     [
         (WhyQuestion, '{"controls":{},"nearest":%s}', "nearest"),
         (SigmaQuestion, '{"across":"a","along":"b","rows":%s}', "rows"),
-        (SigmaQuestion, '{"across":"a","along":"b","columns":%s}', "columns"),
         (PoseQuestion, '{"controls":{},"times":[0],"level":%s}', "level"),
         (FileQuestion, '{"controls":{},"take":%s}', "take"),
         (PerformanceQuestion, '{"segments":[{"kind":"hold","seconds":1}],"take":%s}', "take"),
         (WalkQuestion, '{"count":%s}', "count"),
-        (WalkQuestion, '{"motions":%s}', "motions"),
     ],
 )
 def test_an_integer_beyond_floats_is_refused_by_the_name_of_its_field(form, body, field, number):

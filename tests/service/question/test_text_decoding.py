@@ -26,15 +26,7 @@ def test_words_are_targets(text, expected):
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "",
-        "rhand",
-        "rhand:0,0,0",
-        "rhand@soon:0,0,0",
-        "rhand@end:0,0",
-        "rhand@end:0,0,1e999",
-        "rhand@end:0,0, 1",
-    ],
+    ["", "rhand@soon:0,0,0", "rhand@end:0,0", "rhand@end:0,0,1e999", "rhand@end:0,0, 1"],
 )
 def test_other_words_are_none(text):
     with pytest.raises(ValueError, match="expected JOINT@MOMENT:X,Y,Z, m; a moment is seconds or"):
@@ -44,27 +36,16 @@ def test_other_words_are_none(text):
 HAND = {"joint": "hand", "position": [0, 1.5, 2], "time": 1}
 
 
-def test_plain_values_are_targets():
-    found = msgspec.convert(HAND, Target)
-    assert found == Target("hand", (0.0, 1.5, 2.0), time=1) and found.when == 1.0
-    at = {"joint": "hand", "position": [0, 1, 2], "at": "lowest"}
-    assert msgspec.convert(at, Target) == Target("hand", (0.0, 1.0, 2.0), at="lowest")
-    assert msgspec.convert(at, Target).when == "lowest"
-
-
 @pytest.mark.parametrize(
     "found",
     [
-        [],
-        "hand@end:0,0,0",
         {**HAND, "position": [0, 1]},
-        {**HAND, "position": [0, 1, True]},
         {**HAND, "at": "end"},
-        {**HAND, "frame": 3},
         {"joint": "hand", "position": [0, 1, 2], "at": "soon"},
     ],
 )
-def test_other_values_are_none(found):
+def test_plain_values_are_targets_or_none(found):
+    assert msgspec.convert(HAND, Target) == Target("hand", (0.0, 1.5, 2.0), time=1)
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert(found, Target)
 

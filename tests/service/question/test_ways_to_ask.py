@@ -15,19 +15,6 @@ from posefield.question.model_question import SigmaQuestion, WhyQuestion
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 
 
-def test_a_query_and_a_body_say_alike_how_a_file_is_made():
-    said = {"names": "ue5", "root": "in_place", "unit": "cm", "up": "z"}
-    expected = FileQuestion(controls={"turn": -2.0}, loop=True, **said)
-    assert (
-        text_decoding.decode_question(
-            FileQuestion, [("turn", "-2"), ("loop", "true"), *said.items()]
-        )
-        == expected
-    )
-    content = {"controls": {"turn": -2}, "loop": True, **said}
-    assert json_decoding.decode_question(FileQuestion, json.dumps(content).encode()) == expected
-
-
 def test_what_is_left_out_has_one_default():
     expected = FileQuestion(controls={})
     assert text_decoding.decode_question(FileQuestion, []) == expected
@@ -66,17 +53,12 @@ def test_a_query_is_read_as_the_standard_library_reads_it(text):
 
 
 PAIRS = [("turn", "20"), ("stature", "1.7")]
-
-
 BODY = {"controls": {"stature": 1.7, "turn": 20}}
-
-
 GRID = {"across": "a", "along": "b", "rows": 3}
-
-
+MADE = {"names": "ue5", "root": "in_place", "unit": "cm", "up": "z"}
 CASES = {
     PoseQuestion: ([("time", "0.5")], {"times": [0.5]}),
-    FileQuestion: ([("fps", "25")], {"fps": 25}),
+    FileQuestion: ([*MADE.items(), ("loop", "true")], {**MADE, "loop": True}),
     WhyQuestion: ([("nearest", "3")], {"nearest": 3.0}),
     SigmaQuestion: ([(name, str(value)) for name, value in GRID.items()], GRID),
 }

@@ -5,7 +5,7 @@ import struct
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Usd, UsdGeom, UsdSkel, Vt
 
 from posefield.motion import quat
 
@@ -110,9 +110,7 @@ def write_glb(path, figure, **more):
         }
         for joint, name in enumerate(figure.names)
     ]
-    for node in nodes:
-        node.update({} if node["children"] else {"children": None})
-    nodes = [{k: v for k, v in node.items() if v is not None} for node in nodes]
+    nodes = [{k: v for k, v in node.items() if v != []} for node in nodes]
     nodes.append({"name": "Armature", "scale": [0.01] * 3, "children": [0]})
     facts = {
         "asset": {"version": "2.0"},
@@ -154,18 +152,8 @@ def write_usd(path, figure, unit=1.0, up="y", skeletons=1):
     return path
 
 
-def write_empty_usd(path):
-    """Write a stage without a skeleton."""
-    layer = Sdf.Layer.CreateNew(str(path))
-    layer.Save()
-    return path
-
-
 def _matrices(turns, places):
-    found = []
-    for turn, place in zip(turns, places, strict=True):
-        matrix = Gf.Matrix4d(1.0)
-        matrix.SetRotateOnly(Gf.Quatd(float(turn[0]), Gf.Vec3d(*map(float, turn[1:]))))
-        matrix.SetTranslateOnly(Gf.Vec3d(*map(float, place)))
-        found.append(matrix)
-    return Vt.Matrix4dArray(found)
+    found = np.zeros((len(turns), 4, 4))
+    found[:, :3, :3] = quat.to_matrix(turns).swapaxes(1, 2)
+    found[:, 3, :3], found[:, 3, 3] = places, 1.0
+    return Vt.Matrix4dArray.FromNumpy(found)

@@ -1,7 +1,7 @@
 """Tests of retargeting: equal bodies, rest poses, proportions, feet and hands."""
 
+from collections import namedtuple
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
 from posefield.retarget import planted_legs
-from posefield.retarget.retargeting import HandGoal, RetargetReport, retarget
+from posefield.retarget.retargeting import HandGoal, retarget
 from posefield.rigs.rig import read_rig
 
 ROUNDING = 1e-5
@@ -23,9 +23,7 @@ LEGS = (*SHINS, "LeftLeg", "RightLeg")
 FEET = ("LeftToeBase", "RightToeBase")
 
 
-class Retargeted(NamedTuple):
-    clip: Clip
-    report: RetargetReport
+Retargeted = namedtuple("Retargeted", ("clip", "report"))
 
 
 @pytest.fixture
@@ -64,23 +62,13 @@ def test_a_rig_of_the_same_skeleton_has_the_same_motion(walk, figure, onto):
     assert apart(onto(figure.longer(1.02, *LEGS)).clip, walk) > 100 * ROUNDING
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_axes_of_the_joints_do_not_matter(walk, figure, onto, seed):
-    assert apart(onto(figure.framed(seed)).clip, walk) < ROUNDING
-
-
-def test_a_rest_pose_with_lowered_arms_has_the_same_motion(walk, figure, onto):
+def test_axes_rest_pose_heading_and_a_root_above_the_hips_do_not_matter(walk, figure, onto):
     lowered = figure.turned("LeftArm", (0, 0, 1), -50.0).turned("RightArm", (0, 0, 1), 50.0)
-    made = onto(lowered)
-    assert apart(made.clip, walk) < ROUNDING
-    # The same places need other rotations of the arms.
-    arm = walk.skeleton.names.index("LeftArm")
-    assert np.abs(made.clip.rotations[:, arm] - walk.rotations[:, arm]).max() > 0.1
-
-
-def test_a_rig_that_faces_elsewhere_walks_as_the_motion(walk, figure, onto):
-    turned = figure.turned("Hips", (0, 1, 0), 90.0)
-    assert apart(onto(turned).clip, walk) < ROUNDING
+    others = (figure.framed(1), lowered, figure.turned("Hips", (0, 1, 0), 90.0))
+    for other in (*others, figure.with_root("root")):
+        made = onto(other)
+        assert apart(made.clip, walk) < ROUNDING
+    assert np.array_equal(made.clip.rotations[:, 0], np.tile(quat.IDENTITY, (len(walk), 1)))
 
 
 PROPORTIONS = {
@@ -128,13 +116,6 @@ def test_told_stances_are_kept(walk, figure, onto):
     assert onto(tall, stances=[]).report.skate == 0.0
 
 
-def test_soles_are_lifted_beyond_seven_millimetres():
-    depths = np.linspace(-0.05, 0.05, 201)
-    left = depths - planted_legs.limited_lifts(depths)
-    assert np.array_equal(left[depths <= 0.007], depths[depths <= 0.007])
-    assert left.max() <= 0.01 < depths.max() and np.all(np.diff(left) >= 0.0)
-
-
 def test_the_root_travels_in_proportion_or_as_the_motion(walk, figure, onto):
     tall = figure.longer(1.2, *LEGS)
     way = walk.root_path[-1] - walk.root_path[0]
@@ -166,21 +147,12 @@ def test_more_joints_follow_along_the_chain_or_rest(walk, figure, onto):
     middle = orientations(made.clip)[:, names.index("SpineMiddle")]
     below, above = (turned[0][:, names.index(name)] for name in ("LowerBack", "Spine"))
     between = quat.slerp(below, above, np.array(0.5))
-    assert np.degrees(angle(middle, between)).max() < 3.0
+    angles = np.linalg.norm(quat.log(quat.mul(quat.conj(middle), between)), axis=-1)
+    assert np.degrees(angles).max() < 3.0
 
 
 def orientations(clip):
     return skeleton.forward_kinematics(clip.skeleton.parents, clip.rotations, clip.translations)[1]
-
-
-def angle(one, other):
-    return np.linalg.norm(quat.log(quat.mul(quat.conj(one), other)), axis=-1)
-
-
-def test_a_root_above_the_hips_carries_them(walk, figure, onto):
-    made = onto(figure.with_root("root"))
-    assert apart(made.clip, walk) < ROUNDING
-    assert np.array_equal(made.clip.rotations[:, 0], np.tile(quat.IDENTITY, (len(walk), 1)))
 
 
 def test_a_motion_with_any_rest_pose_is_retargeted(walk, roles, figure, onto):
@@ -282,16 +254,6 @@ def test_missing_roles_are_told(walk, figure, onto):
     assert "no joint for" in warning and "they do not move" in warning
 
 
-def test_a_motion_without_legs_is_refused(walk, figure, onto):
+def test_a_motion_without_legs_is_refused(roles, figure, onto):
     with pytest.raises(InvalidField, match="no joint for rightFoot"):
-        onto(figure, own_roles={r: j for r, j in ROLES.items() if r != "rightFoot"})
-
-
-ROLES = {
-    "hips": "Hips",
-    **{
-        side.lower() + role: side + joint
-        for side in ("Left", "Right")
-        for role, joint in (("UpperLeg", "UpLeg"), ("LowerLeg", "Leg"), ("Foot", "Foot"))
-    },
-}
+        onto(figure, own_roles={r: j for r, j in roles.items() if r != "rightFoot"})

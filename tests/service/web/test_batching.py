@@ -57,19 +57,15 @@ def together(model, asked, rounds=1):
     return asyncio.run(ask())
 
 
-def test_one_call_answers_all_of_a_turn(model):
+def test_one_call_answers_all_of_a_turn_with_the_bytes_that_each_gets_alone(model):
     own, feeds = counted(model)
     asked = [question(own, haste) for haste in HASTE]
     feeds.clear()
-    together(own, asked)
+    found = together(own, asked)
     assert rows(feeds) == [2, 2, MAX_POSES, MAX_POSES, 7]
-
-
-def test_each_gets_the_bytes_that_it_gets_alone(model):
-    asked = [question(model, haste) for haste in HASTE]
-    for each, row in zip(asked, together(model, asked), strict=True):
-        (own,) = poses.run_batch(model, [each])
-        assert all(np.array_equal(a, b) for a, b in zip(row, own, strict=True))
+    for each, row in zip(asked, found, strict=True):
+        (alone,) = poses.run_batch(model, [each])
+        assert all(np.array_equal(a, b) for a, b in zip(row, alone, strict=True))
 
 
 def test_one_that_has_no_answer_harms_no_other(model):

@@ -1,21 +1,10 @@
 """Tests of the number of BLAS threads of a server process."""
 
 import numpy as np
-import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.http import server
-
-
-@pytest.fixture(autouse=True)
-def two_threads(monkeypatch):
-    """Two BLAS threads, of which the environment says nothing."""
-    for name in SINGLE_THREAD_ENV:
-        monkeypatch.delenv(name, raising=False)
-    with threadpool_limits(2, user_api="blas"):
-        assert threads() == {2}
-        yield
 
 
 def threads():
@@ -24,6 +13,10 @@ def threads():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
 
-def test_blas_keeps_to_one_thread():
-    server.limit_threads()
-    assert threads() == {1}
+def test_blas_keeps_to_one_thread(monkeypatch):
+    for name in SINGLE_THREAD_ENV:
+        monkeypatch.delenv(name, raising=False)
+    with threadpool_limits(2, user_api="blas"):
+        assert threads() == {2}
+        server.limit_threads()
+        assert threads() == {1}

@@ -43,13 +43,7 @@ def test_credentials_of_browsers_are_never_allowed():
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "https://a.example/",
-        "https://A.example",
-        "https://*.example",
-        "null",
-    ],
+    "text", ["https://a.example/", "https://A.example", "https://*.example", "null"]
 )
 def test_what_is_no_origin_is_refused(text):
     with pytest.raises(InvalidField, match=re.escape("ORIGINS: ")):

@@ -7,11 +7,7 @@ from posefield.http.responses import MIN_CHUNK_SIZE, merged_chunks
 
 @pytest.mark.parametrize(
     "pieces",
-    [
-        [b"a", b"", b"b"],
-        [b"", b"x" * MIN_CHUNK_SIZE, b"", b"y"],
-        [b"x" * 1000] * 1000,
-    ],
+    [[b"a", b"", b"b"], [b"", b"x" * MIN_CHUNK_SIZE, b"", b"y"], [b"x" * 1000] * 1000],
 )
 def test_nothing_is_lost_and_all_but_the_last_are_long_enough(pieces):
     found = list(merged_chunks(pieces))

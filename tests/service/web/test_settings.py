@@ -26,13 +26,7 @@ def test_each_setting_has_a_variable():
 
 
 @pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("PORT", "65536"),
-        ("GRACE", "1.5"),
-        ("OPEN", "yes"),
-        ("JWT_LEEWAY", "-1"),
-    ],
+    ("name", "text"), [("PORT", "65536"), ("GRACE", "1.5"), ("OPEN", "yes"), ("JWT_LEEWAY", "-1")]
 )
 def test_a_variable_that_cannot_be_used_is_named(name, text):
     with pytest.raises(InvalidField, match=f"POSEFIELD_{name}: .*expected"):
