@@ -109,18 +109,18 @@ class Toolbox:
 
     def list_models(self, arguments: Mapping[str, Any]) -> Facts:
         """Return the models, what segment of a script each can be, and its controls."""
-        _decode(Nothing, arguments)
+        json_decoding.convert_question(Nothing, arguments)
         return {"models": [_model_facts(model) for model in self.models.models.values()]}
 
     def plan(self, arguments: Mapping[str, Any]) -> Facts:
         """Return the report of a performance, without its poses."""
-        script = self._resolve(_decode(PlanRequest, arguments).script)
+        script = self._resolve(json_decoding.convert_question(PlanRequest, arguments).script)
         with errors_under("script"):
             return composition.plan(script, MAX_FRAMES).document()
 
     def perform(self, arguments: Mapping[str, Any]) -> Facts:
         """Write a performance to a file; return its path and its report."""
-        asked = _decode(FileRequest, arguments)
+        asked = json_decoding.convert_question(FileRequest, arguments)
         path = self.folder / _file_name(asked.file)
         encoder, question = CLIP_ENCODERS[path.suffix[1:]], asked.script
         with errors_under("script"):
@@ -134,10 +134,6 @@ class Toolbox:
     def _resolve(self, question: PerformanceQuestion) -> Script:
         with errors_under("script"):
             return resolve_script(question, self.models.find)
-
-
-def _decode(form: Any, arguments: Mapping[str, Any]) -> Any:
-    return json_decoding.convert_question(form, arguments)
 
 
 def _file_name(name: str) -> str:

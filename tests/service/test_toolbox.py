@@ -57,6 +57,14 @@ def test_a_file_has_the_report_of_its_plan(box, tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["walks.usdc"]
 
 
+def test_a_link_in_the_folder_is_replaced_and_leads_nowhere_else(box, tmp_path):
+    secret = tmp_path / "other.txt"
+    secret.write_text("kept")
+    (tmp_path / "walks.npz").symlink_to(secret)
+    called(box, "perform", {"script": WALKS, "file": "walks.npz"})
+    assert secret.read_text() == "kept" and not (tmp_path / "walks.npz").is_symlink()
+
+
 def test_only_performing_writes(box, tmp_path):
     assert [tool.name for tool in box.tools.values() if tool.writes] == ["perform"]
     called(box, "list_models", {})

@@ -179,13 +179,13 @@ class _System:
 
     def path(self, known: Annotated[Booleans, "size chains"], given: Sides, joined: bool) -> Paths:
         """Return the paths (N,). joined: the places of first stances of cycles are unknown."""
-        found = self._joined(known, given) if joined else self._solved(known, given)
+        if joined:
+            found = self._joined(known, given)
+        else:
+            found = banded_systems.solve(self.bands, self.goal, known, given)
         whole = self.chains.spread(found)
         path = whole[0] + 1j * whole[1] if len(whole) > 1 else whole[0]
         return self._in_cycle(path)
-
-    def _solved(self, known: Annotated[Booleans, "size chains"], given: Sides) -> Sides:
-        return banded_systems.solve(self.bands, self.goal, known, given)
 
     def _joined(self, known: Annotated[Booleans, "size chains"], given: Sides) -> Sides:
         """Return the solutions (2, U, R), of cycles with the first place that fits both ends."""

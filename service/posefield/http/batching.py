@@ -76,7 +76,10 @@ class ClipBatcher:
         """Return the file of an answer; the batch does not affect its bytes."""
         if len(answer.clip) > MAX_BATCHED_FRAMES:
             return await worker_threads.run_in_thread(encoder.encode, answer, convention)
-        work = partial(_files, encoder, convention)
+
+        def work(answers: Sequence[ClipAnswer]) -> list[bytes]:
+            return encoder.write(answers, convention)
+
         made: bytes = await self._result((encoder.extension, convention), answer, work)
         return made
 
@@ -112,12 +115,6 @@ def _encoded_clips(
         answer if isinstance(answer, Exception) else EncodedClip(answer, next(files))
         for answer in answers
     ]
-
-
-def _files(
-    encoder: ClipEncoder, convention: Convention, answers: Sequence[ClipAnswer]
-) -> list[bytes]:
-    return encoder.write(answers, convention)
 
 
 def _uncancelled_context() -> Context:

@@ -48,7 +48,6 @@ from posefield.question.motion_question import (
 )
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import crowd_synthesis, walking_feet
-from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.crowd_validation import (
     Blending,
     CharacterTakes,
@@ -313,17 +312,16 @@ async def limit_crowd(context: Crowds, content: bytes) -> CrowdTask:
 
 async def pose_crowd(context: Crowds, task: CrowdTask) -> CrowdPoses:
     """Return the poses of a crowd."""
-    return await worker_threads.within(_poses, context.model, task)
 
+    def work() -> CrowdPoses:
+        question = of_body(task.content, task.most)
+        return crowd_synthesis.synthesize_crowd(context.model, question)
 
-def _poses(model: Synthesizer, task: CrowdTask) -> CrowdPoses:
-    return crowd_synthesis.synthesize_crowd(model, of_body(task.content, task.most))
+    return await worker_threads.within(work)
 
 
 async def encode_crowd(context: Crowds, task: CrowdTask, answer: CrowdPoses) -> bytes:
-    """Return the poses as a file, large ones in a thread."""
-    if len(answer.rotations) <= context.form.inline_limit:
-        return context.form.encode(answer)
+    """Return the poses as a file."""
     return await worker_threads.within(context.form.encode, answer)
 
 
@@ -358,11 +356,11 @@ async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
 
 async def plan_walk(context: Walks, task: WalkTask) -> CrowdClip:
     """Return the crowd with planned paths, whose motions are computed as they are sent."""
-    return await worker_threads.within(_planned, context.model, task)
-
-
-def _planned(model: Synthesizer, task: WalkTask) -> CrowdClip:
-    return walking_feet.build_crowd(model, model.gait, task.order)
+    model = context.model
+    # The gait of a model is measured at its first use.
+    return await worker_threads.within(
+        lambda: walking_feet.build_crowd(model, model.gait, task.order)
+    )
 
 
 async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:

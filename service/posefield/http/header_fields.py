@@ -72,7 +72,8 @@ class HeadLimits:
     def _check_host(self, given: bytes) -> None:
         name = _without_port(given.decode("latin-1").lower())
         if not (_is_address(name) or any(_matches(name, known) for known in self.names)):
-            expected = ", ".join(_joined_names(known) for known in self.names)
+            shown = (f"*{known}" if known.startswith(".") else known for known in self.names)
+            expected = ", ".join(shown)
             detail = f"{name[:100]!r}, expected an address or one of {expected} (POSEFIELD_HOSTS)"
             raise RequestError(UNKNOWN_HOST, detail)
         # Bounded: clients can make up any number of accepted Host values.
@@ -98,10 +99,6 @@ _NAME = frozenset("abcdefghijklmnopqrstuvwxyz0123456789.-_")
 
 def _matches(name: str, known: str) -> bool:
     return known in ("*", name) or (known.startswith(".") and name.endswith(known))
-
-
-def _joined_names(known: str) -> str:
-    return f"*{known}" if known.startswith(".") else known
 
 
 def _without_port(given: str) -> str:

@@ -181,16 +181,11 @@ async def _compress_body(response: Response, coding: str) -> None:
     headers["Content-Length"] = str(len(response.body))
 
 
-def _zstd(content: bytes) -> bytes:
-    return zstd.compress(content, ZSTD_LEVEL)
-
-
-def _gzip(content: bytes) -> bytes:
+_COMPRESS: dict[str, Callable[[bytes], bytes]] = {
+    "zstd": lambda content: zstd.compress(content, ZSTD_LEVEL),
     # mtime=0: equal content gives equal bytes.
-    return gzip.compress(content, GZIP_LEVEL, mtime=0)
-
-
-_COMPRESS: dict[str, Callable[[bytes], bytes]] = {"zstd": _zstd, "gzip": _gzip}
+    "gzip": lambda content: gzip.compress(content, GZIP_LEVEL, mtime=0),
+}
 
 
 async def _compress_stream(pieces: AsyncIterator[bytes], coding: str) -> AsyncIterator[bytes]:

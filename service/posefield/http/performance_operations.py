@@ -238,7 +238,10 @@ def _layout(query: dict[str, str]) -> PerformanceLayout:
 async def validate(context: Performances, asked: ScriptRequest) -> PerformanceTask:
     """Return the script with its models; raises QueryError with a pointer into the script."""
     question, encoder = asked.question, context.form
-    write = _encoder(encoder, asked.layout)
+    try:
+        write = performance_files.encoder(encoder, asked.layout)
+    except InvalidField as fault:
+        raise problems.parameter_error(fault) from None
     order = _delivery(context, asked)
     if order is None:
         convention = encoder.convention(question.unit, question.up, question.body)
@@ -266,13 +269,6 @@ def _delivery(context: Performances, asked: ScriptRequest) -> Delivery | None:
             raise problems.parameter_error(fault) from None
         raise
     return found
-
-
-def _encoder(form: ClipEncoder, layout: PerformanceLayout) -> PerformanceEncoder:
-    try:
-        return performance_files.encoder(form, layout)
-    except InvalidField as fault:
-        raise problems.parameter_error(fault) from None
 
 
 def places(context: Performances, task: PerformanceTask) -> AbstractAsyncContextManager[None]:

@@ -1,6 +1,6 @@
 """Steps of the requests on trust: sigma, why and suggestions."""
 
-from contextlib import AbstractAsyncContextManager, nullcontext
+from contextlib import AbstractAsyncContextManager
 from functools import partial
 from typing import Any
 
@@ -19,9 +19,6 @@ from posefield.synthesis.trust import explain_result, suggest
 Grids = Context[TableEncoder[SigmaGrid]]
 Model = Context[None]
 
-# The first request inverts the matrix of all captured clips: some milliseconds for this many.
-CLIPS_AT_ONCE = 100
-
 
 async def limit_grid(context: Grids, question: SigmaQuestion) -> SigmaQuestion:
     """Return the question; InvalidField for a grid beyond the limit of the settings."""
@@ -32,27 +29,19 @@ async def limit_grid(context: Grids, question: SigmaQuestion) -> SigmaQuestion:
     return question
 
 
-def grid_places(context: Grids, question: SigmaQuestion) -> AbstractAsyncContextManager[None]:
-    """Return the limit on grids that take a thread."""
-    return (
-        worker_threads.SYNTHESIS_LIMITER
-        if len(question) > context.form.inline_limit
-        else nullcontext()
-    )
+def quick_places(context: object, question: object) -> AbstractAsyncContextManager[None]:
+    """Return the limit on work of milliseconds."""
+    return worker_threads.POSE_LIMITER
 
 
 async def compute_grid(context: Grids, question: SigmaQuestion) -> SigmaGrid:
     """Return sigma and support on the grid."""
-    if len(question) > context.form.inline_limit:
-        return await worker_threads.within(trust.grid, context.model, question)
-    return trust.grid(context.model, question)
+    return await worker_threads.within(trust.grid, context.model, question)
 
 
 async def encode_grid(context: Grids, question: SigmaQuestion, answer: SigmaGrid) -> bytes:
     """Return the grid as bytes."""
-    if len(question) > context.form.inline_limit:
-        return await worker_threads.within(context.form.encode, answer)
-    return context.form.encode(answer)
+    return await worker_threads.within(context.form.encode, answer)
 
 
 def send_grid(context: Grids, answer: SigmaGrid, content: bytes) -> Response:
@@ -64,7 +53,7 @@ _grid = partial(
     Steps[TableEncoder[SigmaGrid], SigmaQuestion, SigmaQuestion, SigmaGrid, bytes],
     GRID_ENCODERS,
     validate=limit_grid,
-    places=grid_places,
+    places=quick_places,
     synthesise=compute_grid,
     encode=encode_grid,
     respond=send_grid,
@@ -73,16 +62,8 @@ GET_SIGMA = _grid(decode=from_url(SigmaQuestion))
 QUERY_SIGMA = _grid(decode=from_body(SigmaQuestion))
 
 
-def why_places(context: Model, question: WhyQuestion) -> AbstractAsyncContextManager[None]:
-    """Return the limit on explanations by models of many clips."""
-    quick = context.model.session.card.samples <= CLIPS_AT_ONCE
-    return nullcontext() if quick else worker_threads.SYNTHESIS_LIMITER
-
-
 async def explain(context: Model, question: WhyQuestion) -> Explanation:
     """Return the captured clips behind an answer."""
-    if context.model.session.card.samples <= CLIPS_AT_ONCE:
-        return explain_result(context.model, question)
     return await worker_threads.within(explain_result, context.model, question)
 
 
@@ -100,7 +81,7 @@ _why = partial(
     Steps[None, WhyQuestion, WhyQuestion, Explanation, dict[str, Any]],
     {},
     validate=unchecked,
-    places=why_places,
+    places=quick_places,
     synthesise=explain,
     encode=encode_why,
     respond=send_document,

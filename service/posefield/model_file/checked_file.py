@@ -204,8 +204,13 @@ NO_CHECKSUM = (
 
 def read(path: Path) -> bytes:
     """Return the content of a model file; ModelError if it cannot be read or is too large."""
+
+    def opener(name: str, flags: int) -> int:
+        # A named pipe would wait for its writer.
+        return os.open(name, flags | os.O_NONBLOCK)
+
     try:
-        with open(path, "rb", opener=_open_nonblocking) as it:
+        with open(path, "rb", opener=opener) as it:
             facts = os.fstat(it.fileno())
             if not stat.S_ISREG(facts.st_mode):
                 raise ModelError(path, "cannot be read: not a regular file")
@@ -213,11 +218,6 @@ def read(path: Path) -> bytes:
             return it.read(facts.st_size)
     except OSError as fault:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
-
-
-def _open_nonblocking(path: str, flags: int) -> int:
-    """Open a file without blocking, so that a named pipe does not wait for its writer."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def check_size(size: int, source: str | Path) -> None:

@@ -16,7 +16,7 @@ from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import PositionConstraint
 from posefield.constraints.targets import NO_CONSTRAINTS, JointTarget
 from posefield.locomotion import floor_plane
-from posefield.model_file.model_card import Control, ModelCard
+from posefield.model_file.model_card import ModelCard
 from posefield.performance import act_motion
 from posefield.performance.act_motion import Act, StagedAct
 from posefield.performance.limb_targets import WorldTarget
@@ -180,12 +180,8 @@ def _expected_position(
 def _heights(card: ModelCard, asked: MotionQuestion, goal: JointTarget) -> dict[str, float]:
     """Return the control that is the height of a target, if there is one that is not given."""
     found = constraint_solver.controls_from_targets(card, asked.controls, (goal,))
-    own = {control.name for control in card.controls if _measures_height(control)}
+    own = {c.name for c in card.controls if c.measure and c.measure.quantity == "height"}
     return {name: value for name, value in found.items() if name in own}
-
-
-def _measures_height(control: Control) -> bool:
-    return control.measure is not None and control.measure.quantity == "height"
 
 
 def _position(

@@ -314,16 +314,11 @@ def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
         one,
         read,
         repeated,
-        _default(field),
+        field.default if field.default_factory is NODEFAULT else field.default_factory(),
         meta.description or "",
         extra.get("unit"),
         extra.get("metavar"),
     )
-
-
-def _default(field: structs.FieldInfo) -> Any:
-    """Return the default of a field; NODEFAULT for a required one."""
-    return field.default if field.default_factory is NODEFAULT else field.default_factory()
 
 
 def _without_none(kind: Any) -> Any:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from posefield.common import atomic_files
 from posefield.common.units import Floats
@@ -45,7 +44,10 @@ def clip_json(answer: SampledClip, convention: Convention) -> bytes:
         "rate": clip.rate,
         "frames": len(clip),
         "times": np.round(frame_times(clip), DECIMALS),
-        **{name: _rounded(values) for name, values in motion_arrays(clip).items()},
+        **{
+            name: np.ascontiguousarray(np.round(values, DECIMALS), dtype=np.float32)
+            for name, values in motion_arrays(clip).items()
+        },
         "trust": answer.trust.document(),
     }
     return tables.json_object(content)
@@ -98,10 +100,6 @@ def motion_arrays(clip: Clip) -> dict[str, Floats]:
 def _curve_names(clip: Clip) -> dict[str, list[str]]:
     """Return the names of a clip's curves, in the order of their values; nothing without them."""
     return {} if clip.curves is None else {"curve_names": clip.curves.names}
-
-
-def _rounded(values: Floats) -> npt.NDArray[np.float32]:
-    return np.ascontiguousarray(np.round(values, DECIMALS), dtype=np.float32)
 
 
 def pose_table(answer: PoseAnswer[Any]) -> Table:

@@ -143,7 +143,8 @@ def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
         # As numpy.save: an array whose columns lie together is written in that order.
         own = values.T if values.flags.fnc else values
         head = _array_header(values.dtype, values.shape, values.flags.fnc)
-        name, data = f"{label}.npy".encode("ascii"), _bytes(own)
+        name = f"{label}.npy".encode("ascii")
+        data = np.ascontiguousarray(own).reshape(-1).view(np.uint8).data
         size = len(head) + len(data)
         if at + size > MAX_BYTES:
             raise ValueError(f"{at + size} bytes up to {label}, expected at most {MAX_BYTES}")
@@ -157,10 +158,6 @@ def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
     central = b"".join(index)
     end = END_RECORD.pack(b"PK\5\6", 0, 0, len(arrays), len(arrays), len(central), at, 0)
     return b"".join((*pieces, central, end))
-
-
-def _bytes(values: Column) -> memoryview:
-    return np.ascontiguousarray(values).reshape(-1).view(np.uint8).data
 
 
 @lru_cache(maxsize=256)
