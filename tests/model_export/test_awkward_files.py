@@ -5,15 +5,19 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 from exported_clips import encoded
 from minimal import TOML, small_clip, write_clips
 
+from posefield.common.errors import FileError
 from posefield.motion import quat
 from posefield.motion.clip import assemble
 from posefield.motion.skeleton import Skeleton
+from posefield_train.probe import probe_report
+from posefield_train.source import ingest, recipe
 from posefield_train.source.clip_joints import keep_joints
 
 PHASES = (0.0, 0.5, 1.0, 1.5)
@@ -26,6 +30,16 @@ def bvh(change: Callable[[str], str] = lambda text: text) -> Callable[[Path], No
         (folder / "a.bvh").write_text(change(encoded(small_clip(), "bvh").decode()))
 
     return write
+
+
+def with_relative_positions(text: str) -> str:
+    """The file with position channels of zeros at all joints below the root."""
+    head, motion = text.split("MOTION")
+    head = head.replace("CHANNELS 3", "CHANNELS 6 Xposition Yposition Zposition")
+    lines = motion.strip().splitlines()
+    parts = [[line.split()[at : at + 3] for at in range(0, 18, 3)] for line in lines[2:]]
+    rows = [" 0 0 0 ".join(map(" ".join, [[*own[0], *own[1]], *own[2:]])) for own in parts]
+    return "\n".join([f"{head}MOTION", *lines[:2], *rows]) + "\n"
 
 
 def frame_time(written: str) -> Callable[[str], str]:
@@ -168,6 +182,12 @@ CASES = [
         ("0.bvh: frame time 33.333 s, 0.03 frames a second", "say source.rate"),
         code=3,
     ),
+    Case(
+        "positions relative to OFFSETs",
+        bvh(with_relative_positions),
+        CONVERT,
+        ("note: positions of 4 joints are relative to their OFFSETs: added",),
+    ),
     *(
         Case(
             f"frame time {written}",
@@ -266,3 +286,57 @@ def test_a_command_reads_the_file_or_says_why_not(posefield, tmp_path, monkeypat
     assert [part for part in case.said if part not in said] == [], said
     if not code and "-o" in case.command:
         assert (tmp_path / case.command.split()[-1]).stat().st_size
+
+
+PIECES = [
+    "0",
+    "-1",
+    "1e9",
+    "nan",
+    "}",
+    "{",
+    "JOINT x",
+    "End Site",
+    "\n",
+    ",",
+    ";",
+    '"',
+    "=",
+    "[",
+    "é",
+]
+
+
+def damaged(content: bytes, chance: Random) -> bytes:
+    """A text with a line taken away, doubled or moved, or with a piece in a wrong place."""
+    lines = content.decode("latin-1").split("\n")
+    at, other = chance.randrange(len(lines)), chance.randrange(len(lines))
+    match chance.randrange(4):
+        case 0:
+            del lines[at]
+        case 1:
+            lines[at], lines[other] = lines[other], lines[at]
+        case 2:
+            lines.insert(at, lines[other])
+        case _:
+            words = lines[at].split(" ")
+            words[chance.randrange(len(words))] = chance.choice(PIECES)
+            lines[at] = " ".join(words)
+    return "\n".join(lines).encode("latin-1", "replace")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_damaged_files_are_read_or_refused(tmp_path, seed):
+    """No other error than those of files comes of 40 damaged families, tables and recipes."""
+    chance, refused = Random(seed), 0
+    for _ in range(10):
+        family()(tmp_path)
+        path = tmp_path / chance.choice(["0.bvh", "1.bvh", "clips.csv", "recipe.toml"])
+        path.write_bytes(damaged(path.read_bytes(), chance))
+        try:
+            probe_report.text(probe_report.probe(sorted(tmp_path.glob("*.bvh"))))
+            ingest.ingest(recipe.read(tmp_path / "recipe.toml"), tmp_path)
+        except FileError as fault:
+            refused += 1
+            assert len(str(fault)) < 3000
+    assert 0 < refused < 10
