@@ -285,6 +285,7 @@ def test_a_report_is_written_and_changes_nothing_in_the_model(posefield, train_w
     facts = json.loads(page.with_suffix(".json").read_text())
     assert [p.name for p in sorted(page.parent.iterdir())] == ["quick.html", "quick.json"]
     steps = [line.split(" s  ")[1] for line in err.splitlines()]
+    steps = [step.partition(" (about ")[0] for step in steps]
     assert [step["step"] for step in facts["about"]["steps"]] == steps[:-2]
     assert steps[-2:] == ["drawing the report", "done"]
     assert facts["about"]["bytes"] == model.stat().st_size
