@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[1]
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 
 BUDGETS = {
-    "service/posefield": 43_900,
-    "model_export/posefield_train": 26_460,
+    "service/posefield": 44_050,
+    "model_export/posefield_train": 25_950,
     "clients/python": 2_110,
     "clients/blender": 1_280,
     "clients/viewer/src": 8_190,
@@ -21,7 +21,7 @@ BUDGETS = {
 }
 """Most lines of each part, without generated ones: who needs more takes lines away elsewhere."""
 GENERATED = {"generated.py", "client.py", "schema.ts"}
-MOST_TESTS = 0.785
+MOST_TESTS = 0.755
 """Lines of Python under tests for each line that ships."""
 
 
