@@ -151,8 +151,9 @@ function ghost(session: Session): HTMLElement {
   const companions = new Companions(session, "ghost", [1, 0.32], async (label) => {
     const { controls, labels, performer, model } = store.state;
     const question = { controls, performer, labels, nearest: 1 };
-    const [nearest] = (await service.client.why(model, question, signal)).nearest;
-    if (!nearest || signal.aborted) return null;
+    const reasons = await service.client.why(model, question, signal);
+    const [nearest] = reasons.nearest;
+    if (!nearest || reasons.model !== card.identity || signal.aborted) return null;
     const text = `Ghost: the model at the controls of ${nearest.source}, the nearest captured clip (distance ${nearest.distance.toFixed(2)})`;
     const { level, loop, root, stands } = store.state;
     const key = `${nearest.source} ${level} ${root} ${loop} ${stands}`;

@@ -225,7 +225,7 @@ class Files {
     const { card } = this.#session;
     const formats = this.#choose("Format", "format", FORMATS);
     const seconds = this.#number("Seconds", "seconds", { min: 0.1, max: 600, step: 0.1 });
-    const seed = this.#number("Seed", "seed", { min: 0, max: LARGEST_SEED, step: 1 });
+    const seed = this.#number("Seed of paths", "seed", { min: 0, max: LARGEST_SEED, step: 1 });
     const names = this.#choose("Joint names", "names", NAMES);
     const measures = [this.#choose("Unit", "unit", UNITS), this.#choose("Up axis", "up", UPS)];
     this.#shows.push(() => {

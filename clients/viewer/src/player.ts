@@ -161,12 +161,13 @@ export class Player {
   }
 
   /** Return the answer; null for a fault, which is shown, and when the page has gone on. */
-  async #answer<Answer>(request: Promise<Answer>): Promise<Answer | null> {
-    const { notice, signal } = this.#page;
+  async #answer<Answer extends Poses>(request: Promise<Answer>): Promise<Answer | null> {
+    const { card, notice, signal } = this.#page;
     try {
       const answer = await request;
       if (!signal.aborted) notice(null);
-      return signal.aborted ? null : answer;
+      // A model that replaces this one is opened anew, with its own controls and joints.
+      return signal.aborted || answer.trust.model !== card.identity ? null : answer;
     } catch (fault) {
       if (!signal.aborted) notice(fault);
       return null;

@@ -53,7 +53,7 @@ export function mount(host: HTMLElement, session: Session): void {
     const { controls, labels, model, performer } = store.state;
     const question = { controls, performer, labels, nearest: NEAREST };
     const reasons = await service.client.why(model, question, signal).catch(() => null);
-    if (!reasons || signal.aborted) return;
+    if (reasons?.model !== card.identity || signal.aborted) return;
     list.replaceChildren(...reasons.nearest.map((clip) => item(clip, card, session)));
     const { count } = reasons.others;
     others.textContent = count
