@@ -371,7 +371,7 @@ def send_performances(
 ) -> Response:
     """Return the response that streams the archive."""
     pieces, warnings = content
-    sent = responses.sent(pieces, worker_threads.ARCHIVE_LIMITER)
+    sent = responses.sent(pieces, worker_threads.LONG_LIMITER)
     return responses.performance_archive(sent, context.form, warnings)
 
 

@@ -29,9 +29,9 @@ each holds Python's lock in turn (decision 0030)."""
 PERFORMANCE_LIMITER = CapacityLimiter(HALF)
 LONG_LIMITER = CapacityLimiter(1)
 CROWD_LIMITER = CapacityLimiter(HALF)
-ARCHIVE_LIMITER = CapacityLimiter(HALF)
+ARCHIVE_LIMITER = CapacityLimiter(CORES)
 """Limits on threads for work of seconds, separate so that other work does not wait for it. Long
-performances are made one at a time: each may take all memory for answers."""
+performances and those of archives are made one at a time: each may take all memory for answers."""
 SWITCH_INTERVAL = 0.001
 """Seconds after which a thread lets others run Python, such as the event loop that answers poses;
 Python's default of 5 ms is that long for each thread before it."""
