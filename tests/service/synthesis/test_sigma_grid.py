@@ -70,7 +70,7 @@ def test_the_whole_graph_says_the_same(model):
         ({"along": "turn"}, "along", "expected another control than across"),
         ({"columns": 1}, "columns", "1 values, expected 2 to 1024"),
         ({"margin": -0.1}, "margin", "expected 0 to 1"),
-        ({"margin": float("nan")}, "margin", "expected 0 to 1"),
+        ({"margin": float("nan")}, "margin", "expected a finite number"),
         ({"controls": {"turn": 1.0}}, "controls/turn", "given, and across the grid too"),
         ({"controls": {"spin": 1.0}}, "controls/spin", "no such control"),
         ({"performer": "nobody"}, "performer", "expected one of middle, short, tall"),
