@@ -169,7 +169,7 @@ EVEN = 0.02
 """Largest deviation of the spacing of even keys, as a share of it."""
 DROPPED = 0.1
 """Largest share of frames without a key that are told as dropped frames."""
-WAY_OUT = "expected a key in every frame, or source.rate, at which the curves are sampled"
+WAY_OUT = "expected one in each frame, or a rate (source.rate, --rate) to sample the curves at"
 
 
 @dataclass(frozen=True)

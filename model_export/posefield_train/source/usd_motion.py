@@ -129,7 +129,7 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     codes = motion.sample_codes()
     pace = _codes_per_second(opened, notes)
     if not len(codes):
-        raise opened.error(f"{motion.path} has no samples over time, expected an animation")
+        raise opened.error(f"{motion.path} moves no joints over time, expected an animation")
     try:
         found = motion_file.sample_times(codes / pace, options.rate)
     except UnevenKeys as fault:
