@@ -113,6 +113,32 @@ test("a model chosen while nobody answers is shown when somebody does", () =>
     await fault(page).waitFor({ state: "hidden" });
   }));
 
+test("an answer that breaks off leaves the picture, and is asked for again", () =>
+  on(async (page) => {
+    await settled(page);
+    const before = await picture(page);
+    await page.route(/msgpack/, (route) => route.abort("connectionreset"));
+    await slider(page, "turn").fill("300");
+    await fault(page).getByText("The last picture stays").waitFor();
+    assert.ok(before.equals(await picture(page)));
+    await page.unroute(/msgpack/);
+    await fault(page).waitFor({ state: "hidden" });
+  }));
+
+test("a stage that the graphics card lost is drawn again", () =>
+  on(async (page) => {
+    await settled(page);
+    const before = await picture(page);
+    const lose = await page.locator("#stage canvas").evaluateHandle((it: HTMLCanvasElement) => {
+      return it.getContext("webgl2")!.getExtension("WEBGL_lose_context")!;
+    });
+    await lose.evaluate((it) => it.loseContext());
+    await page.waitForTimeout(300);
+    await lose.evaluate((it) => it.restoreContext());
+    await page.waitForTimeout(300);
+    assert.ok(before.equals(await picture(page)));
+  }));
+
 // These wait far more than they compute, and leave the service as it is.
 describe("at one service", { concurrency: 3 }, () => {
   test("an answer that comes late does not overwrite a newer one, and none queue up", () =>
@@ -159,18 +185,6 @@ describe("at one service", { concurrency: 3 }, () => {
       await page.route(/msgpack/, (route) => route.fulfill({ status: 200, body: "\x80" }));
       await slider(page, "turn").fill("300");
       await fault(page).waitFor();
-      await page.unroute(/msgpack/);
-      await fault(page).waitFor({ state: "hidden" });
-    }));
-
-  test("an answer that breaks off leaves the picture, and is asked for again", () =>
-    on(async (page) => {
-      await settled(page);
-      const before = await picture(page);
-      await page.route(/msgpack/, (route) => route.abort("connectionreset"));
-      await slider(page, "turn").fill("300");
-      await fault(page).getByText("The last picture stays").waitFor();
-      assert.ok(before.equals(await picture(page)));
       await page.unroute(/msgpack/);
       await fault(page).waitFor({ state: "hidden" });
     }));
@@ -284,20 +298,6 @@ describe("at one service", { concurrency: 3 }, () => {
       await fault(page).getByText("no 3-D graphics").waitFor();
       await page.waitForTimeout(6000);
       assert.match((await fault(page).textContent())!, /no 3-D graphics/);
-    }));
-
-  test("a stage that the graphics card lost is drawn again", () =>
-    on(async (page) => {
-      await settled(page);
-      const before = await picture(page);
-      const lose = await page.locator("#stage canvas").evaluateHandle((it: HTMLCanvasElement) => {
-        return it.getContext("webgl2")!.getExtension("WEBGL_lose_context")!;
-      });
-      await lose.evaluate((it) => it.loseContext());
-      await page.waitForTimeout(300);
-      await lose.evaluate((it) => it.restoreContext());
-      await page.waitForTimeout(300);
-      assert.ok(before.equals(await picture(page)));
     }));
 
   test("a page that may keep nothing opens all the same", () =>

@@ -106,12 +106,17 @@ NEAR = 0.25
 
 
 def bound_rest(
-    local: Transform, parents: Sequence[int], outer: Transform, bind: Mapping[int, Transform]
+    local: Transform,
+    parents: Sequence[int],
+    outer: Transform,
+    bind: Mapping[int, Transform],
+    nearest: float = EIGHTH,
 ) -> Transform:
     """Return the transforms (J, ...) at rest, with turns and root of the bind pose.
 
     local: of the nodes, each to its parent, the first to `outer`. bind: orientations and places of
     joints in the frame of the exporter: exporters differ on it, but not on turns between joints.
+    nearest: least product of the roots' quaternions for which the frame is taken as that of local.
     """
     world = local.root_inside(outer).rotation
     for joint, parent in enumerate(parents):
@@ -122,7 +127,7 @@ def bound_rest(
     turns[1:] = quat.mul(quat.conj(world[list(parents[1:])]), world[1:])
     roots = [bind[0].below(outer), bind[0]] if 0 in bind else []
     root = max(roots, key=lambda own: abs(float(own.rotation @ turns[0])), default=None)
-    if root is not None and abs(float(root.rotation @ turns[0])) >= EIGHTH:
+    if root is not None and abs(float(root.rotation @ turns[0])) >= nearest:
         # A file that was exported in a pose of its motion has the root of that pose.
         is_posed = np.abs(np.sum(turns * local.rotation, axis=-1)).min() < POSED
         bones = np.linalg.norm(places[1:], axis=-1).sum()

@@ -182,7 +182,8 @@ class SkelJoints:
             raise self.opened.error(
                 f"{path} has neither restTransforms nor bindTransforms, expected one"
             )
-        return frame, rest_joints.bound_rest(frame, parents, outer, bind), notes
+        # The format says which frame bindTransforms are in, whatever pose restTransforms show.
+        return frame, rest_joints.bound_rest(frame, parents, outer, bind, 0.0), notes
 
     def world(self, codes: Sequence[float]) -> Transform:
         """Return transforms (F, ...) of the skeleton in the world."""
