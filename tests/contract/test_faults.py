@@ -23,7 +23,7 @@ OVERLOADED = Answer(503, PROBLEM, b'{"type": "urn:posefield:problem:overloaded"}
 
 def test_whatever_is_done_to_it_no_answer_is_wrong_and_none_is_lost(models):
     command = [sys.executable, BENCHMARKS / "serve_faults.py", models / "reach.onnx"]
-    done = subprocess.run([*command, "--seconds", "8"], capture_output=True, text=True, timeout=300)
+    done = subprocess.run([*command, "--seconds", "4"], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.splitlines()[-1] == "no fault"
 

@@ -20,7 +20,7 @@ from minimal import TOML, small_clip, write_clips
 
 pytestmark = pytest.mark.system
 
-SECONDS = float(os.environ.get("POSEFIELD_FUZZ_SECONDS", "15"))
+SECONDS = float(os.environ.get("POSEFIELD_FUZZ_SECONDS", "10"))
 SEED = int(os.environ.get("POSEFIELD_FUZZ_SEED", "1"))
 LONGEST = 60.0
 """CPU seconds that a command may take; each takes less than two."""
