@@ -46,7 +46,10 @@ describe("the map", () => {
     const hash = new URLSearchParams(new URL(page.url()).hash.split("?")[1]);
     const rest = card.controls.filter(({ name }) => !["turn", "target_height"].includes(name));
     return Object.fromEntries(
-      rest.map((each) => [each.name, Number(hash.get(each.name) ?? each.default)]),
+      rest.map(({ name, default: usual }) => {
+        // Open controls have the mark ~ before the value that was inferred.
+        return [name, Number((hash.get(name) ?? `${usual}`).replace("~", ""))];
+      }),
     );
   };
   const colours = (spots: readonly (readonly [number, number])[]): Promise<number[][]> =>
