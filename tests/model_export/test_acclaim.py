@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from acclaim_files import ARM_AMC, ARM_ASF, files_of
+from scipy.spatial.transform import Rotation
 
 from posefield.common.errors import AcclaimError
 from posefield_train.source import acclaim, bvh, data_folder
@@ -45,6 +46,17 @@ def test_the_axis_of_a_bone_matters(tmp_path):
     """Negative control: with axes as the world's the first turn leaves the bone where it is."""
     clip = load(tmp_path, asf=ARM_ASF.replace("axis 0 0 90", "axis 0 0 0"), unit=0.5)
     assert np.allclose(ends(clip)[0], 0.5 * np.array([3.0, 2.0, 3.0]))
+
+
+@pytest.mark.parametrize("order", ["XYZ", "ZYX", "YZX"])
+def test_angles_turn_about_fixed_axes_in_the_stated_order(tmp_path, order):
+    """Oracle: scipy. The first axis of the order turns first."""
+    turned = ARM_AMC.replace("root 1 2 3 0 90 0\nupper 0 90", "root 1 2 3 30 40 50\nupper 0 0")
+    clip = load(tmp_path, asf=ARM_ASF.replace("axis XYZ", f"axis {order}"), amc=turned)
+    degrees = dict(zip("XYZ", (30.0, 40.0, 50.0), strict=True))
+    rotation = Rotation.from_euler(order.lower(), [degrees[axis] for axis in order], degrees=True)
+    expected = np.array([1.0, 2.0, 3.0]) + rotation.apply([2.0, 0.0, 0.0])
+    assert np.allclose(ends(clip)[1], expected, atol=1e-12)
 
 
 def test_line_ends_and_blanks_do_not_matter(tmp_path):
