@@ -39,7 +39,6 @@ COMMANDS_INTRO = """\
 install "posefield[train]"`."""
 EXIT_CODES = (
     (0, "done"),
-    (1, "`check` found defects"),
     (2, "a question or an argument that cannot be answered"),
     (3, "a file that cannot be used"),
     (4, "samples from which no model can be made"),

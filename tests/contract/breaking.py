@@ -25,7 +25,7 @@ def changes(old: Node, new: Node) -> list[str]:
 
 
 def _bounds(before: "_Facts", after: "_Facts") -> Iterator[str]:
-    """What is asked for may not be bounded more, and answers not less."""
+    """Yield the bounds that became tighter for requests, or looser for answers."""
     for place, name in before.bounds.keys() | after.bounds.keys():
         if place not in before.places & after.places:
             continue
@@ -42,10 +42,10 @@ def _bounds(before: "_Facts", after: "_Facts") -> Iterator[str]:
 
 
 class _Facts:
-    """What a contract promises.
+    """Promises of a contract.
 
-    kept: facts that may not go. added: places, and what may not come there. bounds: limits and
-    enumerations of values at places.
+    kept: facts that must stay. added: places, with demands that must not be added there. bounds:
+    limits and enumerations of values at places.
     """
 
     def __init__(self, document: Node) -> None:

@@ -97,6 +97,9 @@ def _proposed(report: "ProbeReport", folder: Path) -> list[str]:
             "clips in long takes, and strides with --strides",
             err=True,
         )
+    # Any family can be read by its hips, before there is another control.
+    if "hips" not in report.roles:
+        return []
     names = [Path(file.file).relative_to(folder).as_posix() for file in report.files]
     rows = [
         FamilyRow(name, 0, file.frames - 1, "", name)
@@ -106,8 +109,8 @@ def _proposed(report: "ProbeReport", folder: Path) -> list[str]:
     text = recipe_folder.recipe_text(facts, recipe_folder.PLACEHOLDER)
     try:
         proposal = recipe_folder.propose(text, "draft", rows, folder, report.roles)
-    except (MotionError, ValueError, KeyError):
-        # Bodies without roles, clips that are no family: the draft has places for controls.
+    except (MotionError, ValueError):
+        # Clips that are no family, or that no control predicts: the draft has places for controls.
         return []
     return recipe_folder.proposal_lines(proposal, report.roles)
 

@@ -1,8 +1,8 @@
 """The `posefield` command of the service; the training job adds its own commands.
 
-Exit codes: 0 success; 1 `check` found defects; 2 a question or an argument that cannot be answered;
-3 a file that cannot be used; 4 samples from which no model can be made; 5 a process of an export
-that died; 128 and a signal's number where that ended an export.
+Exit codes: 0 success; 2 a question or an argument that cannot be answered; 3 a file that cannot be
+used; 4 samples from which no model can be made; 5 a process of an export that died; 128 and a
+signal's number where that ended an export.
 """
 
 import sys
@@ -125,8 +125,8 @@ def _exit_code(fault: MotionError) -> int:
 
 HELP = (
     "Example motions become one model file, which answers with any motion between them.\n\n"
-    "Exit codes: 0 success, 1 check found defects, 2 a question or an argument cannot be answered, "
-    "3 a file cannot be used, 4 no model can be made of the samples, 5 a process died."
+    "Exit codes: 0 success, 2 a question or an argument cannot be answered, 3 a file cannot be "
+    "used, 4 no model can be made of the samples, 5 a process died."
 )
 COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
     "demo": (command_serve.demo, SERVE, ["demo", "demo --once -o clips"]),

@@ -36,9 +36,8 @@ def add_root(clip: Clip, joints: Skeleton) -> Clip:
     still = np.broadcast_to(quat.IDENTITY, (len(clip), 1, 4)), np.zeros((len(clip), 1, 3))
     rotations = np.concatenate([still[0], clip.rotations], axis=1)
     translations = np.concatenate([still[1], clip.translations], axis=1)
-    return move_root(replace(
-        clip, skeleton=joints, rotations=rotations, translations=translations, root_bone=False
-    ), 1)  # fmt: skip
+    posed = replace(clip, skeleton=joints, rotations=rotations, translations=translations)
+    return move_root(posed, 1)
 
 
 def move_root(clip: Clip, hips: int) -> Clip:

@@ -259,9 +259,9 @@ def file_or_shipped(path: Path) -> Path:
 
     Raises ModelError for a name without a file: a path without a suffix and a folder.
     """
-    names = sorted(file.stem for file in SHIPPED_FOLDER.glob("*.onnx"))
     if path.exists() or path.suffix or path.name != str(path):
         return path
+    names = sorted(file.stem for file in SHIPPED_FOLDER.glob("*.onnx"))
     if path.name in names:
         return SHIPPED_FOLDER / f"{path.name}.onnx"
     known = ", ".join(names) + did_you_mean(path.name, names)
