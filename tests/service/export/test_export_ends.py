@@ -3,6 +3,7 @@
 Each export runs as a process of its own, by the user's command.
 """
 
+import contextlib
 import os
 import random
 import re
@@ -66,9 +67,13 @@ def reached(target, number, process):
 
 
 def workers_of(process):
-    """Process ids of the workers of an export."""
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    return [int(c) for c in children if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+    """Process ids of the workers of an export; a child may end while they are listed."""
+    workers = []
+    for child in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                workers.append(int(child))
+    return workers
 
 
 def whole(target, undisturbed):
