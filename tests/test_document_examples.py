@@ -1,14 +1,17 @@
-"""Tests of the documentation's examples: they run against the shipped models."""
+"""Tests of the documentation's examples: they run against the shipped models.
+
+The packages are installed from their wheels, in an environment that holds nothing else.
+"""
 
 import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import document_pages
 import pytest
 import serving
+import wheels
 
 pytestmark = pytest.mark.system
 
@@ -38,19 +41,32 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dist")
+    wheels.build(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def programs(dist, tmp_path_factory):
+    """Return the folder of programs of an environment with the packages that the pages install."""
+    packages = ("posefield[evaluate,parquet]", "posefield-client")
+    return wheels.install(dist, tmp_path_factory.mktemp("env"), sys.executable, *packages)
+
+
 def examples(path):
-    found = document_pages.blocks(path.read_text())
-    return [block for block in found if block.language in RUNNING]
+    return [block for block in document_pages.blocks(path.read_text()) if block.language in RUNNING]
 
 
-def run(block, address, folder):
-    """Run an example in a folder; return its exit code and what it says."""
+def run(block, address, folder, programs):
+    """Run an example in a folder; return its exit code and its output."""
     text = block.text.replace(ADDRESS, address)
     strict = "" if REFUSED in text else STRICT
     command = ["bash", "-euo", "pipefail", "-c", strict + text]
     if block.language == "python":
-        command = [sys.executable, "-c", text]
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        command = [programs / "python", "-c", text]
+    path = f"{programs}{os.pathsep}{os.environ['PATH']}"
     environ = {**os.environ, "PATH": path, "NO_PROXY": "127.0.0.1"}
     done = subprocess.run(
         command, cwd=folder, env=environ, capture_output=True, text=True, timeout=LONGEST
@@ -58,12 +74,13 @@ def run(block, address, folder):
     return done.returncode, done.stdout + done.stderr
 
 
-def assert_runs(block, address, folder):
-    code, said = run(block, address, folder)
-    assert code == 0, f"{block.text}\n{said}"
-    for line in block.text.splitlines():
-        if line.startswith(REFUSED):
-            assert '"status":422' in said and line.removeprefix(REFUSED) in said
+def assert_runs(path, address, folder, programs):
+    for block in examples(path):
+        code, output = run(block, address, folder, programs)
+        assert code == 0, f"{block.text}\n{output}"
+        for line in block.text.splitlines():
+            if line.startswith(REFUSED):
+                assert '"status":422' in output and line.removeprefix(REFUSED) in output
 
 
 @pytest.mark.parametrize(
@@ -71,9 +88,23 @@ def assert_runs(block, address, folder):
     [path for path in document_pages.pages() if examples(path)],
     ids=document_pages.identifier,
 )
-def test_the_examples_of_a_page_run_in_order(path, shipped_address, folder):
-    for block in examples(path):
-        assert_runs(block, shipped_address, folder)
+def test_the_examples_of_a_page_run_in_order(path, shipped_address, folder, programs):
+    assert_runs(path, shipped_address, folder, programs)
+
+
+# `.ci/pythons` makes an environment for each Python of this machine.
+PYTHONS = {path.parent.name[-4:]: path for path in wheels.ROOT.glob(".venv-3.*/bin/")}
+
+
+@pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
+def test_a_newcomers_pages_run_under_each_python(version, dist, shipped_address, folder, tmp_path):
+    """With the packages that these pages name, and no extra."""
+    if version not in PYTHONS:
+        pytest.skip(f"no environment of .ci/pythons with Python {version}")
+    packages = ("posefield[train]", "posefield-client")
+    programs = wheels.install(dist, tmp_path, PYTHONS[version] / "python", *packages)
+    for page in ("README.md", "docs/quickstart.md"):
+        assert_runs(wheels.ROOT / page, shipped_address, folder, programs)
 
 
 def test_many_examples_are_found():
@@ -90,6 +121,6 @@ def test_many_examples_are_found():
         "false | true\n",
     ],
 )
-def test_an_example_that_fails_is_found(text, shipped_address, folder):
+def test_an_example_that_fails_is_found(text, shipped_address, folder, programs):
     """Negative control: unknown controls, files and failures within a pipe."""
-    assert run(document_pages.Block("sh", text), shipped_address, folder)[0] != 0
+    assert run(document_pages.Block("sh", text), shipped_address, folder, programs)[0] != 0

@@ -37,6 +37,10 @@ def test_the_site_builds_with_search_and_dark_mode_and_nothing_from_elsewhere(so
     pages = list(site.rglob("index.html"))
     assert len(pages) > 90
     assert [page for page in pages if LOADED.search(page.read_text())] == []
+    index = (DOCS / "index.md").read_text()
+    guides = [f"{path.parent.name}/{path.name}" for path in DOCS.glob("[gt]*/*.md")]
+    assert [page for page in guides if page not in index and page != "tools/index.md"] == []
+    assert not list(site.rglob("*.pyc"))
     assert 'data-md-color-scheme="slate"' in (site / "index.html").read_text()
     search = json.dumps(json.loads((site / "search.json").read_text()))
     assert "POSEFIELD_CROWD_LIMIT" in search and "decisions/0" not in search

@@ -11,10 +11,9 @@ from pathlib import Path
 import httpx
 import pytest
 import serving
+import wheels
 
 ROOT = Path(__file__).parents[1]
-BIN = Path(sys.executable).parent
-NAMES = ("posefield", "posefield-train", "posefield-client")
 SHIPPED = [f"posefield/shipped/{name}" for name in ("cmu_walk.onnx", "reaching.onnx", "NOTICE")]
 TABLES = ("cmu_walk/strides.csv", "hdm05_reach/returns.csv", "hdm05_kick/clips.csv")
 
@@ -25,26 +24,8 @@ pytestmark = pytest.mark.system
 def dist(tmp_path_factory):
     """Folder with the wheels and sdists."""
     folder = tmp_path_factory.mktemp("dist")
-    for name in NAMES:
-        subprocess.run(
-            [BIN / "uv", "build", "--quiet", "--package", name, "--out-dir", folder],
-            cwd=ROOT,
-            check=True,
-        )
+    wheels.build(folder)
     return folder
-
-
-def installed(dist, folder, python, *wanted):
-    """A fresh environment with these packages, at the versions of the lock file."""
-    pins = folder / "pins.txt"
-    own = {"cwd": ROOT, "check": True, "stdout": subprocess.DEVNULL}
-    export = ["export", "--frozen", "--quiet", "--all-packages", "--all-extras", "--no-dev"]
-    words = ["--no-hashes", "--no-emit-workspace", "--output-file", pins]
-    subprocess.run([BIN / "uv", *export, *words], **own)
-    subprocess.run([BIN / "uv", "venv", "--quiet", "--python", python, folder / "env"], **own)
-    where = ["--python", folder / "env/bin/python", "--find-links", dist, "--constraints", pins]
-    subprocess.run([BIN / "uv", "pip", "install", "--quiet", *where, *wanted], **own)
-    return folder / "env/bin"
 
 
 def run(*words, cwd, code=0):
@@ -67,7 +48,7 @@ def assert_serves(posefield, models):
 
 
 def test_wheels_train_and_serve_in_a_fresh_environment(dist, tmp_path):
-    bin_ = installed(dist, tmp_path, sys.executable, "posefield[train]")
+    bin_ = wheels.install(dist, tmp_path, sys.executable, "posefield[train]")
     run(bin_ / "posefield", "sample", "reaching", "--output", "sample", cwd=tmp_path)
     trained = run(
         *(bin_ / "posefield", "train", "sample/recipe.toml", "--output", "reaching.onnx", "--json"),
@@ -82,7 +63,7 @@ def test_wheels_train_and_serve_in_a_fresh_environment(dist, tmp_path):
 
 
 def test_the_service_alone_shows_a_walk_and_tells_how_to_get_the_training_commands(dist, tmp_path):
-    bin_ = installed(dist, tmp_path, sys.executable, "posefield", "posefield-client")
+    bin_ = wheels.install(dist, tmp_path, sys.executable, "posefield", "posefield-client")
     run(bin_ / "posefield", "demo", "--once", "--output", "demo", cwd=tmp_path)
     assert (tmp_path / "demo/walk_1.2.usdc").read_bytes().startswith(b"PXR-USDC")
     helped = run(bin_ / "posefield", "--help", cwd=tmp_path).stdout
@@ -94,15 +75,6 @@ def test_the_service_alone_shows_a_walk_and_tells_how_to_get_the_training_comman
         missing = "posefield_train, scipy, onnx, (pydantic, )?matplotlib, joblib"
         line = re.escape(': pip install "posefield[train]"\n')
         assert re.fullmatch(f"posefield: needs {missing}{line}", told), told
-
-
-def test_the_lines_of_the_readme_run_after_its_installation(dist, tmp_path):
-    bin_ = installed(dist, tmp_path, sys.executable, "posefield", "posefield-client")
-    (lines,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    with serving.started([bin_ / "posefield", "serve"]) as child:
-        lines = lines.replace("http://127.0.0.1:8000", serving.address(child))
-        run(bin_ / "python", "-c", lines, cwd=tmp_path)
-    assert (tmp_path / "reach.usdc").read_bytes().startswith(b"PXR-USDC")
 
 
 def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):
