@@ -1,0 +1,208 @@
+"""Models in this process: `import posefield` answers as the service does, without a server.
+
+    model = posefield.load("reaching")
+    clip = model.clip(stature=1.75, hip_height=0.95, turn=35, target_height=1.6)
+    clip.save("reach.usdc")
+
+Keywords are the fields of the questions (`posefield.question`), decoded and validated as the body
+of a request; other keywords are controls, in the model's units. Lengths are metres, times seconds,
+angles radians, quaternions w x y z; Y is up. Invalid input raises a MotionError.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from posefield.common import atomic_files
+from posefield.common.errors import FileError, ModelError, UnknownFormat
+from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import LengthUnit, UpAxis
+from posefield.encode import performance_files
+from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder
+from posefield.encode.usd_crowd import FILES
+from posefield.locomotion import walking_crowd
+from posefield.performance import composition
+from posefield.performance.script import resolve_script
+from posefield.question import json_decoding
+from posefield.question.motion_question import DEFAULT_BODY, BodyKind, ClipQuestion, PoseQuestion
+from posefield.question.performance_question import PerformanceLayout, PerformanceQuestion
+from posefield.question.performance_report import PerformanceAnswer
+from posefield.question.results import ClipAnswer, PoseAnswer
+from posefield.question.walk_question import WalkQuestion
+from posefield.registry import model_registry
+from posefield.registry.model_registry import ModelRegistry
+from posefield.synthesis import clips, poses, walking_feet
+from posefield.synthesis.poses import MAX_POSES
+from posefield.synthesis.synthesizer import Synthesizer
+
+Question = TypeVar("Question", PoseQuestion, ClipQuestion, WalkQuestion, PerformanceQuestion)
+Script = Mapping[str, Any] | PerformanceQuestion | str | Path
+"""Script of a performance, as the body of a request, or the path of a JSON file with one."""
+
+MAX_FRAMES = 10 * MAX_POSES
+"""Largest number of frames of a performance."""
+
+
+@dataclass(frozen=True)
+class Clip(ClipAnswer):
+    """Clip of a model: `clip`, its motion, and `trust`, its provenance and uncertainty.
+
+    clip.rotations: (F, J, 4), local to the parent joint. clip.root_path: (F, 3), m. clip.skeleton:
+    names, parents and offsets, m, of the J joints. clip.rate: frames a second.
+    """
+
+    def save(
+        self,
+        path: str | Path,
+        *,
+        unit: LengthUnit | None = None,
+        up: UpAxis | None = None,
+        body: BodyKind | None = None,
+    ) -> tuple[str, ...]:
+        """Write a file in the format of the path's suffix; return its warnings.
+
+        unit, up, body: None for the format's defaults. Names of joints and the kind of root are
+        those of the question. Raises UnknownFormat, InvalidField for a convention that the format
+        does not allow, and FileError if the file cannot be written.
+        """
+        encoder = encoder_for(Path(path))
+        content = encoder.encode(self, encoder.convention(unit, up, body))
+        atomic_files.write(content, Path(path))
+        return encoder.noted(self).trust.warnings
+
+
+@dataclass(frozen=True)
+class Performance(PerformanceAnswer):
+    """Performance of a script: `clip`, its motion, and `trust`, the report of its segments.
+
+    unit, up, body: of its files, as the script has them.
+    """
+
+    unit: LengthUnit | None = None
+    up: UpAxis | None = None
+    body: BodyKind | None = None
+
+    def save(self, path: str | Path, *, layout: PerformanceLayout = "whole") -> None:
+        """Write a file in the format of the path's suffix.
+
+        layout: animations in USD files. Raises as `Clip.save` does.
+        """
+        encoder = encoder_for(Path(path))
+        encode = performance_files.encoder(encoder, layout)
+        convention = encoder.convention(self.unit, self.up, self.body)
+        atomic_files.write(encode(self, convention), Path(path))
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """Walking crowd of a model, whose motions are computed as it is saved."""
+
+    synthesizer: Synthesizer
+    question: WalkQuestion
+
+    def save(self, path: str | Path) -> Mapping[str, Any]:
+        """Write usd, usda, usdc, usdz or npz by the path's suffix; return the facts of the crowd.
+
+        Raises UnknownFormat, InvalidField for a crowd that the model or the limits do not permit,
+        and FileError if the file cannot be written.
+        """
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode.tables import motion_tables
+        from posefield.encode.usd_crowd import crowd_writer
+
+        path, question, extensions = Path(path), self.question, (*FILES, "npz")
+        if path.suffix.removeprefix(".") not in extensions:
+            raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(extensions)}")
+        order = walking_crowd.from_question(question)
+        crowd = walking_feet.build_crowd(self.synthesizer, self.synthesizer.gait, order)
+        if path.suffix == ".npz":
+            motion_tables.write_npz(crowd, path)
+        else:
+            crowd_writer.write(crowd, path, question.instancing, question.body or DEFAULT_BODY)
+        return crowd.facts
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model that is open in this process; `load` opens one."""
+
+    synthesizer: Synthesizer
+
+    def pose(self, times: float | Sequence[float], **fields: Any) -> PoseAnswer[Any]:
+        """Return the poses at times (S,), s, from the start of the clip.
+
+        fields: of a PoseQuestion, and controls. The answer has rotations (S, J, 4), root_position
+        (S, 3), m, bone_offsets (J, 3), m, and trust.
+        """
+        moments = [times] if isinstance(times, float | int) else times
+        question = decode(PoseQuestion, {**fields, "times": moments})
+        return poses.synthesize_poses(self.synthesizer, question)
+
+    def clip(self, **fields: Any) -> Clip:
+        """Return a clip. fields: of a ClipQuestion, such as fps, names and root, and controls."""
+        answer = clips.synthesize_clip(self.synthesizer, decode(ClipQuestion, fields))
+        return Clip(answer.clip, answer.trust)
+
+    def crowd(self, **fields: Any) -> Crowd:
+        """Return a crowd of a cyclic model on random paths. fields: of a WalkQuestion."""
+        return Crowd(self.synthesizer, decode(WalkQuestion, fields))
+
+    def perform(self, script: Script) -> Performance:
+        """Return the performance of a script in which this model is the only one."""
+        return perform(script, [self])
+
+
+def load(model: str | Path) -> Model:
+    """Return the model of an .onnx file, or the shipped model of a name.
+
+    Raises ModelError for a file that cannot be used, and for an unknown name.
+    """
+    path = model_registry.file_or_shipped(Path(model))
+    if path.is_dir():
+        raise ModelError(path, "a folder, expected one .onnx file")
+    return Model(next(iter(model_registry.load([path]).models.values())))
+
+
+def perform(script: Script, models: Iterable[Model] = ()) -> Performance:
+    """Return the performance of a script. models: that it may name; the shipped ones if empty.
+
+    Raises QueryError with a pointer into the script, and FileError for a file that cannot be read.
+    """
+    opened = {model.synthesizer.name: model.synthesizer for model in models}
+    registry = ModelRegistry(opened) if opened else model_registry.with_shipped([])
+    if isinstance(script, str | Path):
+        try:
+            content = Path(script).read_bytes()
+        except OSError as error:
+            raise FileError(script, f"{error.strerror}, expected a script in JSON") from error
+        question = json_decoding.decode_question(PerformanceQuestion, content)
+    else:
+        question = decode(PerformanceQuestion, script)
+    answer = composition.perform(resolve_script(question, registry.find), MAX_FRAMES)
+    conventions = question.unit, question.up, question.body
+    return Performance(answer.clip, answer.trust, answer.held, *conventions)
+
+
+def encoder_for(path: Path) -> ClipEncoder:
+    """Return the encoder for a path's suffix; UnknownFormat if there is none."""
+    extension = path.suffix.removeprefix(".")
+    if extension not in CLIP_ENCODERS:
+        known, hint = ", ".join(CLIP_ENCODERS), did_you_mean(extension, CLIP_ENCODERS)
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {known}{hint}")
+    return CLIP_ENCODERS[extension]
+
+
+def decode(form: type[Question], fields: Mapping[str, Any] | Question) -> Question:
+    """Return the question of keywords, which may hold NumPy's numbers and arrays.
+
+    Keywords that are no field of a question with controls are controls. Raises FormError.
+    """
+    if isinstance(fields, Mapping) and "controls" in form.__struct_fields__:
+        known = {name: fields[name] for name in fields if name in form.__struct_fields__}
+        named = {name: fields[name] for name in fields if name not in known}
+        fields = {**known, "controls": {**known.get("controls", {}), **named}}
+    content = msgspec.json.encode(fields, enc_hook=lambda value: value.tolist())
+    return json_decoding.decode_question(form, content)
