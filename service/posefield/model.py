@@ -18,10 +18,9 @@ import msgspec
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, ModelError, UnknownFormat
-from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import performance_files
-from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder
+from posefield.encode.formats import encoder_for
 from posefield.encode.usd_crowd import FILES
 from posefield.locomotion import walking_crowd
 from posefield.performance import composition
@@ -184,15 +183,6 @@ def perform(script: Script, models: Iterable[Model] = ()) -> Performance:
     answer = composition.perform(resolve_script(question, registry.find), MAX_FRAMES)
     conventions = question.unit, question.up, question.body
     return Performance(answer.clip, answer.trust, answer.held, *conventions)
-
-
-def encoder_for(path: Path) -> ClipEncoder:
-    """Return the encoder for a path's suffix; UnknownFormat if there is none."""
-    extension = path.suffix.removeprefix(".")
-    if extension not in CLIP_ENCODERS:
-        known, hint = ", ".join(CLIP_ENCODERS), did_you_mean(extension, CLIP_ENCODERS)
-        raise UnknownFormat("output", f"{path.name!r} ends in none of {known}{hint}")
-    return CLIP_ENCODERS[extension]
 
 
 def decode(form: type[Question], fields: Mapping[str, Any] | Question) -> Question:

@@ -12,13 +12,12 @@ from posefield.console.options import (
     CharacterOptions,
     Json,
     ModelPath,
-    encoder_for,
     open_model,
     with_option_groups,
     with_question_options,
 )
 from posefield.console.output import as_json, print_warnings, written_message
-from posefield.encode.formats import POSE_ENCODERS
+from posefield.encode.formats import POSE_ENCODERS, encoder_for
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import clips, poses

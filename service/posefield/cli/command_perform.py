@@ -12,12 +12,12 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.console.options import (
     CharacterOptions,
     Json,
-    encoder_for,
     with_option_groups,
     with_question_options,
 )
 from posefield.console.output import as_json
 from posefield.encode import performance_files
+from posefield.encode.formats import encoder_for
 from posefield.question import json_decoding
 from posefield.question.performance_question import (
     CrowdStageQuestion,

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_origin, get_type_
 import typer
 from msgspec import Struct
 
-from posefield.common.errors import InvalidField, ModelError, UnknownFormat
-from posefield.common.name_suggestion import did_you_mean
-from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder
+from posefield.common.errors import InvalidField, ModelError
+from posefield.encode.formats import ClipEncoder
+from posefield.encode.formats import encoder_for as encoder_for
 from posefield.question import text_decoding
 from posefield.question.motion_question import FileQuestion
 from posefield.question.performance_question import PerformanceQuestion
@@ -41,16 +41,6 @@ def open_model(path: Path) -> Synthesizer:
     if path.is_dir():
         raise ModelError(path, "a folder, expected one .onnx file")
     return next(iter(model_registry.load([path]).models.values()))
-
-
-def encoder_for(path: Path) -> ClipEncoder:
-    """Return the encoder for a path's ending; UnknownFormat if there is none."""
-    ending = path.suffix.removeprefix(".")
-    if ending not in CLIP_ENCODERS:
-        hint = did_you_mean(ending, CLIP_ENCODERS)
-        known = ", ".join(CLIP_ENCODERS)
-        raise UnknownFormat("output", f"{path.name!r} ends in none of {known}{hint}")
-    return CLIP_ENCODERS[ending]
 
 
 Command = Callable[..., None]

@@ -6,10 +6,12 @@ The table of archives is `archives.ARCHIVE_WRITERS`.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from posefield.common import cancellation
-from posefield.common.errors import InvalidField
+from posefield.common.errors import InvalidField, UnknownFormat
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import conventions, glb
 from posefield.encode.conventions import (
@@ -204,6 +206,15 @@ CLIP_ENCODERS = by_extension(
     ClipEncoder("arrow", ARROW, table_writer(arrow_stream), 24),
     ClipEncoder("msgpack", MSGPACK, table_writer(tables.msgpack_table), 24),
 )
+
+
+def encoder_for(path: Path) -> ClipEncoder:
+    """Return the encoder for a path's suffix; UnknownFormat if there is none."""
+    extension = path.suffix.removeprefix(".")
+    if extension not in CLIP_ENCODERS:
+        known, hint = ", ".join(CLIP_ENCODERS), did_you_mean(extension, CLIP_ENCODERS)
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {known}{hint}")
+    return CLIP_ENCODERS[extension]
 
 
 @dataclass(frozen=True)
