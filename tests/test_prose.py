@@ -39,6 +39,23 @@ def test_a_sentence_of_a_document_is_judged(tmp_path):
     assert len(check(page).stdout.splitlines()) == 2
 
 
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("/** What the answer is. */", "begins with 'What'"),
+        ("const a = 1; // Whether it is.", "begins with 'Whether'"),
+        ("/** The answer.\n * It is held to a target. */", ":2: 'held to' in: "),
+        ('const a = "https://held to";', ""),
+        ("/** The answer. */", ""),
+    ],
+)
+def test_a_comment_of_typescript_is_judged(line, fault, tmp_path):
+    file = tmp_path / "planted.ts"
+    file.write_text(f"{line}\n")
+    done = check(file)
+    assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
+
+
 def test_the_lint_step_runs_it():
     makefile = (CHECK.parents[1] / "Makefile").read_text()
     lint = makefile.partition("\nlint:")[2].partition("\n\n")[0]

@@ -57,10 +57,10 @@ export const CONTRACT = ${JSON.stringify(info.version)};
 /** Keys that every document has. */
 export const REQUIRED = ${text(Object.fromEntries(required))} as const;
 
-/** Which of them are lists. */
+/** Parameters that are lists. */
 export const LISTS = ${text(Object.fromEntries(lists))} as const;
 
-/** What files of each format are sent as. */
+/** Media types of the files of each format. */
 export const MEDIA_TYPES = ${text(mediaTypes(contract))} as const;
 
 /** Everything that may be wrong. */

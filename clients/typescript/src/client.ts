@@ -119,13 +119,13 @@ export class Client {
     return this.#read(asked, (found) => read("SigmaGrid", found), signal);
   }
 
-  /** Which captured clips an answer is made of. */
+  /** The captured clips that an answer is made of. */
   async why(model: string, question: WhyQuestion, signal?: AbortSignal): Promise<Reasons> {
     const asked = this.#request(model, "/why", question);
     return this.#read(asked, (found) => read("Reasons", found), signal);
   }
 
-  /** Which clips to capture next, and of whom. */
+  /** Clips to capture next, and their performers. */
   async suggestions(
     model: string,
     asked: Pick<WhyQuestion, "labels"> & {

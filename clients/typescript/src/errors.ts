@@ -16,13 +16,13 @@ import { CONTRACT, type components, PROBLEM_TYPES } from "./schema.ts";
 
 type Document = components["schemas"]["Problem"];
 
-/** What may be wrong, as on the service's page of problems; "other" is what newer services say. */
+/** Kinds of problems, as on the service's page of problems; "other" is one of a newer service. */
 export type ProblemKind = KindOf<Document["type"]> | "other";
 
 const PREFIX = "urn:posefield:problem:";
 type KindOf<Type extends string> = Type extends `${typeof PREFIX}${infer Kind}` ? Kind : never;
 
-/** Where in a question a fault lies: a JSON pointer into it, or the name of a parameter. */
+/** Place of a fault in a question: a JSON pointer into it, or the name of a parameter. */
 export interface Place {
   readonly pointer?: string;
   readonly parameter?: string;
@@ -43,10 +43,10 @@ export class Problem extends PosefieldError {
   override readonly name = "Problem";
   readonly status: number;
   readonly kind: ProblemKind;
-  /** What programs tell it by, whatever the contract's version. */
+  /** Kind by which programs tell problems apart, in every version of the contract. */
   readonly type: string;
   readonly title: string;
-  /** What was found and what was expected. */
+  /** The value that was found, and the expected ones. */
   readonly detail: string;
   readonly places: readonly Place[];
   /** By which the service's log knows the request. */

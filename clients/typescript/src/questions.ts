@@ -9,7 +9,7 @@ export interface Request {
   /** With the query. */
   readonly path: string;
   readonly body: string | null;
-  /** What a file has to come as; a document's form is looked at when it is read. */
+  /** Media type of a file; a document's form is checked when it is read. */
   readonly mediaType?: string;
 }
 

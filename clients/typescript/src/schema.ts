@@ -5028,7 +5028,7 @@ export const REQUIRED = {
   ]
 } as const;
 
-/** Which of them are lists. */
+/** Parameters that are lists. */
 export const LISTS = {
   "CharacterList": [
     "characters",
@@ -5078,7 +5078,7 @@ export const LISTS = {
   ]
 } as const;
 
-/** What files of each format are sent as. */
+/** Media types of the files of each format. */
 export const MEDIA_TYPES = {
   "usda": "model/vnd.usda",
   "usdc": "model/vnd.usdc",

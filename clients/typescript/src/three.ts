@@ -19,7 +19,7 @@ export interface Rig {
   readonly skeleton: Skeleton;
 }
 
-/** What has joints: a clip, poses of a crowd. */
+/** Joints of a clip, or of the poses of a crowd. */
 type Jointed = Pick<Motion, "names" | "parents" | "boneOffsets">;
 type Posed = Pick<Poses, "rotations" | "rootPosition" | "boneOffsets">;
 

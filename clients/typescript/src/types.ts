@@ -1,11 +1,11 @@
-/** What is asked and answered, named as the contract names it. */
+/** Questions and answers, named as in the contract. */
 
 import type { components, operations } from "./schema.ts";
 
 type Schemas = components["schemas"];
 
 export type ManifestEntry = Schemas["ManifestEntry"];
-/** Something that a motion was held to, and by how much it misses it. */
+/** A constraint of a motion, and the distance by which it is missed. */
 export type Met = Schemas["Met"];
 export type ModelCard = Schemas["ModelCard"];
 export type CharacterList = Schemas["CharacterList"];
@@ -97,7 +97,7 @@ export interface Motion extends Poses {
   readonly curveNames: readonly string[];
   readonly rate: number;
   readonly frames: number;
-  /** What the numbers are: other lengths and another axis up, where the question asked for them. */
+  /** Units of the numbers: other lengths and another axis up, where the question asked for them. */
   readonly units: Readonly<Record<string, string>>;
 }
 
@@ -131,12 +131,12 @@ export interface CrowdPoses {
   readonly curves: Float32Array | null;
 }
 
-/** What the head of an answer says of a file. */
+/** Facts about a file from the head of its answer. */
 export interface Named {
   /** As the service names it. */
   readonly name: string;
   readonly mediaType: string;
-  /** Which model answered, as name@hash. */
+  /** The model that answered, as name@hash. */
   readonly model: string | null;
   /** As in Trust, m; of a single clip. */
   readonly sigma: number | null;
@@ -146,12 +146,12 @@ export interface Named {
   readonly supported: boolean | null;
   /** Values that the service chose, by the controls that were left out; of a single clip. */
   readonly inferred: Readonly<Record<string, number>>;
-  /** What the clip was to meet and does not; of a single clip. */
+  /** Targets that the clip misses; of a single clip. */
   readonly missed: readonly Missed[];
   readonly warnings: readonly string[];
 }
 
-/** By how much a clip misses something that it was held to. */
+/** Distance by which a clip misses a constraint. */
 export type Missed = Pick<Met, "what" | "miss" | "unit">;
 
 /** A file, whole. */
@@ -167,7 +167,7 @@ export interface Progress {
 
 export type OnProgress = (progress: Progress) => void;
 
-/** What may be said beside the question for a large file. */
+/** Options of a large file beside its question. */
 export interface TransferOptions {
   readonly signal?: AbortSignal | undefined;
   readonly onProgress?: OnProgress | undefined;

@@ -1,4 +1,4 @@
-/** What can go wrong, by servers that really do it: each is told by its class, and some pass. */
+/** Faults of servers that really have them: each has its class of error, and some pass. */
 
 import assert from "node:assert/strict";
 import type { ServerResponse } from "node:http";

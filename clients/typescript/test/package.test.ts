@@ -53,7 +53,7 @@ let folder: string;
 before(() => {
   folder = mkdtempSync(`${tmpdir()}/posefield-`);
   run(PACKAGE, "build.ts");
-  // What npm would send, and nothing that it would leave out.
+  // The files that npm publishes, and no others.
   const words = ["pack", "--silent", "--pack-destination", folder];
   // It says what it has written, whose name has the version in it.
   const said = execFileSync("npm", words, { cwd: `${PACKAGE}dist`, encoding: "utf8" });

@@ -5,7 +5,7 @@ import type { AddressInfo } from "node:net";
 
 import { Client, type ClientOptions } from "../src/index.ts";
 
-/** Where a service with the models of api/examples listens; tests/clients/typescript starts it. */
+/** Address of a service with the models of api/examples; tests/clients/typescript starts it. */
 export const URL_OF_SERVICE = process.env["POSEFIELD_URL"] ?? "";
 
 export interface Sent {
@@ -18,7 +18,7 @@ export interface Sent {
 
 export interface Observed {
   readonly client: Client;
-  /** What has been sent and answered so far. */
+  /** Requests and answers so far. */
   readonly sent: Sent[];
 }
 

@@ -40,7 +40,7 @@ before(async () => {
   crowd = await client.crowd("reach", expected.crowd.question);
 });
 
-/** Where bones stand in the world. */
+/** Positions of bones in the world. */
 function placesOf(bones: readonly Bone[]): number[][] {
   bones[0]?.updateWorldMatrix(true, true);
   return bones.map((bone) => new Vector3().setFromMatrixPosition(bone.matrixWorld).toArray());

@@ -69,7 +69,7 @@ export function read(content: Uint8Array<ArrayBuffer>): Character {
   return character as unknown as Character;
 }
 
-/** The skin with these corners; whoever draws it may write its positions. */
+/** The skin with these corners; the code that draws it may write its positions. */
 export function geometry(character: Character, corners: Character["fine"]): BufferGeometry {
   return new BufferGeometry()
     .setAttribute("position", new BufferAttribute(character.points.slice(), 3))

@@ -1,9 +1,9 @@
-/** What may stand between a page and its service: passes all on, and may slow or cut clips. */
+/** A proxy between a page and its service: passes all on, and may slow or cut clips. */
 
 import { createServer, type Server, type ServerResponse } from "node:http";
 import type { AddressInfo } from "node:net";
 
-/** How a clip's body is sent on. */
+/** Ways to send a clip's body on. */
 export type Sending = (to: ServerResponse, body: Buffer) => Promise<void>;
 
 export class Between {

@@ -73,7 +73,7 @@ function shell(text: string): string[] {
   return said.split("\0").slice(0, -1);
 }
 
-/** What a stand-in for the client is asked, as JSON of its keywords. */
+/** The question to a stand-in for the client, as JSON of its keywords. */
 function called(text: string): Record<string, unknown> {
   const stand = `
 import json, sys, types

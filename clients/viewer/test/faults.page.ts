@@ -1,4 +1,4 @@
-/** What can go wrong around the page: it says so in words, and goes on by itself. */
+/** Faults around the page: it names them in words, and goes on by itself. */
 
 import assert from "node:assert/strict";
 import { createHash } from "node:crypto";

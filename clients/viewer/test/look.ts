@@ -1,4 +1,4 @@
-/** What a test reads from the page: its picture, its numbers, and what it was asked. */
+/** Readings of the page by a test: its picture, its numbers, and its questions. */
 
 import type { Locator, Page } from "playwright-core";
 

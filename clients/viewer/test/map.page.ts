@@ -218,7 +218,7 @@ describe("the map", () => {
     return { grid, points };
   };
 
-  /** What of the map is not of its sigma's colour; the address and the map may still be on their way. */
+  /** Pixels of the map without its sigma's colour; the address and the map may still be on their way. */
   const miscoloured = async (): Promise<string> => {
     const { grid, points } = await bare();
     const near = points

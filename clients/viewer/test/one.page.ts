@@ -272,7 +272,7 @@ test("whether anything like it was captured has a mark beside sigma, and who mov
     await who!.getByText("Moves as an unseen performer").waitFor();
     const sign = () => support!.locator("path").getAttribute("d");
     const before = await sign();
-    // Within the range of each control, and nobody walked so.
+    // Within the range of each control, but no captured clip is near.
     await typed(page, "speed").fill("1.7");
     await typed(page, "speed").press("Enter");
     await typed(page, "stride_length").fill("1");

@@ -1,4 +1,4 @@
-/** The page as somebody meets it: on a phone and a desk, at the first visit, with presets and a video. */
+/** The page as users meet it: on a phone and a desk, at the first visit, with presets and a video. */
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";

@@ -67,7 +67,7 @@ export class Serving {
   }
 }
 
-/** A port that nobody listens at now. */
+/** A port without a listener. */
 async function free(): Promise<number> {
   const server = createServer().listen(0, "127.0.0.1");
   await new Promise((done) => server.once("listening", done));

@@ -1,4 +1,4 @@
-/** What a model leaves behind when another is shown, or the same one otherwise: nothing. */
+/** A model leaves nothing behind when another is shown, or the same one otherwise. */
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
@@ -19,7 +19,7 @@ after(() => chromium.close());
 
 test("the graphics card is given back what a model took", async () => {
   const page = await chromium.newPage({ viewport: { width: 640, height: 480 } });
-  // Each geometry has buffers; those that nobody gives back stay alive.
+  // Each geometry has buffers; those that are not disposed stay alive.
   await page.addInitScript(`
     globalThis.alive = 0;
     const own = WebGL2RenderingContext.prototype;

@@ -1,4 +1,4 @@
-/** Takes and feet: what is asked of a service, and what is said of its answer. */
+/** Takes and feet: the questions to a service, and the words about its answer. */
 
 import assert from "node:assert/strict";
 import { test } from "node:test";

@@ -1,4 +1,4 @@
-/** How long things take, printed; three times the goals is too long on any machine. */
+/** Durations, printed; three times the goals is too long on any machine. */
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";

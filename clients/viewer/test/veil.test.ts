@@ -1,4 +1,4 @@
-/** What is hatched: where nothing is supported, parted half-way from where something is. */
+/** The hatched region: the unsupported points, parted half-way from the supported ones. */
 
 import assert from "node:assert/strict";
 import { test } from "node:test";

@@ -1,4 +1,4 @@
-/** How long a video is. */
+/** Length of a video. */
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
