@@ -25,7 +25,7 @@ from performance_costs import (
 from random_scripts import Document
 from rows import Row, record, table
 
-from posefield.common.array_shapes import Frames
+from posefield.common.units import Frames
 from posefield.feet import foot_placement
 from posefield.performance import composition
 from posefield.performance.passage import RATE

@@ -8,9 +8,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from posefield.common.array_shapes import Frames, Positions
 from posefield.common.errors import QueryError
-from posefield.common.units import Booleans
+from posefield.common.units import Booleans, Frames, Positions
 from posefield.locomotion import gait
 from posefield.motion.clip import Clip
 from posefield.performance import composition

@@ -1,7 +1,7 @@
 """Import hook that checks the array shapes of the project's signatures while tests run.
 
 A signature gives a shape as `Annotated[Floats, "frames joints 3"]`, in the language of jaxtyping
-(posefield/common/array_shapes.py). The hook wraps each function with such an annotation in the
+(posefield/common/units.py). The hook wraps each function with such an annotation in the
 checks of jaxtyping and beartype, and checks the fields of a dataclass after its `__init__`. Only
 arrays are checked. The service has neither the hook nor the two libraries.
 

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerPoint, Points, PointValues
-from posefield.common.units import Floats
+from posefield.common.units import Floats, PerPoint, Points, PointValues
 from posefield.kriging import kriging_model, random_field
 from posefield.kriging.kriging_model import Hyper, KrigingWeights
 

@@ -14,8 +14,7 @@ from scipy.optimize import least_squares
 
 from paper import variogram
 from paper.variogram import RANGES, ExperimentalVariogram, VariogramModel
-from posefield.common.array_shapes import PointControls, PoseVectors
-from posefield.common.units import Floats
+from posefield.common.units import Floats, PointControls, PoseVectors
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging

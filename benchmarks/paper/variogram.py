@@ -11,8 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import SampleControls, SampleValues
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, SampleControls, SampleValues
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 

@@ -26,8 +26,7 @@ from msgspec import Struct
 
 from posefield import __version__
 from posefield.common import atomic_files
-from posefield.common.errors import InvalidField, MotionError, QueryError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, MotionError, QueryError, did_you_mean
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api import contract
 from posefield.performance import composition

@@ -13,7 +13,7 @@ import httpx
 import pytest
 from serving import address, children, host_and_port, process, started, within
 
-from posefield.common.cpu_cores import SINGLE_THREAD_ENV
+from posefield.common.cancellation import SINGLE_THREAD_ENV
 
 pytestmark = pytest.mark.system
 

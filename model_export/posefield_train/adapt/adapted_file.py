@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import Floats
 from posefield.inference import reduced_motion
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, Level, ModelCard, rounded

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posefield.common.errors import RecipeError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import RecipeError, did_you_mean
 from posefield.common.units import Floats
 from posefield.model_file.model_card import PERFORMER, Control, ModelCard
 from posefield.motion import measures

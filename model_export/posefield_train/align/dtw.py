@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipFrames, PerClip, Traces
-from posefield.common.units import Floats, Indices
+from posefield.common.units import ClipFrames, Floats, Indices, PerClip, Traces
 
 # Frames of each step (in the sequence, in the reference). Every step advances in both, and the
 # slope stays between 1/3 and 3, so that no pose is frozen (Sakoe & Chiba 1978).

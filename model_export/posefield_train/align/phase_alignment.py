@@ -12,9 +12,8 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import JointWeights, PerClip, Traces
 from posefield.common.errors import RecipeError
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import UP, Floats, Indices, JointWeights, PerClip, Traces
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import CurveValues

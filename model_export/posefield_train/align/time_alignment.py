@@ -11,19 +11,20 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.units import (
+    UP,
     ClipBones,
     ClipFrames,
     ClipPaths,
     ClipPositions,
     ClipRotations,
+    Floats,
     JointRotations,
     JointWeights,
     PerClip,
     RootPath,
     Traces,
 )
-from posefield.common.units import UP, Floats
 from posefield.motion import curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw

@@ -10,8 +10,15 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipFrames, ClipPaths, ClipRotations, ClipTravel, PerClip
-from posefield.common.units import UP, Floats
+from posefield.common.units import (
+    UP,
+    ClipFrames,
+    ClipPaths,
+    ClipRotations,
+    ClipTravel,
+    Floats,
+    PerClip,
+)
 from posefield.model_file.model_card import ROW_VALUES
 from posefield.motion import quat, skeleton
 from posefield_train.align.time_alignment import AlignedClips

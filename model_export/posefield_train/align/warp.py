@@ -14,8 +14,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
-from posefield.common.array_shapes import ClipFrames, PerClip
-from posefield.common.units import Floats
+from posefield.common.units import ClipFrames, Floats, PerClip
 from posefield.model_file.model_card import ROW_VALUES
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 

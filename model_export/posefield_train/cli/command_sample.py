@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posefield.common import atomic_files
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, did_you_mean
 from posefield.console.options import Json, encoder_for, parse_controls, with_option_groups
 from posefield.console.output import as_json, written_message
 from posefield.question.results import ClipAnswer, Trust

@@ -10,8 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipFrames
-from posefield.common.units import Floats
+from posefield.common.units import ClipFrames, Floats
 from posefield.motion import quat
 from posefield_train.kriging import coefficient_models
 from posefield_train.onnx_graph.graph_builder import GraphBuilder

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions
 from posefield.common.errors import FileError, MotionFileError
+from posefield.common.units import Positions
 from posefield.motion import bvh_writer
 from posefield.motion.clip import Clip
 from posefield_train.source import motion_file, motion_readers

@@ -9,9 +9,8 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions
 from posefield.common.errors import FileError
-from posefield.common.units import Floats, UpAxis
+from posefield.common.units import Floats, Positions, UpAxis
 from posefield.motion import skeleton
 from posefield.roles.joint_recognition import NEEDED, RoleGuess
 from posefield_train.probe import proposals

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posefield import __version__
-from posefield.common.array_shapes import ClipPositions, PerClip
 from posefield.common.errors import ExportRefused
-from posefield.common.units import Floats
+from posefield.common.units import ClipPositions, Floats, PerClip
 from posefield.inference import onnx_runtime, reduced_motion, session
 from posefield.inference.reduced_motion import Deviations
 from posefield.inference.session import Session

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from posefield.common.array_shapes import Frames
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames
 from posefield.kriging import typical_clip
 from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
 from posefield.model_file.model_card import (

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipBones, SampleControls, SampleValues
-from posefield.common.units import Floats
+from posefield.common.units import ClipBones, Floats, SampleControls, SampleValues
 from posefield_train.kriging import kriging_tuning, sample_kriging, sample_points
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, PowerLawFit
 from posefield_train.kriging.kriging_tuning import TunedKriging

@@ -13,7 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.units import (
+    Floats,
     PerControl,
     PerPoint,
     PointControls,
@@ -24,7 +25,6 @@ from posefield.common.array_shapes import (
     SampleValues,
     Values,
 )
-from posefield.common.units import Floats
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints

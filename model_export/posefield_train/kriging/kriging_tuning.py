@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
-from posefield.common.array_shapes import PerSample, SampleValues
-from posefield.common.units import Floats
+from posefield.common.units import Floats, PerSample, SampleValues
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import sample_kriging, sample_points, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints

@@ -10,8 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import SampleMatrix, Samples, SampleValues
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, SampleMatrix, Samples, SampleValues
 from posefield.kriging import kriging_model
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import SampleControls, Samples, SampleValues
 from posefield.common.errors import TrainingError
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, SampleControls, Samples, SampleValues
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
 from posefield_train.source.ingest import Example

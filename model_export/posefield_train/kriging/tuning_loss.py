@@ -13,8 +13,7 @@ from typing import Annotated
 import numpy as np
 from scipy.special import expit
 
-from posefield.common.array_shapes import SampleMatrix, SampleValues
-from posefield.common.units import Booleans, Floats, Indices
+from posefield.common.units import Booleans, Floats, Indices, SampleMatrix, SampleValues
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import sample_points, universal_kriging

@@ -12,7 +12,9 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.errors import TrainingError
+from posefield.common.units import (
+    Floats,
     PerPoint,
     Points,
     PointSamples,
@@ -20,8 +22,6 @@ from posefield.common.array_shapes import (
     Samples,
     SampleValues,
 )
-from posefield.common.errors import TrainingError
-from posefield.common.units import Floats
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import Hyper as Hyper
 from posefield.kriging.kriging_model import covariances as covariances

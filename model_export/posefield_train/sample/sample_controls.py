@@ -4,8 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, did_you_mean
 from posefield_train.sample import sample_body
 
 STATURES = {"short": 1.62, "middle": 1.75, "tall": 1.88}

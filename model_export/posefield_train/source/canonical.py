@@ -8,8 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Vector
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Floats, Vector
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.curves import clamp

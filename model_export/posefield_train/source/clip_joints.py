@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import did_you_mean
 from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip

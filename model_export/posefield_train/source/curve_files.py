@@ -7,8 +7,7 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
-from posefield.common.errors import RecipeError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import RecipeError, did_you_mean
 from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip

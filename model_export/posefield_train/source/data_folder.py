@@ -9,8 +9,7 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import IO, TYPE_CHECKING, Literal
 
-from posefield.common.errors import InvalidField, RecipeError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, RecipeError, did_you_mean
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer

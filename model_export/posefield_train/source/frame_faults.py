@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, Positions
 
 MEDIAN_SPAN = 0.035
 """Half the time over which the median step around a frame is taken, s. A leap, or a leap and its

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions, Rotations
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Positions, Rotations
 from posefield.motion.skeleton import Skeleton
 from posefield.rigs import gltf_document, gltf_rig, rest_joints
 from posefield.rigs.gltf_document import Beside, GltfDocument

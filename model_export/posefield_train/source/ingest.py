@@ -7,10 +7,8 @@ from typing import get_args
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions
-from posefield.common.errors import TrainingError
-from posefield.common.name_suggestion import did_you_mean
-from posefield.common.units import Floats
+from posefield.common.errors import TrainingError, did_you_mean
+from posefield.common.units import Floats, Positions
 from posefield.motion.clip import Clip
 from posefield.motion.joint_roles import Role
 from posefield_train.source import (

@@ -7,9 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions, Rotations
 from posefield.common.errors import MotionFileError
-from posefield.common.units import Floats, UpAxis
+from posefield.common.units import Floats, Positions, Rotations, UpAxis
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.rigs.rest_joints import JointTree

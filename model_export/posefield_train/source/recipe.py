@@ -21,8 +21,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from posefield.common.errors import RecipeError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import RecipeError, did_you_mean
 from posefield.motion.joint_roles import Role
 from posefield_train.source import data_folder, recipe_checks
 from posefield_train.source.control_sources import (

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import did_you_mean
 from posefield.motion import measures
 from posefield_train.source.control_sources import RESERVED, TIME_NAMES, Auto, Control, KeyFault
 from posefield_train.source.recipe_sections import (

@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import Positions
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, Positions
 
 # Words for left and right anywhere in a name, and letters that begin it, or end it after a
 # separator.

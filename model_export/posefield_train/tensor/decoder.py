@@ -6,16 +6,16 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.units import (
     Bones,
     ClipBones,
     ClipFrames,
     ClipPaths,
     ClipRotations,
     ClipTravel,
+    Floats,
     JointRotations,
 )
-from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.curves import Curve, clamp
 from posefield_train.onnx_graph.graph_builder import GraphBuilder

@@ -10,8 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, PerClip
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames, PerClip
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.truncation_error import EventFrame, TruncationReference

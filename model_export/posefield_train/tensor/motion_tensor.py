@@ -8,17 +8,18 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.errors import TrainingError
+from posefield.common.units import (
+    Booleans,
     ClipBones,
     ClipPaths,
     ClipRotations,
     ClipTravel,
+    Floats,
     JointWeights,
     PoseVectors,
     Rotations,
 )
-from posefield.common.errors import TrainingError
-from posefield.common.units import Booleans, Floats
 from posefield.motion import curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, distances

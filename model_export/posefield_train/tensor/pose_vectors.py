@@ -10,16 +10,17 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.errors import TrainingError
+from posefield.common.units import (
+    Booleans,
     ClipPaths,
     ClipPositions,
     ClipRotations,
+    Floats,
     JointRotations,
     RootPath,
     Vector,
 )
-from posefield.common.errors import TrainingError
-from posefield.common.units import Booleans, Floats
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield.motion.skeleton import POSES_PER_BLOCK

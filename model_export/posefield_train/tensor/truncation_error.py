@@ -10,9 +10,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipBones, JointWeights
 from posefield.common.errors import TrainingError
-from posefield.common.units import Floats
+from posefield.common.units import ClipBones, Floats, JointWeights
 from posefield.model_file.model_card import Event
 from posefield.motion import skeleton
 from posefield.motion.curves import distances

@@ -12,8 +12,7 @@ from typing import Any
 from posefield.batch.job import ExportJob, WorkerInput, manifest_line, open_model_of
 from posefield.batch.rows import ClipQuery
 from posefield.batch.target import ExportTarget, WrittenFile, put_file
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, did_you_mean
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
 from posefield.encode.character import extent
 from posefield.encode.conventions import Convention

@@ -21,9 +21,8 @@ from msgspec import structs
 
 from posefield.batch import process_pool, scripts
 from posefield.batch.scripts import MAX_FRAMES, ScriptRow, open_models
-from posefield.common.array_shapes import RootPath
 from posefield.common.errors import InvalidField, QueryError
-from posefield.common.units import UP, Floats, Singles
+from posefield.common.units import UP, Floats, RootPath, Singles
 from posefield.encode.usd_crowd import FILES
 from posefield.inference import level_selection
 from posefield.inference.level_selection import Camera

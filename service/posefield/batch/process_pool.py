@@ -24,7 +24,7 @@ from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.chunks import ChunkAbandoned, ChunkTask, StopCheck
 from posefield.batch.job import VERSIONED_PACKAGES, WorkerInput
 from posefield.batch.target import open_target
-from posefield.common.cpu_cores import SINGLE_THREAD_ENV
+from posefield.common.cancellation import SINGLE_THREAD_ENV
 from posefield.common.errors import ClusterError, FileError, WorkerDied
 
 POLL_INTERVAL = 0.1

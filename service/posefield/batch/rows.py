@@ -24,8 +24,7 @@ from msgspec import structs, to_builtins
 
 from posefield.batch import sampling, tables
 from posefield.batch.tables import TABLES, Column, Columns, RawRow, RawRows, shortened_text
-from posefield.common.errors import InvalidField, QueryError, UnknownFormat
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, QueryError, UnknownFormat, did_you_mean
 from posefield.common.units import Floats
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question import json_decoding, text_decoding

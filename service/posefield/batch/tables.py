@@ -17,8 +17,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, AnyStr, TextIO
 
-from posefield.common.errors import FileError, FormError, QueryError
-from posefield.common.name_suggestion import similar_name
+from posefield.common.errors import FileError, FormError, QueryError, similar_name
 from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.question import text_decoding
 from posefield.question.motion_question import NamedClipQuestion

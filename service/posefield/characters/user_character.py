@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from posefield.common.errors import FileError, InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import FileError, InvalidField, did_you_mean
 from posefield.encode.user_rig.rig_files import RigTarget
 from posefield.question.motion_question import LEGAL_NAME
 from posefield.rigs import rest_joints

@@ -1,4 +1,4 @@
-"""Cancellation of work whose client has gone, turns between threads, and progress of long work.
+"""Cancellation of work whose client has gone, turns and numbers of threads, and progress.
 
 A request handler sets `current`; loops that may take longer than a tenth of a second call `check`.
 anyio.to_thread.run_sync copies the caller's context into its threads; `bind_context` does so for
@@ -88,3 +88,12 @@ def bind_context(function: Callable[Parameters, Result]) -> Callable[Parameters,
         return own.run(function, *args, **kwargs)
 
     return call
+
+
+SINGLE_THREAD_ENV = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+)
+"""Environment of a worker process where there is one worker per core.
+
+With more than one BLAS thread each, the threads of all workers would wait for each other.
+"""

@@ -7,8 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import frame_groups
-from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames, RootPath, Rotations, Variables, Vector
 from posefield.constraints import constraint, gauss_newton
 from posefield.constraints.constraint import Constraint, CorrectionTask
 from posefield.constraints.motion_variables import MotionVariables

@@ -7,8 +7,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import Gradients, ReducedMotions, Values, Variables
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Gradients, ReducedMotions, Values, Variables
 from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
 from posefield.motion import measures
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure

@@ -9,9 +9,8 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import Frames
 from posefield.common.errors import InvalidField, QueryError
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames
 from posefield.common.value_cache import ValueCache
 from posefield.constraints import constrained_motion, constraint
 from posefield.constraints import targets as goals

@@ -13,8 +13,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Values, Variables
-from posefield.common.units import Booleans, Floats, Indices
+from posefield.common.units import Booleans, Floats, Indices, Values, Variables
 from posefield.constraints import constraint, reachability
 from posefield.constraints.constraint import (
     Constraint,

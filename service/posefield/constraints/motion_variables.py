@@ -6,8 +6,16 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, ReducedMotions, RootPath, Variables, Vector
-from posefield.common.units import UP, Floats
+from posefield.common.units import (
+    UP,
+    Bones,
+    Floats,
+    Frames,
+    ReducedMotions,
+    RootPath,
+    Variables,
+    Vector,
+)
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, RotationChart

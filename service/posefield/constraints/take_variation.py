@@ -13,9 +13,8 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import PointControls, PointLabels, PointValues, Values
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, PointControls, PointLabels, PointValues, Values
 from posefield.common.value_cache import ValueCache
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import Floats
 from posefield.constraints import take_variation
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from posefield.common import cancellation
-from posefield.common.errors import InvalidField, UnknownFormat
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import InvalidField, UnknownFormat, did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import conventions, glb
 from posefield.encode.conventions import (

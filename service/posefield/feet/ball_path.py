@@ -9,9 +9,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import RootPath
 from posefield.common.frame_groups import FrameGroups
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import UP, Floats, Indices, RootPath
 from posefield.feet import stance_rows
 from posefield.feet.smooth_change import smooth_change
 from posefield.feet.stance_rows import FootRows, Mask, PerRun, Runs

@@ -12,9 +12,8 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation, frame_groups
-from posefield.common.array_shapes import Frames
 from posefield.common.frame_groups import FrameRows
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import UP, Booleans, Floats, Frames
 from posefield.feet import ball_path, footsteps, limbs, stance_rows, two_bone
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.footsteps import Character, FeetPlan, Led, PlanRequest, SampledMotion

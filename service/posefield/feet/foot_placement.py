@@ -10,9 +10,8 @@ from typing import Annotated, TypeVar
 import numpy as np
 
 from posefield.common import frame_groups
-from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.frame_groups import FrameGroups, FrameRows
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import UP, Floats, Frames, Indices, RootPath, Rotations
 from posefield.feet import limbs, two_bone
 from posefield.feet.footsteps import FeetPlan
 from posefield.feet.limbs import Limb, LimbPoses

@@ -11,8 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
-from posefield.common.units import Booleans, Floats
+from posefield.common.units import Bones, Booleans, Floats, Frames, RootPath, Rotations
 from posefield.feet import limbs, stances, two_bone
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses

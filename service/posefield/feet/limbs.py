@@ -9,9 +9,8 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import frame_groups
-from posefield.common.array_shapes import Bones
 from posefield.common.frame_groups import FrameGroups
-from posefield.common.units import Floats
+from posefield.common.units import Bones, Floats
 from posefield.motion import skeleton
 
 Points = Annotated[Floats, "*characters frames 3"]

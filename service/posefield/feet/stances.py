@@ -11,8 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import UP, Booleans, Floats, Frames, RootPath
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import contact_detection

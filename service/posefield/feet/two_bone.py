@@ -11,9 +11,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames
 from posefield.common.frame_groups import FrameRows
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import UP, Booleans, Floats, Frames
 from posefield.feet.limbs import Limb, LimbPoses, Points, Turns, Values
 from posefield.motion import quat
 

@@ -10,8 +10,7 @@ from starlette.types import Receive, Scope, Send
 
 from posefield.characters import user_character
 from posefield.characters.user_character import EMPTY, CharacterFolder
-from posefield.common.errors import UnknownFormat
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import UnknownFormat, did_you_mean
 from posefield.http import header_fields, request_cycle, static_page
 from posefield.http.access import access_control
 from posefield.http.api import contract, problems

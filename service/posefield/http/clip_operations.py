@@ -16,8 +16,7 @@ from posefield.characters import delivery
 from posefield.characters.delivery import Delivery
 from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common import cancellation
-from posefield.common.errors import FormError, InvalidField, QueryError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import FormError, InvalidField, QueryError, did_you_mean
 from posefield.constraints import targets
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
 from posefield.encode.conventions import Convention

@@ -21,8 +21,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
-from posefield.common.errors import QueryError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import QueryError, did_you_mean
 from posefield.http import header_fields, metrics, negotiation, telemetry
 from posefield.http.access import access_control
 from posefield.http.access.access_control import AuditedRequest

@@ -32,7 +32,7 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 from uvicorn.supervisors import Multiprocess
 from uvicorn.supervisors.multiprocess import Process
 
-from posefield.common.cpu_cores import SINGLE_THREAD_ENV
+from posefield.common.cancellation import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
 from posefield.http import metrics, telemetry, worker_threads
 from posefield.http.api.settings import Settings

@@ -19,10 +19,9 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerCharacter, PointControls, PointLabels, Vector
 from posefield.common.cancellation import ProgressCallback, ignore_progress
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, PerCharacter, PointControls, PointLabels, Vector
 from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import Session
 from posefield.motion import joint_roles

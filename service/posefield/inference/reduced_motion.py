@@ -17,16 +17,17 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import (
+from posefield.common.units import (
     Bones,
+    Floats,
     Frames,
+    Indices,
     JointRotations,
     PerSample,
     RootPath,
     Rotations,
     Samples,
 )
-from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import Seeds
 from posefield.model_file.model_card import Level, ModelCard

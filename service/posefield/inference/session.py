@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
-from posefield.common.units import Floats, Indices, Singles
+from posefield.common.units import Bones, Floats, Frames, Indices, PointControls, Singles, Vector
 from posefield.inference import onnx_runtime
 from posefield.inference.onnx_runtime import CONTACTS, LABELS, Graph, GraphParts
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits

@@ -13,7 +13,10 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import (
+from posefield.common.bounded_types import Count, Degree, NonNegative
+from posefield.common.units import (
+    Floats,
+    Indices,
     PerControl,
     PerPoint,
     PerSample,
@@ -22,8 +25,6 @@ from posefield.common.array_shapes import (
     SampleMatrix,
     Samples,
 )
-from posefield.common.bounded_types import Count, Degree, NonNegative
-from posefield.common.units import Floats, Indices
 
 # Where the Matérn covariances of unit rate have fallen to 5 %.
 RATE32, RATE52 = 4.743865, 5.918277

@@ -15,15 +15,17 @@ from typing import Annotated, Any
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import (
+from posefield.common.units import (
+    Booleans,
+    Floats,
     PerControl,
     PerPoint,
     PerSample,
     PointControls,
     SampleControls,
     SampleMatrix,
+    Singles,
 )
-from posefield.common.units import Booleans, Floats, Singles
 from posefield.kriging.kriging_model import half_ranges
 
 RANGE_MARGIN = 0.1

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerClip, Values
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, PerClip, Values
 
 NEAR = 0.25
 """Standard deviation of the weights of clips near given values, in half-ranges."""

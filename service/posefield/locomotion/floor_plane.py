@@ -9,8 +9,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import PerPoint, Scalars
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Floats, PerPoint, Scalars
 from posefield.motion import quat
 
 FloorVectors = npt.NDArray[np.complex128]

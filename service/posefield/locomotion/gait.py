@@ -13,9 +13,16 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import PerCharacter, PerClip, PerPoint, PointControls, Scalars
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices
+from posefield.common.units import (
+    Floats,
+    Indices,
+    PerCharacter,
+    PerClip,
+    PerPoint,
+    PointControls,
+    Scalars,
+)
 from posefield.inference.session import Session
 from posefield.locomotion import stride
 from posefield.model_file.model_card import PERFORMER, ModelCard

@@ -11,9 +11,8 @@ from typing import Annotated, TypeVar
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import CharacterFrames, CharacterPoints, PerCharacter
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices
+from posefield.common.units import CharacterFrames, CharacterPoints, Floats, Indices, PerCharacter
 from posefield.inference import level_selection
 from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
 from posefield.inference.session import Session

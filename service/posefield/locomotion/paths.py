@@ -10,9 +10,15 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import CharacterFrames, CharacterPoints, PerCharacter, PerPoint
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices
+from posefield.common.units import (
+    CharacterFrames,
+    CharacterPoints,
+    Floats,
+    Indices,
+    PerCharacter,
+    PerPoint,
+)
 from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors

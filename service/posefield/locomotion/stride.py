@@ -12,8 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import PerPoint, PointControls, PointLabels
-from posefield.common.units import Floats, Indices, Singles
+from posefield.common.units import Floats, Indices, PerPoint, PointControls, PointLabels, Singles
 from posefield.inference import onnx_runtime
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane

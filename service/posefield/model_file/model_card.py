@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal, SupportsFloat
 import msgspec
 import numpy as np
 
-from posefield.common.array_shapes import Positions
 from posefield.common.bounded_types import (
     Count,
     Index,
@@ -26,7 +25,7 @@ from posefield.common.bounded_types import (
     Slug,
     Text,
 )
-from posefield.common.units import Floats, Singles
+from posefield.common.units import Floats, Positions, Singles
 from posefield.kriging.kriging_model import Hyper
 from posefield.motion import measures
 from posefield.motion.contact_detection import FootContact

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Vector
-from posefield.common.units import Floats
+from posefield.common.units import Bones, Floats, Vector
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton

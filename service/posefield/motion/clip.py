@@ -6,8 +6,18 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, PerCharacter, Positions, RootPath, Rotations
-from posefield.common.units import UP, Booleans, Floats, Indices, Singles
+from posefield.common.units import (
+    UP,
+    Bones,
+    Booleans,
+    Floats,
+    Indices,
+    PerCharacter,
+    Positions,
+    RootPath,
+    Rotations,
+    Singles,
+)
 from posefield.motion import quat, skeleton
 from posefield.motion.curves import CurveValues
 from posefield.motion.skeleton import Skeleton

@@ -11,9 +11,8 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, Positions, RootPath, Vector
 from posefield.common.bounded_types import Index, Share
-from posefield.common.units import Floats
+from posefield.common.units import Bones, Floats, Frames, Positions, RootPath, Vector
 from posefield.motion import quat, skeleton
 
 Quantity = Literal[

@@ -5,8 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import JointRotations, Quaternions, Scalars, Vector, Vectors
-from posefield.common.units import Floats
+from posefield.common.units import Floats, JointRotations, Quaternions, Scalars, Vector, Vectors
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

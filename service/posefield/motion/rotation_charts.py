@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import Quaternions, Vectors
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Quaternions, Vectors
 from posefield.motion import quat
 
 ChartName = Literal["rotation_vector", "stereographic"]

@@ -9,9 +9,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones
 from posefield.common.bounded_types import Index, Name, Parent
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import UP, Bones, Floats, Indices
 from posefield.motion import quat
 
 # Poses that are computed at once: their planes take 7 MB for 31 joints.

@@ -6,9 +6,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
+from posefield.common.units import Bones, Floats, Frames
 from posefield.feet import limbs, stance_rows
 from posefield.feet.stances import FootPath
 from posefield.inference.onnx_runtime import CONTACTS

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.array_shapes import Vector
 from posefield.common.errors import InvalidField, OutOfReach
+from posefield.common.units import Vector
 from posefield.constraints import constraint_solver
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import PositionConstraint

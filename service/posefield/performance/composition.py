@@ -7,8 +7,8 @@ import numpy as np
 import orjson
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.errors import InvalidField
+from posefield.common.units import Frames, RootPath, Rotations
 from posefield.feet import body_plans, foot_placement
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import FeetPlan, SampledMotion

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, JointRotations, Rotations, Vector
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP
+from posefield.common.units import UP, Bones, Frames, JointRotations, Rotations, Vector
 from posefield.feet import two_bone
 from posefield.motion import quat, skeleton
 

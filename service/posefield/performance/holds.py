@@ -13,10 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
-from posefield.common.units import Floats
+from posefield.common.errors import InvalidField, did_you_mean
+from posefield.common.units import Bones, Floats, Frames, RootPath, Rotations
 from posefield.feet import limbs, two_bone
 from posefield.feet.limbs import Limb
 from posefield.feet.stance_rows import STANDING

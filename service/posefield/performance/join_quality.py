@@ -11,8 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Floats, Frames
 from posefield.feet import limbs
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import Character

@@ -16,8 +16,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import Frames
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Floats, Frames
 from posefield.feet.footsteps import Character
 from posefield.feet.stance_rows import DECIMALS, STANDING
 from posefield.locomotion import floor_plane

@@ -11,8 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath, Vector
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Frames, Indices, RootPath, Vector
 from posefield.feet import limbs, two_bone
 from posefield.feet.footsteps import Character, Led
 from posefield.feet.limbs import Limb, LimbPoses, Turns

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, RootPath, Rotations
 from posefield.common.errors import MotionError
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Bones, Floats, RootPath, Rotations
 from posefield.common.value_cache import ValueCache
 from posefield.feet import limbs, two_bone
 from posefield.locomotion import floor_plane

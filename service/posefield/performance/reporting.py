@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import RootPath, Rotations
-from posefield.common.units import Floats, round_micrometres
+from posefield.common.units import Floats, RootPath, Rotations, round_micrometres
 from posefield.constraints.gauss_newton import MISS_TOLERANCE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField, QueryError
+from posefield.common.units import Bones
 from posefield.common.value_cache import ValueCache
 from posefield.feet import footsteps
 from posefield.feet.footsteps import Character

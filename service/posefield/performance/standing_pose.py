@@ -12,8 +12,16 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, JointRotations, RootPath, Rotations, Vector
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import (
+    UP,
+    Bones,
+    Floats,
+    Indices,
+    JointRotations,
+    RootPath,
+    Rotations,
+    Vector,
+)
 from posefield.common.value_cache import ValueCache
 from posefield.feet import limbs, two_bone
 from posefield.feet.limbs import Limb, LimbPoses

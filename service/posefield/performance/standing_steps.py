@@ -10,8 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath, Rotations
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames, RootPath, Rotations
 from posefield.feet import limbs, two_bone
 from posefield.feet.limbs import LimbPoses
 from posefield.feet.stance_rows import STANDING

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import RootPath, Rotations
 from posefield.common.errors import InvalidField
-from posefield.common.units import Booleans, Floats
+from posefield.common.units import Booleans, Floats, RootPath, Rotations
 from posefield.motion import quat
 from posefield.performance import join_quality, joins
 from posefield.performance.join_quality import CutFacts, UsualMotion

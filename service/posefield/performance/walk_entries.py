@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerPoint, PointControls
-from posefield.common.units import Floats
+from posefield.common.units import Floats, PerPoint, PointControls
 from posefield.common.value_cache import ValueCache
 from posefield.constraints.take_variation import TakeSettings
 from posefield.locomotion import floor_plane, stride

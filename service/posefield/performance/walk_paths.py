@@ -13,9 +13,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerPoint
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
+from posefield.common.units import Floats, PerPoint
 from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import Ends, FloorVectors

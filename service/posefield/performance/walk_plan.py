@@ -11,9 +11,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, PerPoint, PointControls
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames, PerPoint, PointControls
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.performance import (

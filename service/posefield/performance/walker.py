@@ -7,10 +7,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PerPoint, PointControls, PointLabels
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
-from posefield.common.units import Floats, Indices
+from posefield.common.errors import InvalidField, did_you_mean
+from posefield.common.units import Floats, Indices, PerPoint, PointControls, PointLabels
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import ITERATIONS, Gait, requested_labels

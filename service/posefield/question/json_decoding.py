@@ -11,8 +11,7 @@ from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hin
 
 import msgspec
 
-from posefield.common.errors import FormError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import FormError, did_you_mean
 
 Question = TypeVar("Question")
 _PATH = " - at `$"

@@ -15,8 +15,7 @@ from itertools import accumulate, chain, takewhile
 from pathlib import Path
 from typing import Protocol
 
-from posefield.common.errors import ModelError, UnknownModel
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import ModelError, UnknownModel, did_you_mean
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry.model_loading import LoadFailure, ModelLoader
 from posefield.synthesis.synthesizer import Synthesizer

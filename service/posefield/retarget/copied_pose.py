@@ -12,8 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Rotations, Vector
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import UP, Booleans, Floats, Rotations, Vector
 from posefield.feet.two_bone import shortest_turn
 from posefield.motion import quat
 from posefield.motion.skeleton import joint_chain

@@ -13,8 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import frame_groups
-from posefield.common.array_shapes import Frames, RootPath, Rotations
-from posefield.common.units import UP, Booleans, Floats, Indices
+from posefield.common.units import UP, Booleans, Floats, Frames, Indices, RootPath, Rotations
 from posefield.feet import stance_rows, stances, two_bone
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import UNEVEN, FootPath, Interval

@@ -6,9 +6,8 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath, Vector
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Booleans, Floats, round_micrometres
+from posefield.common.units import UP, Booleans, Floats, Frames, RootPath, Vector, round_micrometres
 from posefield.feet.two_bone import shortest_turn
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton

@@ -8,9 +8,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
+from posefield.common.units import Bones, Floats
 from posefield.motion.skeleton import Skeleton, joint_chain
 from posefield.rigs.rig import facing_of
 from posefield.roles import joint_recognition

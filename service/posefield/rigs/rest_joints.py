@@ -15,9 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, JointRotations, JointWeights, Positions, Rotations
 from posefield.common.errors import MotionFileError
-from posefield.common.units import Floats, UpAxis
+from posefield.common.units import (
+    Bones,
+    Floats,
+    JointRotations,
+    JointWeights,
+    Positions,
+    Rotations,
+    UpAxis,
+)
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 from posefield.roles import joint_recognition

@@ -12,9 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from posefield.common.array_shapes import Vector
-from posefield.common.errors import MotionFileError
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import MotionFileError, did_you_mean
+from posefield.common.units import Vector
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.skeleton import Skeleton, joint_chain
 from posefield.rigs import rest_joints

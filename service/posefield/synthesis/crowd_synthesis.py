@@ -12,8 +12,15 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import Frames, PointControls, PointLabels
-from posefield.common.units import Booleans, Floats, Indices, Singles
+from posefield.common.units import (
+    Booleans,
+    Floats,
+    Frames,
+    Indices,
+    PointControls,
+    PointLabels,
+    Singles,
+)
 from posefield.inference import level_selection, onnx_runtime
 from posefield.inference.level_selection import LevelCriteria, LevelTable
 from posefield.model_file.model_card import ModelCard

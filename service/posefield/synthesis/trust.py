@@ -13,11 +13,9 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import SampleControls
 from posefield.common.cancellation import ProgressCallback, ignore_progress
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
-from posefield.common.units import Booleans, Floats, Indices, Singles
+from posefield.common.errors import InvalidField, did_you_mean
+from posefield.common.units import Booleans, Floats, Indices, SampleControls, Singles
 from posefield.kriging import kriging_model, support
 from posefield.kriging.support import NUGGET, Support, covariances
 from posefield.model_file.model_card import PERFORMER, Control, ModelCard

@@ -9,8 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from posefield.common.errors import InvalidField, OutsideSamples
-from posefield.common.name_suggestion import did_you_mean, similar_name
+from posefield.common.errors import InvalidField, OutsideSamples, did_you_mean, similar_name
 from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield.model_file import answer_bounds

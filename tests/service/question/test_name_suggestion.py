@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from posefield.common import name_suggestion
-from posefield.common.name_suggestion import similar_name
+from posefield.common import errors
+from posefield.common.errors import similar_name
 
 JOINTS = ("Hips", "LeftHand", "RightHand", "RightHandThumb", "Head")
 
@@ -30,15 +30,15 @@ def test_two_equally_similar_names_suggest_none():
 
 
 def test_a_long_name_gets_no_suggestion():
-    longest = "a" * name_suggestion.MAX_NAME_LENGTH
+    longest = "a" * errors.MAX_NAME_LENGTH
     assert similar_name(longest, [longest[:-1]])
     assert similar_name(longest + "a", [longest]) is None
-    assert similar_name("abc", ["abc" + "d" * name_suggestion.MAX_NAME_LENGTH]) is None
+    assert similar_name("abc", ["abc" + "d" * errors.MAX_NAME_LENGTH]) is None
 
 
 def test_the_time_is_bounded_for_any_text_of_a_client():
     """A megabyte, and the most similar names of the greatest length: below a second."""
-    length = name_suggestion.MAX_NAME_LENGTH
+    length = errors.MAX_NAME_LENGTH
     known = [f"{'ab' * length}{number:04}"[-length:] for number in range(10_000)]
     began = time.process_time()
     assert similar_name("ab" * 500_000, known) is None

@@ -3,7 +3,7 @@
 import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from posefield.common.cpu_cores import SINGLE_THREAD_ENV
+from posefield.common.cancellation import SINGLE_THREAD_ENV
 from posefield.http import server
 
 

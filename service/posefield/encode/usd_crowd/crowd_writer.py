@@ -21,8 +21,7 @@ from typing import IO, Any
 from posefield.common import atomic_files
 from posefield.common import cancellation as cancel
 from posefield.common.cancellation import Cancellation, Cancelled
-from posefield.common.errors import FileError, InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.errors import FileError, InvalidField, did_you_mean
 from posefield.encode import archives
 from posefield.encode.character import character
 from posefield.encode.usd_crowd import (

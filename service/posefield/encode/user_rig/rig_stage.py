@@ -5,8 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import JointWeights, Positions, Rotations
-from posefield.common.units import Floats
+from posefield.common.units import Floats, JointWeights, Positions, Rotations
 from posefield.motion import quat
 from posefield.rigs.rest_joints import WORLD, RestJoints
 
