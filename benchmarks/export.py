@@ -29,7 +29,7 @@ from posefield.batch.process_pool import Runner
 from posefield.batch.rows import Defaults, RowSource, SourceOptions, open_source
 from posefield.batch.target import open_target
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.registry import model_loading
+from posefield.registry import model_registry
 from posefield.synthesis.clips import synthesize_clip
 
 ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
@@ -52,7 +52,7 @@ class Bench:
     def of(cls, model: Path, clips: int, form: str) -> "Bench":
         """Clips at points sampled from a model's controls."""
         content = model.read_bytes()
-        opened = model_loading.open_model(model.stem, model, content)
+        opened = model_registry.open_model(model.stem, model, content)
         source = open_source(SourceOptions(sample=clips), Defaults(form), opened)
         digest = hashlib.sha256(content).hexdigest()
         job = ExportJob(opened.identity, digest, source.digest, "folder", 1)
@@ -165,7 +165,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
     rows = bench.source.rows()
     asked = [next(rows) for _ in range(STAGED)]
     name = bench.work.job.model.partition("@")[0]
-    opened = model_loading.open_model(name, name, bench.work.model)
+    opened = model_registry.open_model(name, name, bench.work.model)
     encoder = CLIP_ENCODERS[form]
     answers = [synthesize_clip(opened, query.question) for query in asked]
     files = encoder.write(answers, encoder.usual)

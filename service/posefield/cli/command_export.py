@@ -31,7 +31,7 @@ from posefield.console.options import (
 from posefield.console.output import as_json
 from posefield.model_file import checked_file
 from posefield.question.motion_question import FileQuestion
-from posefield.registry import model_loading
+from posefield.registry import model_registry
 
 if TYPE_CHECKING:
     from posefield.characters.user_character import UserCharacter
@@ -116,7 +116,7 @@ def export(
     With --character, the character of another file moves, as in `posefield clip`.
     """
     content = checked_file.read(model)
-    opened = model_loading.open_model(model.stem, model, content)
+    opened = model_registry.open_model(model.stem, model, content)
     asked = SourceOptions(rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed)
     source = open_source(asked, Defaults(rows.form, question), opened)
     found = layouts.find_layout(execution.layout)

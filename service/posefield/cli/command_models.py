@@ -18,8 +18,8 @@ from posefield.model_file import model_card as cards
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import measures
 from posefield.question.model_question import SuggestQuestion, WhyQuestion
-from posefield.registry import model_registry, model_sources
-from posefield.registry.listed_models import ModelFile
+from posefield.registry import model_registry
+from posefield.registry.model_sources import ModelFile
 from posefield.synthesis.trust import explain_result as find_reasons
 from posefield.synthesis.trust import suggest as find_suggestions
 
@@ -104,7 +104,7 @@ def _listed(places: list[str]) -> Iterator[LocalModel | ModelError]:
     """Yield the models of places in order, or the error of a place or file."""
     for place in places:
         try:
-            files = model_sources.open_source(place).scan()
+            files = model_registry.open_source(place)()
         except ModelError as fault:
             yield fault
             continue

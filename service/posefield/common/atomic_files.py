@@ -30,7 +30,7 @@ def write_chunks(chunks: Iterable[bytes], path: Path) -> None:
 
     Raises FileError if it cannot be written.
     """
-    with replacing(path) as made, made.open("wb") as file:
+    with replacing(path) as temporary, temporary.open("wb") as file:
         file.writelines(chunks)
 
 
@@ -40,9 +40,9 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises FileError if it cannot be written.
     """
-    with _temporary_folder(path) as room:
-        yield room / path.name
-        _move_into_place(room / path.name, path)
+    with _temporary_folder(path) as folder:
+        yield folder / path.name
+        _move_into_place(folder / path.name, path)
 
 
 @contextmanager
@@ -75,9 +75,9 @@ def _temporary_folder(path: Path) -> Iterator[Path]:
         raise FileError(path, f"cannot be written: {fault.strerror}") from fault
 
 
-def _move_into_place(made: Path, path: Path) -> None:
-    made.chmod(0o644)
-    made.replace(path)
+def _move_into_place(temporary: Path, path: Path) -> None:
+    temporary.chmod(0o644)
+    temporary.replace(path)
 
 
 def _replace_folder(new: Path, folder: Path, old: Path) -> None:

@@ -25,29 +25,29 @@ BlockSides = Annotated[Floats, "2 columns blocks systems"]
 
 def product(bands: Bands, values: Sides) -> Sides:
     """Return the products (C, U, R) of the matrices and vectors (C, U, R)."""
-    found: Floats = bands[0] * values
-    for apart in (1, 2):
-        band = bands[apart, : max(values.shape[1] - apart, 0)]
-        found[:, :-apart] += band * values[:, apart:]
-        found[:, apart:] += band * values[:, :-apart]
-    return found
+    products: Floats = bands[0] * values
+    for offset in (1, 2):
+        band = bands[offset, : max(values.shape[1] - offset, 0)]
+        products[:, :-offset] += band * values[:, offset:]
+        products[:, offset:] += band * values[:, :-offset]
+    return products
 
 
 def solve(
-    bands: Bands, goal: Sides, known: Annotated[Booleans, "size systems"], values: Sides
+    bands: Bands, goal: Sides, fixed: Annotated[Booleans, "size systems"], values: Sides
 ) -> Sides:
     """Return the solutions (C, U, R) of positive definite systems.
 
     known: unknowns whose values (C, U, R) are given; their equations are left out.
     """
-    given = np.where(known, values, 0.0)
-    right = np.where(known, given, goal - product(bands, given))
-    own = bands.copy()
-    own[0][known] = 1.0
-    for apart in (1, 2):
-        own[apart][known] = 0.0
-        own[apart, : max(len(known) - apart, 0)][known[apart:]] = 0.0
-    return np.where(known, given, _solve_free(own, right))
+    fixed_values = np.where(fixed, values, 0.0)
+    right = np.where(fixed, fixed_values, goal - product(bands, fixed_values))
+    reduced = bands.copy()
+    reduced[0][fixed] = 1.0
+    for offset in (1, 2):
+        reduced[offset][fixed] = 0.0
+        reduced[offset, : max(len(fixed) - offset, 0)][fixed[offset:]] = 0.0
+    return np.where(fixed, fixed_values, _solve_free(reduced, right))
 
 
 def _solve_free(bands: Bands, right: Sides) -> Sides:
@@ -64,9 +64,9 @@ def _solve_free(bands: Bands, right: Sides) -> Sides:
     sides = np.pad(right, ((0, 0), (0, odd), (0, 0)))
     blocks = np.stack([sides[:, ::2], sides[:, 1::2]])
     solved = _reduce(diagonal, above, blocks)
-    found = np.empty(sides.shape)
-    found[:, ::2], found[:, 1::2] = solved
-    return found[:, :count].reshape(columns, count, systems)
+    solution = np.empty(sides.shape)
+    solution[:, ::2], solution[:, 1::2] = solved
+    return solution[:, :count].reshape(columns, count, systems)
 
 
 def _reduce(
@@ -82,18 +82,18 @@ def _reduce(
     inner, outer = (count - 1) // 2, count // 2
     before, after = above[:, :, : count - 1 : 2], above[:, :, 1 : count - 1 : 2]
     down, up = _times(before, inverses), _times(_turned(after), inverses[:, :, :inner])
-    own, rest = diagonal[:, :, ::2].copy(), sides[:, :, ::2].copy()
+    even_blocks, rest = diagonal[:, :, ::2].copy(), sides[:, :, ::2].copy()
     odd = sides[:, :, 1::2]
-    own[:, :, :outer] -= _times(down, _turned(before))
-    own[:, :, 1 : inner + 1] -= _times(up, after)
+    even_blocks[:, :, :outer] -= _times(down, _turned(before))
+    even_blocks[:, :, 1 : inner + 1] -= _times(up, after)
     rest[:, :, :outer] -= _times(down, odd)
     rest[:, :, 1 : inner + 1] -= _times(up, odd[:, :, :inner])
-    found = np.empty_like(sides)
-    found[:, :, ::2] = kept = _reduce(own, -_times(down[:, :, :inner], after), rest)
-    left = odd - _times(_turned(before), kept[:, :, :outer])
-    left[:, :, :inner] -= _times(after, kept[:, :, 1 : inner + 1])
-    found[:, :, 1::2] = _times(inverses, left)
-    return found
+    solution = np.empty_like(sides)
+    solution[:, :, ::2] = even = _reduce(even_blocks, -_times(down[:, :, :inner], after), rest)
+    left = odd - _times(_turned(before), even[:, :, :outer])
+    left[:, :, :inner] -= _times(after, even[:, :, 1 : inner + 1])
+    solution[:, :, 1::2] = _times(inverses, left)
+    return solution
 
 
 def _times(
@@ -111,7 +111,7 @@ def _turned(blocks: Blocks) -> Blocks:
 def _inverses(blocks: Blocks) -> Blocks:
     """Return the inverses of blocks."""
     (a, b), (c, d) = blocks
-    found = np.empty(blocks.shape)
-    found[0, 0], found[0, 1], found[1, 0], found[1, 1] = d, -b, -c, a
-    found /= a * d - b * c
-    return found
+    inverses = np.empty(blocks.shape)
+    inverses[0, 0], inverses[0, 1], inverses[1, 0], inverses[1, 1] = d, -b, -c, a
+    inverses /= a * d - b * c
+    return inverses

@@ -83,9 +83,9 @@ def bind_context(function: Callable[Parameters, Result]) -> Callable[Parameters,
 
     def call(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
         # A context can be entered by one thread at a time: each call has a copy of its own.
-        own = context.copy()
-        own.run(check)
-        return own.run(function, *args, **kwargs)
+        copy = context.copy()
+        copy.run(check)
+        return copy.run(function, *args, **kwargs)
 
     return call
 

@@ -62,7 +62,7 @@ def results(
     versions = {name: version(name) for name in packages}
     # The result of a task, not scattered data, which is lost with the workers that hold it.
     common = client.submit(_Common, function, tuple(shared), versions, pure=False)
-    waiting = (client.submit(_call, common, tuple(own), pure=False) for own in arguments)
+    waiting = (client.submit(_call, common, tuple(call), pure=False) for call in arguments)
     threads = sum(client.nthreads().values())
     running = as_completed(islice(waiting, AHEAD * threads), loop=client.loop)
     try:
@@ -82,8 +82,8 @@ class _Common:
     versions: Mapping[str, str]
 
 
-def _call(common: _Common, own: tuple[Any, ...]) -> Any:
+def _call(common: _Common, arguments: tuple[Any, ...]) -> Any:
     for name, expected in common.versions.items():
         if (here := version(name)) != expected:
             raise ClusterError(get_worker().address, f"{name} {here}, expected {expected}")
-    return common.function(*common.shared, *own)
+    return common.function(*common.shared, *arguments)

@@ -153,7 +153,7 @@ SIMILARITY = 0.7
 """Smallest similarity of a suggestion: share of equal characters, as `difflib` defines it."""
 
 
-def similar_name(name: str, known: Iterable[str]) -> str | None:
+def similar_name(name: str, names: Iterable[str]) -> str | None:
     """Return the known name that is most similar to `name`, or None if none is similar enough.
 
     None also if two are equally similar. Case and the separators "_", "-", ":" and " " do not
@@ -161,24 +161,32 @@ def similar_name(name: str, known: Iterable[str]) -> str | None:
     """
     if len(name) > MAX_NAME_LENGTH:
         return None
-    short = (each for each in islice(known, MAX_NAMES) if len(each) <= MAX_NAME_LENGTH)
-    plain = {_plain(each): each for each in short}
+    short = (
+        candidate for candidate in islice(names, MAX_NAMES) if len(candidate) <= MAX_NAME_LENGTH
+    )
+    by_plain_name = {_plain(candidate): candidate for candidate in short}
     # Imported here, because only refused questions need it.
     from difflib import SequenceMatcher, get_close_matches
 
-    wanted = _plain(name)
-    begun = [each for each in plain if len(wanted) >= MIN_PREFIX and each.startswith(wanted)]
-    if len(begun) == 1:
-        return plain[begun[0]]
-    found = get_close_matches(wanted, plain, n=2, cutoff=SIMILARITY)
-    tied = len({SequenceMatcher(None, each, wanted).ratio() for each in found}) < len(found)
-    return plain[found[0]] if found and not tied else None
+    plain_name = _plain(name)
+    longer = [
+        candidate
+        for candidate in by_plain_name
+        if len(plain_name) >= MIN_PREFIX and candidate.startswith(plain_name)
+    ]
+    if len(longer) == 1:
+        return by_plain_name[longer[0]]
+    matches = get_close_matches(plain_name, by_plain_name, n=2, cutoff=SIMILARITY)
+    tied = len(
+        {SequenceMatcher(None, candidate, plain_name).ratio() for candidate in matches}
+    ) < len(matches)
+    return by_plain_name[matches[0]] if matches and not tied else None
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return the text " (did you mean 'NAME'?)" to follow an unknown name, or "" for no name."""
-    found = similar_name(name, known)
-    return "" if found is None else f" (did you mean {found!r}?)"
+    similar = similar_name(name, names)
+    return "" if similar is None else f" (did you mean {similar!r}?)"
 
 
 _SEPARATORS = str.maketrans("", "", "_-: ")

@@ -29,8 +29,8 @@ class FrameGroups:
     @cached_property
     def starts(self) -> Annotated[Indices, "motions"]:
         """Return the first frame of each motion (M,) in the array."""
-        found: Indices = np.cumsum(self.counts) - self.counts
-        return found
+        starts: Indices = np.cumsum(self.counts) - self.counts
+        return starts
 
     @cached_property
     def group(self) -> Annotated[Indices, "frames"]:
@@ -39,9 +39,9 @@ class FrameGroups:
 
     @cached_property
     def frame(self) -> Annotated[Indices, "frames"]:
-        """Return the place of each frame (N,) in its motion."""
-        found: Indices = np.arange(len(self.group)) - self.starts[self.group]
-        return found
+        """Return the index of each frame (N,) in its motion."""
+        frame: Indices = np.arange(len(self.group)) - self.starts[self.group]
+        return frame
 
     def split(self, values: Annotated[Numbers, "frames ..."]) -> list[Numbers]:
         """Return the part of values (N, ...) of each motion."""
@@ -50,8 +50,8 @@ class FrameGroups:
 
     def sums(self, values: Annotated[Floats, "frames ..."]) -> Annotated[Floats, "motions ..."]:
         """Return the sums (M, ...) over the frames of each motion, none of which is empty."""
-        found: Floats = np.add.reduceat(values, self.starts, axis=0)
-        return found
+        sums: Floats = np.add.reduceat(values, self.starts, axis=0)
+        return sums
 
     def means(self, values: Annotated[Floats, "frames ..."]) -> Annotated[Floats, "motions ..."]:
         """Return the means (M, ...) over the frames of each motion."""
@@ -59,18 +59,18 @@ class FrameGroups:
 
     def largest(self, values: Annotated[Floats, "frames"]) -> Annotated[Floats, "motions"]:
         """Return the largest value (M,) of each motion."""
-        found: Floats = np.maximum.reduceat(values, self.starts)
-        return found
+        largest: Floats = np.maximum.reduceat(values, self.starts)
+        return largest
 
     def smallest(self, values: Annotated[Floats, "frames"]) -> Annotated[Floats, "motions"]:
         """Return the smallest value (M,) of each motion."""
-        found: Floats = np.minimum.reduceat(values, self.starts)
-        return found
+        smallest: Floats = np.minimum.reduceat(values, self.starts)
+        return smallest
 
     def every(self, values: Annotated[Booleans, "frames"]) -> Annotated[Booleans, "motions"]:
         """Return whether all values of each motion (M,) are true."""
-        found: Booleans = np.logical_and.reduceat(values, self.starts)
-        return found
+        true: Booleans = np.logical_and.reduceat(values, self.starts)
+        return true
 
     def times(self, copies: int) -> "FrameGroups":
         """Return the groups of arrays in which the frames of all motions are repeated."""
@@ -91,28 +91,28 @@ class FrameRows:
         return self.groups.counts
 
     def flat(self, rows: Indices, frames: Indices) -> Indices:
-        """Return the places of frames of rows in the array; frames may lie after a cycle."""
-        found: Indices = self.groups.starts[rows] + frames % self.counts[rows]
-        return found
+        """Return the indices of frames of rows in the array; frames may lie after a cycle."""
+        indices: Indices = self.groups.starts[rows] + frames % self.counts[rows]
+        return indices
 
     def select(self, rows: Annotated[Indices, "chosen"]) -> "FrameRows":
         """Return some of the rows."""
         return FrameRows(FrameGroups(self.counts[rows]), self.rates[rows], self.cyclic[rows])
 
     def beside(self, offset: int) -> Annotated[Indices, "frames"]:
-        """Return the place of the frame that is `offset` frames after each frame (N,).
+        """Return the index of the frame that is `offset` frames after each frame (N,).
 
         Over the ends of a row that does not repeat it is the first or the last frame.
         """
         groups = self.groups
         frame, count = groups.frame + offset, self.counts[groups.group]
-        own = np.where(self.cyclic[groups.group], frame % count, np.clip(frame, 0, count - 1))
-        return np.asarray(groups.starts[groups.group] + own)
+        shifted = np.where(self.cyclic[groups.group], frame % count, np.clip(frame, 0, count - 1))
+        return np.asarray(groups.starts[groups.group] + shifted)
 
 
 def of_lengths(values: Sequence[Numbers]) -> FrameGroups:
     """Return the groups of arrays (F, ...) that are put one after another."""
-    return FrameGroups(np.array([len(own) for own in values]))
+    return FrameGroups(np.array([len(value) for value in values]))
 
 
 def one_row(frames: int, rate: float, cyclic: bool = False) -> FrameRows:

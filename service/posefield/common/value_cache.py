@@ -14,11 +14,12 @@ Value = TypeVar("Value")
 class ValueCache(Generic[Key, Value]):
     """Bounded cache for several threads; the least recently used values are removed.
 
-    most: largest number of values. Values must not be changed. Unlike `lru_cache` of functools, it
-    makes a value from what is no part of the key, so that it keeps no model in memory.
+    capacity: largest number of values. Values must not be changed. Unlike `lru_cache` of functools,
+    it makes a value from arguments that are not part of the key, so that it keeps no model in
+    memory.
     """
 
-    most: int
+    capacity: int
     _values: OrderedDict[Key, Value] = field(default_factory=OrderedDict, init=False)
     _lock: Lock = field(default_factory=Lock, init=False)
 
@@ -36,9 +37,9 @@ class ValueCache(Generic[Key, Value]):
             if key in self._values:
                 self._values.move_to_end(key)
                 return self._values[key]
-        made = make()
-        self._keep({key: made})
-        return made
+        value = make()
+        self._keep({key: value})
+        return value
 
     def find_all(
         self, keys: Sequence[Key], make: Callable[[list[Key]], Iterable[Value]]
@@ -49,20 +50,20 @@ class ValueCache(Generic[Key, Value]):
         are made with them.
         """
         with self._lock:
-            known = {key: self._values[key] for key in keys if key in self._values}
-            for key in known:
+            values = {key: self._values[key] for key in keys if key in self._values}
+            for key in values:
                 self._values.move_to_end(key)
-        missing = [key for key in dict.fromkeys(keys) if key not in known]
+        missing = [key for key in dict.fromkeys(keys) if key not in values]
         if missing:
-            made = dict(zip(missing, make(missing), strict=True))
-            self._keep(made)
-            known |= made
-        return [known[key] for key in keys]
+            new = dict(zip(missing, make(missing), strict=True))
+            self._keep(new)
+            values |= new
+        return [values[key] for key in keys]
 
-    def _keep(self, made: Mapping[Key, Value]) -> None:
+    def _keep(self, new: Mapping[Key, Value]) -> None:
         with self._lock:
-            for key, value in made.items():
+            for key, value in new.items():
                 self._values[key] = value
                 self._values.move_to_end(key)
-            while len(self._values) > self.most:
+            while len(self._values) > self.capacity:
                 self._values.popitem(last=False)

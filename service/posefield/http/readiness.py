@@ -11,8 +11,12 @@ from typing import Any
 
 from posefield.http.api import problems
 from posefield.http.api.problems import RequestError
-from posefield.registry.model_loading import LoadFailure
-from posefield.registry.model_registry import ModelRegistry, RegistryProvider, ReloadStatistics
+from posefield.registry.model_registry import (
+    LoadFailure,
+    ModelRegistry,
+    RegistryProvider,
+    ReloadStatistics,
+)
 from posefield.synthesis.synthesizer import Synthesizer
 
 TEST_LIFETIME = 1.0

@@ -5,6 +5,7 @@ as AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID.
 """
 
 import os
+from functools import partial
 from typing import Any
 
 import obstore
@@ -13,7 +14,7 @@ from obstore.store import from_url
 
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file
-from posefield.registry.listed_models import MODEL_SUFFIX, ModelFile, parse_model_path
+from posefield.registry.model_sources import MODEL_SUFFIX, ModelFile, parse_model_path
 
 PAGE_SIZE = 1000
 """Objects of one page of a listing."""
@@ -38,57 +39,57 @@ class ObjectStoreSource:
         self._base = self.url.rpartition("/")[0] if self._one else self.url
         try:
             self._store = connect(self._base)
-        except (BaseError, OSError, ValueError) as fault:
-            raise _read_error(self.url, fault) from fault
+        except (BaseError, OSError, ValueError) as error:
+            raise _read_error(self.url, error) from error
 
-    def scan(self) -> list[ModelFile]:
+    def __call__(self) -> list[ModelFile]:
         """Return the model files; ModelError if there are none or the store fails."""
         try:
-            found = [self._single_file()] if self._one else self._list_files()
-        except (BaseError, OSError, ValueError) as fault:
-            raise _read_error(self.url, fault) from fault
-        if not found:
+            if self._one:
+                path = self.url.rpartition("/")[2]
+                metadata = obstore.head(self._store, path)
+                files = [self._model_file(metadata, path.removesuffix(MODEL_SUFFIX), "")]
+            else:
+                files = self._list_files()
+        except (BaseError, OSError, ValueError) as error:
+            raise _read_error(self.url, error) from error
+        if not files:
             raise ModelError(self.url, f"no {MODEL_SUFFIX} object under this URL")
-        return found
-
-    def _single_file(self) -> ModelFile:
-        path = self.url.rpartition("/")[2]
-        return self._model_file(
-            obstore.head(self._store, path), path.removesuffix(MODEL_SUFFIX), ""
-        )
+        return files
 
     def _list_files(self) -> list[ModelFile]:
-        metas = (m for batch in obstore.list(self._store, chunk_size=PAGE_SIZE) for m in batch)
+        pages = obstore.list(self._store, chunk_size=PAGE_SIZE)
+        objects = (metadata for page in pages for metadata in page)
         return [
-            self._model_file(meta, *place)
-            for meta in sorted(metas, key=lambda meta: str(meta["path"]))
-            if (place := parse_model_path(meta["path"]))
+            self._model_file(metadata, *name)
+            for metadata in sorted(objects, key=lambda metadata: str(metadata["path"]))
+            if (name := parse_model_path(metadata["path"]))
         ]
 
-    def _model_file(self, meta: Any, name: str, version: str) -> ModelFile:
-        signature, place = _signature(meta), f"{self._base}/{meta['path']}"
-        return ModelFile(
-            place, name, version, signature, lambda: self._read(meta["path"], signature)
-        )
+    def _model_file(self, metadata: Any, name: str, version: str) -> ModelFile:
+        signature, url = _signature(metadata), f"{self._base}/{metadata['path']}"
+        read = partial(self._read, metadata["path"], signature)
+        return ModelFile(url, name, version, signature, read)
 
     def _read(self, path: str, signature: str) -> bytes:
         """Return the content of an object; ModelError if its signature has changed."""
-        place = f"{self._base}/{path}"
+        url = f"{self._base}/{path}"
         try:
-            got = obstore.get(self._store, path)
-            checked_file.check_size(got.meta["size"], place)
-            content, read = bytes(got.bytes()), _signature(got.meta)
-        except (BaseError, OSError, ValueError) as fault:
-            raise _read_error(place, fault) from fault
-        if read != signature:
-            raise ModelError(place, "cannot be read: it has changed meanwhile")
+            response = obstore.get(self._store, path)
+            checked_file.check_size(response.meta["size"], url)
+            content, current = bytes(response.bytes()), _signature(response.meta)
+        except (BaseError, OSError, ValueError) as error:
+            raise _read_error(url, error) from error
+        if current != signature:
+            raise ModelError(url, "cannot be read: it has changed meanwhile")
         return content
 
 
-def _signature(meta: Any) -> str:
-    return f"{meta['e_tag']} {meta['version']} {meta['size']} {meta['last_modified']}"
+def _signature(metadata: Any) -> str:
+    names = ("e_tag", "version", "size", "last_modified")
+    return " ".join(str(metadata[name]) for name in names)
 
 
-def _read_error(place: str, fault: Exception) -> ModelError:
-    first = str(fault).partition("\n")[0]
-    return ModelError(place, f"cannot be read: {first}")
+def _read_error(url: str, error: Exception) -> ModelError:
+    first = str(error).partition("\n")[0]
+    return ModelError(url, f"cannot be read: {first}")

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from posefield.common.errors import InvalidField
-from posefield.registry.model_loading import NAME
+from posefield.registry.model_registry import NAME
 
 KEY_PREFIX = "pf_"
 """Prefix of every key, by which secret scanners recognise a published one."""
