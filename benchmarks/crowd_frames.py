@@ -10,7 +10,7 @@ from paper import naive_kriging, poses
 from scipy import linalg
 
 from posefield.common.units import Indices, Singles
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import UniversalKriging
 
 Answer = Callable[[], list[Singles]]

@@ -9,7 +9,7 @@ import onnxruntime
 from rows import Row
 from timing import in_turn
 
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph import GraphBuilder
 
 # A product whose three matrices lie in a core's own cache; copies within and far beyond it.
 SIZE, NEAR, FAR = 256, 1 << 18, 1 << 26

@@ -19,8 +19,7 @@ from posefield.console.progress import ProgressBar
 from posefield_train.cli import executors
 from posefield_train.evaluate import protocol as held_out
 from posefield_train.evaluate import summary
-from posefield_train.parallel.finished_jobs import FinishedJobs
-from posefield_train.parallel.jobs import Jobs
+from posefield_train.jobs import FinishedJobs, Jobs
 from posefield_train.source import data_folder, ingest, recipe
 
 KEPT = Path(__file__).parents[1] / "build/evaluation"

@@ -16,7 +16,7 @@ import numpy as np
 from discovered_families import Discovery, JudgedFamily
 from rows import Row, record, table
 
-from posefield_train.evaluate import compared_motion, motion_errors, predictions
+from posefield_train.evaluate import motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
 from posefield_train.families import found_families, recipe_folder
 from posefield_train.families.found_families import FamilyRow
@@ -91,7 +91,7 @@ def _errors(
     made = predictions.predict_posefield(told, trained, asked)
     found = []
     for one, answer in zip(held, made, strict=True):
-        captured = compared_motion.motion_of_clip(one.captured or one.clip, None)
+        captured = motion_errors.motion_of_clip(one.captured or one.clip, None)
         errors = motion_errors.compare_motions(answer, captured, ())
         found.append((errors.relative.mean, errors.absolute.rms))
     return found

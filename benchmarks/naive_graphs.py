@@ -19,8 +19,8 @@ from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
 from posefield_train.kriging import kriging_graph
-from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables
+from posefield_train.kriging.kriging_graph import COVARIANCES
+from posefield_train.onnx_graph import GraphBuilder, LevelTables
 from posefield_train.tensor import decoder_graph
 
 VECTORS: ChartName = "rotation_vector"

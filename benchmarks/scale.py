@@ -23,13 +23,13 @@ from evaluation import ground_truth
 from rows import Row, record, table
 
 from posefield.common.units import Floats
-from posefield_train.evaluate import compared_motion, motion_errors, predictions
-from posefield_train.evaluate.compared_motion import ComparedMotion
+from posefield_train.evaluate import motion_errors, predictions
+from posefield_train.evaluate.motion_errors import ComparedMotion
 from posefield_train.evaluate.predictions import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.jobs import single_threaded
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.parallel import single_thread
 from posefield_train.sample import sample_family, sample_files
 from posefield_train.sample.sample_controls import parse_controls
 from posefield_train.source import ingest, recipe
@@ -58,7 +58,7 @@ def measure(clips: int) -> dict[str, Any]:
     spent, wall = _cpu() - before, time.perf_counter() - start
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     used = use(exported.content) if clips == USED else {}
-    with single_thread.single_threaded():
+    with single_threaded():
         compared = compare(own, trained)
     return {
         "clips": clips,
@@ -111,7 +111,7 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
     found = _answers(own, trained, points)
     rng = np.random.Generator(np.random.PCG64(SEED))
     clips = [sample_family.noisy_trial(parse_controls(list(point)), rng) for point in points]
-    captured = [compared_motion.motion_of_clip(clip, None) for clip in clips]
+    captured = [motion_errors.motion_of_clip(clip, None) for clip in clips]
     squares = [
         motion_errors.compare_motions(made, one, ()).mean_squared_error
         for made, one in zip(found, captured, strict=True)

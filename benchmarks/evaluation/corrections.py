@@ -20,14 +20,13 @@ from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import PredictionState, Session
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
-from posefield_train.evaluate import compared_motion, motion_errors
-from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
-from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield_train.evaluate import motion_errors
+from posefield_train.evaluate.motion_errors import ComparedMotion, MotionErrors, MotionEvent
 from posefield_train.evaluate.predictions import OURS, Queries
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
-from posefield_train.report.drawing.significant_digits import round_number
+from posefield_train.report.significant_digits import round_number
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.motion_tensor import UNIFORM_SHARES
@@ -110,10 +109,10 @@ class _MotionCorrector:
         translations = skeleton.translations(state.bones, path)
         share = float(np.interp(self.event.frame, state.frames, UNIFORM_SHARES))
         own = MotionEvent(self.event.joint, share)
-        made = compared_motion.motion_of_poses(parents, rotations, translations, held.duration, own)
+        made = motion_errors.motion_of_poses(parents, rotations, translations, held.duration, own)
         curves = self.opened.card.curves
         values = held.curve_values(state.frames) if curves else np.zeros(0)
-        return compared_motion.with_curves([made], curves, values[None])[0]
+        return motion_errors.with_curves([made], curves, values[None])[0]
 
 
 def event_target(captured: ComparedMotion, event: MotionEvent) -> EventTarget:

@@ -15,7 +15,7 @@ from posefield_train.evaluate import summary
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.predictions import OURS
 from posefield_train.evaluate.protocol import EvaluationResult
-from posefield_train.report.drawing.significant_digits import round_number
+from posefield_train.report.significant_digits import round_number
 
 KNOWN, LEFT_OPEN = "known", "open"
 """Names of the tables in which every method knows the performer, and none does."""

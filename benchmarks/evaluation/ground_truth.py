@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.evaluate import compared_motion
-from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
+from posefield_train.evaluate import motion_errors
+from posefield_train.evaluate.motion_errors import ComparedMotion, MotionEvent
 from posefield_train.sample import noise_free, sample_controls
 
 POINTS, SEED = 2_000, 2006
@@ -32,6 +32,6 @@ def _point(rng: np.random.Generator) -> list[float]:
 def truth_motions(truth_points: Floats, event: MotionEvent | None) -> Sequence[ComparedMotion]:
     """Return the noise-free motions at control points (Q, 4)."""
     return [
-        compared_motion.motion_of_clip(noise_free.truth_clip(list(point), RATE), event)
+        motion_errors.motion_of_clip(noise_free.truth_clip(list(point), RATE), event)
         for point in truth_points
     ]

@@ -12,7 +12,7 @@ from evaluation.peers import LINEAR_PEERS, Interpolator
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.kriging import kriging_model
-from posefield_train.evaluate import gaussian_process, predictions
+from posefield_train.evaluate import predictions
 from posefield_train.evaluate.predictions import GP, OURS, Predictions, Queries, Values
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import universal_kriging
@@ -117,7 +117,7 @@ def peer_values(
                 key: linear_smoothers.chosen_offsets(choices, samples, known)
                 for key, known in values.items()
             }
-    predicted[GP] = _by_quantity(gaussian_process.predict, samples, values, points)
+    predicted[GP] = _by_quantity(predictions.predict_process, samples, values, points)
     if samples.labels:
         predicted[GP + OPEN] = _by_quantity(gp_without_performers, samples, values, points)
         predicted[SAME_PERFORMER] = _by_quantity(
@@ -129,7 +129,7 @@ def peer_values(
 def gp_without_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return the predictions of the Gaussian process from the controls alone."""
     alone = SamplePoints(samples.half_ranges, samples.controls, samples.groups)
-    return gaussian_process.predict(alone, values, queries[:, : samples.controls])
+    return predictions.predict_process(alone, values, queries[:, : samples.controls])
 
 
 def _by_quantity(

@@ -11,12 +11,12 @@ from posefield.common.units import Floats, Indices
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.evaluate import predictions, summary
-from posefield_train.evaluate.compared_motion import ComparedMotion
+from posefield_train.evaluate.motion_errors import ComparedMotion
 from posefield_train.evaluate.predictions import OURS, Queries
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
-from posefield_train.report.drawing.significant_digits import round_number
+from posefield_train.report.significant_digits import round_number
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import PERFORMER

@@ -19,13 +19,16 @@ from evaluation.standing_feet import FeetAnswer
 from evaluation.takes import TakeResults
 from posefield.common.units import Floats
 from posefield_train.evaluate import motion_errors, predictions, protocol, summary
-from posefield_train.evaluate.folds import Fold
 from posefield_train.evaluate.predictions import OURS, Predictions, Queries
-from posefield_train.evaluate.protocol import EvaluationResult, PartialResult, ProgressCallback
+from posefield_train.evaluate.protocol import (
+    EvaluationResult,
+    Fold,
+    PartialResult,
+    ProgressCallback,
+)
 from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.parallel import single_thread
-from posefield_train.parallel.jobs import Jobs
+from posefield_train.jobs import Jobs, single_threaded
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.train import train
@@ -92,7 +95,7 @@ def run(
     return _result(protocol.held_out_result(recipe, examples, name, errors), parts)
 
 
-@single_thread.single_threaded()
+@single_threaded()
 def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str) -> Part:
     """Return the results for the clips of one fold."""
     rest, held = fold.split(examples)
@@ -160,7 +163,7 @@ def run_against_truth(
     return _result(protocol.merge(recipe, TRUTH, names, joints, alone, errors), parts)
 
 
-@single_thread.single_threaded()
+@single_threaded()
 def _run_truth_batch(
     recipe: Recipe, trained: TrainedModel, file: bytes, points: Floats, start: int
 ) -> Part:

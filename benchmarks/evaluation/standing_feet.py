@@ -15,8 +15,8 @@ from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion, FeetMode, LabelValue
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.evaluate import compared_motion, motion_errors
-from posefield_train.report.drawing.significant_digits import round_number
+from posefield_train.evaluate import motion_errors
+from posefield_train.report.significant_digits import round_number
 from posefield_train.source.ingest import Example
 
 NO_LIMIT = 1e6
@@ -111,7 +111,7 @@ def _feet_answer(
 
 def _relative_distance(clip: Clip, captured: Clip) -> float:
     """Return the mean distance of a clip from a captured one after time warping, m."""
-    one, other = (compared_motion.motion_of_clip(moved, None) for moved in (clip, captured))
+    one, other = (motion_errors.motion_of_clip(moved, None) for moved in (clip, captured))
     return motion_errors.compare_motions(one, other, ()).relative.mean
 
 

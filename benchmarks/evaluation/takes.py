@@ -18,7 +18,7 @@ from posefield.motion.clip import Clip, assemble
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.report.drawing.significant_digits import round_number
+from posefield_train.report.significant_digits import round_number
 from posefield_train.source.ingest import Example
 
 RATE = 30.0

@@ -16,9 +16,9 @@ from paper import variogram
 from paper.variogram import RANGES, ExperimentalVariogram, VariogramModel
 from posefield.common.units import Floats, PointControls, PoseVectors
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph import GraphBuilder
 
 VariogramFitter = Callable[[ExperimentalVariogram, str], VariogramModel]
 

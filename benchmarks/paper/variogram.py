@@ -13,7 +13,7 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices, SampleControls, SampleValues
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 
 LAGS = 15
 # Largest lag as a share of the largest distance; farther pairs are few.

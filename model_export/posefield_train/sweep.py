@@ -8,8 +8,7 @@ from posefield.common.errors import InvalidField, TrainingError
 from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
-from posefield_train.parallel import single_thread
-from posefield_train.parallel.jobs import Jobs
+from posefield_train.jobs import Jobs, single_threaded
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
@@ -41,7 +40,7 @@ def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterat
 
 
 def _train_model(name: str, own: Recipe, examples: list[Example], notes: list[str]) -> SweepResult:
-    with single_thread.single_threaded():
+    with single_threaded():
         try:
             ingest.check_presets(own, examples)
             trained = train.train(own, examples, lambda _: None)

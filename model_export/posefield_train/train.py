@@ -11,6 +11,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion.curves import Curve
 from posefield.motion.skeleton import Skeleton
+from posefield_train import outliers
 from posefield_train.align import phase_alignment, time_alignment, travel
 from posefield_train.align.time_alignment import AlignedClips, Refinement
 from posefield_train.align.travel import Travel
@@ -20,11 +21,11 @@ from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import truncation_cost, warped_errors
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.jobs import Jobs, ordered_results, single_threaded
 from posefield_train.kriging import (
     coefficient_models,
     kriging_bank,
     kriging_tuning,
-    sample_kriging,
     sample_points,
     universal_kriging,
 )
@@ -33,16 +34,21 @@ from posefield_train.kriging.kriging_bank import KrigingBank, PowerLaw
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.outliers import family_check, outlier_detection
-from posefield_train.parallel import single_thread
-from posefield_train.parallel.jobs import Jobs, ordered_results
 from posefield_train.source import canonical
 from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import event_blend, hosvd, motion_tensor, truncation_error
-from posefield_train.tensor.decoder import Decoder, Proportions
-from posefield_train.tensor.event_blend import COEFFICIENTS, EventBlend
+from posefield_train.tensor import hosvd, motion_tensor, truncation_error
+from posefield_train.tensor.decoder import (
+    COEFFICIENTS,
+    Decoder,
+    EventBlend,
+    Proportions,
+    build_blend,
+    effector_weights,
+    event_distances,
+    event_weights,
+)
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
 from posefield_train.tensor.truncation_error import TruncationReference
@@ -81,7 +87,7 @@ def train(
     for each other, which give the same bytes on all. Raises TrainingError if the samples do not
     determine a kriging model.
     """
-    with single_thread.single_threaded():
+    with single_threaded():
         return _train(recipe, examples, report, jobs)
 
 
@@ -90,7 +96,7 @@ def _train(
 ) -> TrainedModel:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
-    family_check.check_family(recipe, examples)
+    outliers.check_family(recipe, examples)
     universal_kriging.check_samples(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
     examples = _sorted(examples)
     canonical.return_freed_memory()
@@ -103,7 +109,7 @@ def _train(
     canonical.return_freed_memory()
     report("fitting the fields")
     trained = _fit_and_truncate(recipe, examples, moved, full, jobs)
-    return replace(trained, outliers=outlier_detection.find_outliers(recipe, trained))
+    return replace(trained, outliers=outliers.find_outliers(recipe, trained))
 
 
 # Root mean square distance of joints, m, that each of the three projections of a large tensor may
@@ -208,7 +214,7 @@ def _fit_models(
     proportions, bones = coefficient_models.fit_proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
-    effector = event_blend.effector_weights(judge, full)
+    effector = effector_weights(judge, full)
     pose = coefficient_models.choose_covariance(recipe.kriging, laid, full.motions, effector, jobs)
     fitted = {
         k: coefficient_models.fit(recipe.kriging, pose.hyper, laid, v) for k, v in beside.items()
@@ -278,7 +284,7 @@ def _truncation_limits(
     limits = {"rms": max(ALL_JOINTS_SHARE * rms, SMALLEST_LIMIT)}
     if judge.event_frame is not None:
         residuals = (fits.event or fits.pose).residuals
-        missed = event_blend.event_distances(judge, full, judge.event_frame, residuals)
+        missed = event_distances(judge, full, judge.event_frame, residuals)
         effector = float(np.sqrt(np.mean(np.square(missed))))
         share = EVENT_SHARE if fits.event else EFFECTOR_SHARE
         limits["effector"] = max(share * effector, SMALLEST_LIMIT)
@@ -294,11 +300,11 @@ def _assemble(
     reduced: TuckerTensor,
 ) -> FloatModel:
     """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
-    solved = sample_kriging.solve(fits.pose.hyper, moved.samples, reduced.bases[2])
+    solved = universal_kriging.solve_samples(fits.pose.hyper, moved.samples, reduced.bases[2])
     event, blend = None, _event_blend(recipe, judge, fits, reduced)
     if fits.event and blend:
         values = reduced.bases[2][:, : blend.count]
-        event = sample_kriging.solve(fits.event.hyper, moved.samples, values)
+        event = universal_kriging.solve_samples(fits.event.hyper, moved.samples, values)
     others = {name: found.field for name, found in fits.beside.items()}
     ends, own_tensor = (controls.min(axis=0), controls.max(axis=0)), judge.own_tensor
     timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)
@@ -323,10 +329,8 @@ def _event_blend(
 ) -> EventBlend | None:
     if fits.event is None or judge.event_frame is None:
         return None
-    weights = event_blend.event_weights(
-        recipe.motion.frames, judge.event_frame.frame, recipe.motion.cyclic
-    )
-    return event_blend.build_blend(COEFFICIENTS, weights, reduced.core, reduced.bases[1])
+    weights = event_weights(recipe.motion.frames, judge.event_frame.frame, recipe.motion.cyclic)
+    return build_blend(COEFFICIENTS, weights, reduced.core, reduced.bases[1])
 
 
 def _decoder(own: MotionTensor, reduced: TuckerTensor, blend: EventBlend | None) -> Decoder:

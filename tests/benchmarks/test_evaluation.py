@@ -11,7 +11,7 @@ from joblib import parallel_config
 from minimal import plain_recipe, small_clip, write_clips
 
 from posefield_train.evaluate.predictions import OURS
-from posefield_train.parallel.jobs import ProcessJobs
+from posefield_train.jobs import ProcessJobs
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 

@@ -7,7 +7,7 @@ from families import sample_walk
 
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
-from posefield_train.evaluate.folds import Fold
+from posefield_train.evaluate.protocol import Fold
 from posefield_train.graph import onnx_export
 from posefield_train.train import train
 

@@ -6,7 +6,7 @@ from paper import naive_kriging, variogram
 from running import outputs
 from scipy.interpolate import RBFInterpolator
 
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 
 SAMPLES, FRAMES, JOINTS = 25, 6, 4
 

@@ -11,7 +11,7 @@ from paper.variogram import (
     ExperimentalVariogram,
 )
 
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.tensor import hosvd
 
 TOLERANCE = 1e-9

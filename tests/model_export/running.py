@@ -8,7 +8,7 @@ import onnxruntime
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import KrigingBank
-from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables
+from posefield_train.onnx_graph import GraphBuilder, LevelTables
 
 
 def bank_values(

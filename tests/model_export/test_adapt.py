@@ -10,8 +10,8 @@ from families import sample_walk
 from posefield.common.errors import TrainingError
 from posefield.motion import quat
 from posefield_train import train
-from posefield_train.adapt import adaptation, canonical_clips, extended_models, tensor_extension
-from posefield_train.evaluate import compared_motion, motion_errors, predictions
+from posefield_train.adapt import adaptation, canonical_clips
+from posefield_train.evaluate import motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
 from posefield_train.kriging import universal_kriging
 from posefield_train.source import canonical, ingest
@@ -65,7 +65,7 @@ def misses(recipe, trained, model, name, whose="cy"):
     return np.mean(
         [
             motion_errors.compare_motions(
-                own, compared_motion.motion_of_clip(e.clip, None), ()
+                own, motion_errors.motion_of_clip(e.clip, None), ()
             ).plain_relative.mean
             for own, e in pairs
         ]
@@ -114,9 +114,7 @@ def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
     def extended():
         numbers = adapted.new_clips.numbers
         parents, weights = known.skeleton.parents, known.joint_weights
-        return tensor_extension.extend(
-            known.model, parents, weights, numbers, known.truncation
-        ).tensor
+        return adaptation.extend(known.model, parents, weights, numbers, known.truncation).tensor
 
     own, eigh, qr = extended(), np.linalg.eigh, np.linalg.qr
 
@@ -140,7 +138,7 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     """The same distances in a longer unit: the old samples alone give the very same field."""
     bank = known.model.bank
     far = examples(trained, "cy", (30.0,))
-    laid = extended_models.extend_samples(bank, known.groups, far, "cy")
+    laid = adaptation.extend_samples(bank, known.groups, far, "cy")
     assert (laid.low, laid.high) == (0.0, 30.0) and laid.growth == pytest.approx(30 / 14)
     n, values = len(bank.pose.samples), bank.pose.values
     rng = np.random.Generator(np.random.PCG64(1))

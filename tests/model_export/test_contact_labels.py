@@ -13,10 +13,10 @@ from posefield.inference import session
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.motion import bvh_writer
 from posefield_train import train
-from posefield_train.contacts import contact_labels, held_out_contacts
-from posefield_train.contacts.held_out_contacts import FRAMES, SHARES, HeldOutClips
+from posefield_train.contacts import contact_labels, contact_model
+from posefield_train.contacts.contact_model import FRAMES, SHARES, HeldOutClips
 from posefield_train.evaluate import protocol, summary
-from posefield_train.parallel.jobs import ProcessJobs
+from posefield_train.jobs import ProcessJobs
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 
@@ -143,7 +143,7 @@ def labels(clips):
 
 def accuracies(clips, predicted):
     asked = sample_walk.recipe(), clips, (3, 6)
-    return held_out_contacts.held_out_accuracies(*asked, lambda _: predicted)
+    return contact_model.held_out_accuracies(*asked, lambda _: predicted)
 
 
 def test_true_contacts_agree_wholly_and_opposite_ones_nowhere(clips, labels):
@@ -153,7 +153,7 @@ def test_true_contacts_agree_wholly_and_opposite_ones_nowhere(clips, labels):
     half = accuracies(clips, np.full_like(labels, 0.5))
     assert [one.brier for one in half] == [0.25] * 3
     assert all(0.0 < one.climatology < 0.1 for one in right)
-    assert held_out_contacts.mean_facts(right)["agreement"] == 1.0
+    assert contact_model.mean_accuracy(right)["agreement"] == 1.0
 
 
 def test_an_evaluation_tells_the_contacts_of_clips_held_out(strides):
@@ -163,7 +163,7 @@ def test_an_evaluation_tells_the_contacts_of_clips_held_out(strides):
         result = protocol.run_protocol(own, strides[:8], "clip", ProcessJobs(1), lambda *_: None)
     assert len(result.contacts) == 8
     found = json.loads(json.dumps(summary.facts(result)))["contacts"]
-    assert found == held_out_contacts.mean_facts(result.contacts)
+    assert found == contact_model.mean_accuracy(result.contacts)
     assert found["agreement"] > 0.95 and FRAMES == 100
     said = summary.trust_text(result)[-1]
     assert said.startswith(f"contacts: {found['agreement']:.1%} of frames agree")

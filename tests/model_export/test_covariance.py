@@ -5,7 +5,7 @@ import pytest
 from running import outputs
 from scipy.special import gamma, kv
 
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 
 # float32 has seven digits, and the longest form takes six operations.
 FLOAT32 = 2e-6

@@ -9,9 +9,9 @@ from families import face_motion
 from joblib import parallel_config
 
 from posefield.motion.curves import distances
-from posefield_train.evaluate import compared_motion, motion_errors, protocol, summary
+from posefield_train.evaluate import motion_errors, protocol, summary
 from posefield_train.evaluate.summary import NOT_APPLICABLE
-from posefield_train.parallel.jobs import ProcessJobs
+from posefield_train.jobs import ProcessJobs
 from posefield_train.source import curve_files, ingest
 
 JOBS = ProcessJobs(1)
@@ -45,7 +45,7 @@ def resting(values):
     """A clip of curves alone, as it is compared."""
     own = face_motion.expression(0.5, 0.5).curves
     clip = curve_files.resting_clip(replace(own, values=values), 60.0)
-    return compared_motion.motion_of_clip(clip, None)
+    return motion_errors.motion_of_clip(clip, None)
 
 
 def smooth(shares):

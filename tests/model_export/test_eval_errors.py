@@ -7,8 +7,8 @@ import pytest
 
 from posefield.common.units import UP
 from posefield.motion import quat
-from posefield_train.evaluate import compared_motion, motion_errors
-from posefield_train.evaluate.compared_motion import ComparedMotion
+from posefield_train.evaluate import motion_errors
+from posefield_train.evaluate.motion_errors import ComparedMotion
 from posefield_train.tensor.motion_tensor import FRAMES
 
 ROUNDING = 1e-9
@@ -24,7 +24,7 @@ def captured(rng):
     """A body of four joints that wanders smoothly, with its shell."""
     t = np.linspace(0.0, 1.0, FRAMES)[:, None, None]
     joints = np.sin(3.0 * t + rng.uniform(0.0, 6.0, (1, 4, 3))) + 0.5 * t**2
-    shell = joints[:, :, None] + compared_motion.SHELL_RADIUS * np.eye(3)
+    shell = joints[:, :, None] + motion_errors.SHELL_RADIUS * np.eye(3)
     return made(np.concatenate([joints[:, :, None], shell], axis=2), 1.5, np.zeros(3))
 
 
@@ -73,7 +73,7 @@ def test_what_turns_about_itself_is_seen_by_the_shell_alone(captured):
     points[:, 3, 1:] = points[:, 3, :1] + spun
     found = motion_errors.compare_motions(made(points, 1.5), captured, FEET)
     assert found.relative.largest < ROUNDING
-    assert found.shell.largest == pytest.approx(compared_motion.SHELL_RADIUS * math.sqrt(2.0))
+    assert found.shell.largest == pytest.approx(motion_errors.SHELL_RADIUS * math.sqrt(2.0))
 
 
 def test_a_foot_that_slides_at_a_known_speed_does():

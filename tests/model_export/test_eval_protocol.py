@@ -10,19 +10,10 @@ from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from posefield.common.errors import TrainingError
 from posefield.kriging import support
-from posefield_train.evaluate import (
-    compared_motion,
-    folds,
-    gaussian_process,
-    motion_errors,
-    predictions,
-    protocol,
-    summary,
-    support_flags,
-)
-from posefield_train.evaluate.folds import Fold
+from posefield_train.evaluate import motion_errors, predictions, protocol, summary
 from posefield_train.evaluate.predictions import DEFINITIONS, OURS, Queries
-from posefield_train.parallel.jobs import ProcessJobs
+from posefield_train.evaluate.protocol import Fold
+from posefield_train.jobs import ProcessJobs
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 from posefield_train.train import train
@@ -89,21 +80,21 @@ def test_every_clip_is_held_out_once_with_all_of_its_take(family):
     ]
     stated = [replace(e, take=f"take {i // 3}") for i, e in enumerate(family)]
     for examples, parts in ((family, CLIPS), (files, CLIPS), (same, CLIPS // 3)):
-        listed = folds.clip_folds(examples)
+        listed = protocol.clip_folds(examples)
         assert sorted(i for fold in listed for i in fold.held) == list(range(CLIPS))
         assert len(listed) == parts
         for fold in listed:
             rest, held = fold.split(examples)
             assert not {e.row.place for e in rest} & {e.row.place for e in held}
-    assert [fold.held for fold in folds.clip_folds(stated)] == [
-        fold.held for fold in folds.clip_folds(same)
+    assert [fold.held for fold in protocol.clip_folds(stated)] == [
+        fold.held for fold in protocol.clip_folds(same)
     ]
     with pytest.raises(TrainingError, match=r"all \d+ clips are of one take, expected two or more"):
-        folds.clip_folds([replace(e, take="one") for e in family])
+        protocol.clip_folds([replace(e, take="one") for e in family])
 
 
 def test_performers_are_held_out_whole(family):
-    assert [set(fold.held) for fold in folds.performer_folds(family)] == [
+    assert [set(fold.held) for fold in protocol.performer_folds(family)] == [
         set(range(first, CLIPS, 3)) for first in range(3)
     ]
     assert protocol.protocols(family) == ["clip", "performer"]
@@ -115,8 +106,8 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
     """The protocol's errors are those of a model that never saw the clip."""
     held, joint = 4, family[0].clip.skeleton.names.index("LeftHand")
     queries = Queries(family[held].controls[None], [family[held].row.labels])
-    captured = compared_motion.motion_of_clip(
-        family[held].clip, compared_motion.MotionEvent(joint, 1.0)
+    captured = motion_errors.motion_of_clip(
+        family[held].clip, motion_errors.MotionEvent(joint, 1.0)
     )
 
     def errors(examples):
@@ -207,7 +198,7 @@ def test_the_likelihood_is_scikit_learns(rng):
     theta = kernel.theta + 0.3 * rng.standard_normal(5)
     model = GaussianProcessRegressor(kernel, optimizer=None).fit(points, values)
     expected, slope = model.log_marginal_likelihood(theta, eval_gradient=True)
-    likelihood = gaussian_process.MarginalLikelihood(np.square(points[:, None] - points), values)
+    likelihood = predictions.MarginalLikelihood(np.square(points[:, None] - points), values)
     negative, negative_slope = likelihood.negative(theta)
     assert negative == pytest.approx(-expected, rel=1e-10)
     assert negative_slope == pytest.approx(-slope, rel=1e-8)
@@ -250,9 +241,9 @@ def test_what_cannot_be_evaluated_is_refused_first(tmp_path, folder, posefield, 
 def test_clips_beyond_all_others_are_flagged_and_those_captured_evenly_seldom(rng):
     controls, names = rng.random((60, 2)) * [1.0, 3.0], ("left", "up")
     parts = [Fold((i, i + 1)) for i in range(0, 60, 2)]
-    flags = support_flags.measure_flags(controls, names, parts)
+    flags = protocol.measure_flags(controls, names, parts)
     assert flags.alarms < 0.15 and flags.beyond == {"left": 1.0, "up": 1.0}
     # A fold does not know what it holds out: its two clips far beyond all others are flagged.
     alone = np.vstack([controls, [[5.0, 1.0]], [[5.0, 1.1]]])
-    assert support_flags.measure_flags(alone, names, [*parts, Fold((60, 61))]).alarms >= 2 / 62
+    assert protocol.measure_flags(alone, names, [*parts, Fold((60, 61))]).alarms >= 2 / 62
     assert (support.fit_support(alone).beyond(alone[60:]) == 0.0).all()

@@ -11,8 +11,14 @@ from posefield_train.adapt import model_reconstruction
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import coefficient_models, universal_kriging
 from posefield_train.kriging.kriging_bank import POSE
-from posefield_train.tensor import event_blend, truncation_error
-from posefield_train.tensor.event_blend import COEFFICIENTS, LOST_SHARE
+from posefield_train.tensor import truncation_error
+from posefield_train.tensor.decoder import (
+    COEFFICIENTS,
+    LOST_SHARE,
+    build_blend,
+    event_jacobians,
+    event_weights,
+)
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +31,8 @@ def blended(judge, trained):
     """The small model with a second prediction of five coefficients, whether it pays or not."""
     model = trained.model
     reduced, frames = model.decoder.reduced, len(model.decoder.reduced.bases[1])
-    weights = event_blend.event_weights(frames, judge.event_frame.frame, cyclic=False)
-    blend = event_blend.build_blend(5, weights, reduced.core, reduced.bases[1])
+    weights = event_weights(frames, judge.event_frame.frame, cyclic=False)
+    blend = build_blend(5, weights, reduced.core, reduced.bases[1])
     hyper = replace(model.bank.pose.hyper, nugget=0.5, trend=300.0)
     event = universal_kriging.solve(hyper, model.bank.pose.samples, reduced.bases[2][:, :5])
     bank = replace(model.bank, event=event)
@@ -96,7 +102,7 @@ def at_event(judge, full, motions):
 
 def test_jacobian_is_that_of_central_differences_of_forward_kinematics(judge, trained):
     full, event = trained.full, judge.event_frame
-    found = event_blend.event_jacobians(judge, full, event)
+    found = event_jacobians(judge, full, event)
     assert found.shape == (len(trained.examples), 3, COEFFICIENTS)
     step = 1e-3 * full.motions[:, 0].std()
     for column in (0, 3, COEFFICIENTS - 1):

@@ -7,9 +7,9 @@ import pytest
 from minimal import SKELETON, small_clip
 
 from posefield.motion import quat
+from posefield_train import outliers
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.outliers import mirrored_clips, outlier_detection, outlier_distances
 from posefield_train.source import clip_joints, take_groups
 
 HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)
@@ -25,12 +25,12 @@ def spoiled(clip, frames, joint, by):
 @pytest.mark.parametrize("frames", [slice(50, None), slice(50, 51)])
 def test_a_leap_is_found_whether_or_not_it_leads_back(frames):
     clip = small_clip(frames=100)
-    found = outlier_detection.largest_jump(spoiled(clip, frames, 4, 0.3))
+    found = outliers.largest_jump(spoiled(clip, frames, 4, 0.3))
     assert found.frame in (49, 50)
     assert (found.joint, found.whole) == (4, False)
     assert found.distance == pytest.approx(0.3, abs=0.03)
-    assert outlier_detection.largest_jump(clip) is None
-    assert outlier_detection.largest_jump(spoiled(clip, frames, 0, 0.3)).whole
+    assert outliers.largest_jump(clip) is None
+    assert outliers.largest_jump(spoiled(clip, frames, 0, 0.3)).whole
 
 
 @pytest.fixture
@@ -76,15 +76,15 @@ def test_a_disguise_is_seen_through(rng):
         "turned by -90 degrees about the vertical": round_about,
     }
     for said, own in worn.items():
-        found = mirrored_clips.find_transform(own, expected, NAMES, left)
+        found = outliers.find_transform(own, expected, NAMES, left)
         assert (found.description, found.after < 1e-9, found.before > 0.1) == (said, True, True)
-    assert mirrored_clips.find_transform(expected + 0.1, expected, NAMES, left) is None
+    assert outliers.find_transform(expected + 0.1, expected, NAMES, left) is None
     for degrees, noticed in ((-1.0, False), (8.0, False), (30.0, True)):
         up = np.array([0.0, 1.0, 0.0])
         own = quat.rotate(quat.from_axis_angle(up, np.array(np.radians(degrees))), expected)
-        found = mirrored_clips.find_transform(own, expected, NAMES, left)
+        found = outliers.find_transform(own, expected, NAMES, left)
         assert (found is not None) == noticed
-    assert mirrored_clips.find_transform(body(rng), expected, NAMES, left) is None
+    assert outliers.find_transform(body(rng), expected, NAMES, left) is None
 
 
 def line(rng, count=30):
@@ -96,11 +96,11 @@ def line(rng, count=30):
 
 def test_an_outsider_is_found_and_its_neighbours_are_not(rng):
     laid, values = line(rng)
-    assert outlier_distances.measure_outliers(HYPER, laid, values).outside == ()
+    assert outliers.measure_outliers(HYPER, laid, values).outside == ()
     values[[10, 12]] += [[0.0, 3.0, 0.0], [0.0, 0.0, 2.0]]
-    judged = outlier_distances.measure_outliers(HYPER, laid, values)
+    judged = outliers.measure_outliers(HYPER, laid, values)
     assert set(judged.outside) == {10, 12}
     # Each is judged by those who belong, so the two do not spoil each other's distance.
     assert judged.distances[[10, 12]] == pytest.approx([3.0, 2.0], abs=0.3)
-    assert judged.times[11] < outlier_distances.MEDIAN_FACTOR
+    assert judged.times[11] < outliers.MEDIAN_FACTOR
     assert judged.usual < 0.2

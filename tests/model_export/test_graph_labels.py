@@ -14,8 +14,8 @@ from posefield.common.errors import ExportRefused
 from posefield.inference import session
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import ConstantModel, KrigingBank
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper
 
 SAMPLES, CONTROLS, BATCH = 25, 3, 40

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import FileError, TrainingError
-from posefield_train.parallel.finished_jobs import FinishedJobs
-from posefield_train.parallel.jobs import ProcessJobs
+from posefield_train.jobs import FinishedJobs, ProcessJobs
 
 
 def divide(dividend, divisor):

@@ -7,7 +7,7 @@ import pytest
 
 from posefield.common.errors import TrainingError
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper
 
 # The systems here have condition numbers below 1e5.

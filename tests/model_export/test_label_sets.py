@@ -12,8 +12,8 @@ from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train import train
 from posefield_train.kriging import sample_points, thinning, universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import KrigingBank
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper

@@ -10,14 +10,12 @@ from posefield_train.graph import trained_card
 from posefield_train.kriging import (
     coefficient_models,
     kriging_tuning,
-    sample_kriging,
     sample_points,
     universal_kriging,
 )
-from posefield_train.kriging.sample_kriging import ProjectedProcess
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.kriging.universal_kriging import Hyper, ProjectedProcess
 from posefield_train.source.recipe_sections import Kriging
 
 SAME = 1e-8
@@ -81,15 +79,19 @@ def test_residuals_of_left_out_groups_are_those_of_a_model_without_them(hyper, s
 
 def test_the_drift_is_reproduced_exactly(hyper, samples, points):
     slopes = np.array([[1.0], [-3.0], [0.5]]) if hyper.drifts == (1,) else np.zeros((3, 1))
-    field = sample_kriging.solve(hyper, large(samples, np.arange(20)), 2.0 + samples @ slopes)
+    field = universal_kriging.solve_samples(
+        hyper, large(samples, np.arange(20)), 2.0 + samples @ slopes
+    )
     assert np.abs(field.predict(points) - 2.0 - points @ slopes).max() < SAME
-    curved = sample_kriging.solve(hyper, large(samples, np.arange(20)), np.square(samples))
+    curved = universal_kriging.solve_samples(
+        hyper, large(samples, np.arange(20)), np.square(samples)
+    )
     assert np.abs(curved.predict(points) - np.square(points)).max() > 1e-3
 
 
 def test_its_sample_values_give_its_weights(hyper, samples, values, points):
     """A dense model of the inducing clips, which adaptation reads, has equal weights."""
-    field = sample_kriging.solve(hyper, large(samples, np.arange(20)), values)
+    field = universal_kriging.solve_samples(hyper, large(samples, np.arange(20)), values)
     again = universal_kriging.solve(hyper, field.samples, field.values)
     assert np.abs(again.dual - field.dual).max() < SAME
     weights = field.weights(points)
@@ -100,7 +102,7 @@ def test_its_sample_values_give_its_weights(hyper, samples, values, points):
 
 def test_variance_is_nearer_to_that_of_all_samples_and_grows_away_from_them(hyper, samples, points):
     inducing, nothing = np.arange(30), np.zeros((60, 1))
-    own = sample_kriging.solve(hyper, large(samples, inducing), nothing)
+    own = universal_kriging.solve_samples(hyper, large(samples, inducing), nothing)
     every = universal_kriging.solve(hyper, samples, nothing)
     few = universal_kriging.solve(hyper, samples[inducing], nothing[:30])
     apart, before = (
@@ -188,7 +190,7 @@ def test_a_large_family_has_the_longest_ranges_within_a_standard_error(rng):
     assert least < found <= least + error
     # The next longer ranges are beyond it.
     longer = replace(chosen.hyper, scales=chosen.hyper.scales * 0.94)
-    beyond, _ = _mean_square(sample_kriging.residuals(longer, samples, values))
+    beyond, _ = _mean_square(universal_kriging.left_out_residuals(longer, samples, values))
     assert beyond > least + error
     # Negative control: a small family is as tuned.
     few = large(points[:90], None)

@@ -14,7 +14,7 @@ from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.graph_builder import LevelTables
+from posefield_train.onnx_graph import LevelTables
 from posefield_train.tensor import decoder_graph, hosvd
 from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions
 from posefield_train.tensor.hosvd import TuckerTensor

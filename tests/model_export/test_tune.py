@@ -7,7 +7,7 @@ import pytest
 from label_kernels import performers, vary
 
 from posefield_train.kriging import kriging_tuning, universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import PRIORS, SCALE_PRIOR, LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper

@@ -7,7 +7,7 @@ from gstools.krige import Universal
 from scipy.interpolate import RBFInterpolator
 
 from posefield.kriging.kriging_model import RATE52
-from posefield_train.kriging import covariance_graph, universal_kriging
+from posefield_train.kriging import kriging_graph, universal_kriging
 from posefield_train.kriging.universal_kriging import Hyper
 
 TOLERANCE = 1e-9
@@ -56,7 +56,7 @@ MODELS = {
     "exponential": (gstools.Exponential, {}, 1.0 / 3.0),
     "gaussian": (gstools.Gaussian, {}, 1.0 / np.sqrt(3.0)),
     "spherical": (gstools.Spherical, {}, 1.0),
-    "matern32": (gstools.Matern, {"nu": 1.5}, np.sqrt(1.5) / covariance_graph.RATE32),
+    "matern32": (gstools.Matern, {"nu": 1.5}, np.sqrt(1.5) / kriging_graph.RATE32),
     "matern52": (gstools.Matern, {"nu": 2.5}, np.sqrt(2.5) / RATE52),
 }
 

@@ -18,10 +18,10 @@ from posefield_train.graph import levels, onnx_export, trained_card, truncation_
 from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, LevelTest, ModelLevels
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_card import MAX_LISTED_VALUES
+from posefield_train.jobs import single_threaded
 from posefield_train.kriging import sample_points, thinning
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
-from posefield_train.parallel import single_thread
 from posefield_train.source import clip_table
 from posefield_train.source.ingest import Example
 from posefield_train.tensor import truncation_error
@@ -80,7 +80,7 @@ def export_adapted(reopened: ReconstructedModel, newcomer: NewPerformer) -> Expo
     ExportRefused as `onnx_export.check_and_export` does.
     """
     check_name(reopened.card, newcomer.performer)
-    with single_thread.single_threaded():
+    with single_threaded():
         begun = canonical_clips.align_phase(reopened.known, newcomer.examples)
         examples = new_clips.remeasure(reopened, newcomer.examples, begun)
         moved = canonical_clips.to_canonical(reopened.known, examples)

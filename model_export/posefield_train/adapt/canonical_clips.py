@@ -17,9 +17,9 @@ from posefield_train.align import travel as travels
 from posefield_train.align.time_alignment import FINE, AlignedClips, CanonicalTime
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.jobs import single_threaded
 from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.parallel import single_thread
 from posefield_train.source import canonical, clip_joints
 from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
@@ -114,14 +114,14 @@ def align_phase(adaptable: AdaptableModel, examples: Sequence[Example]) -> tuple
     """Shift examples to the phase of the model's cycles if those were aligned in phase."""
     if not adaptable.in_phase:
         return tuple(examples)
-    with single_thread.single_threaded():
+    with single_threaded():
         references = _references(adaptable, examples)
         return phase_alignment.align_phases_to(
             examples, references, adaptable.joint_weights, adaptable.in_place
         )
 
 
-@single_thread.single_threaded()
+@single_threaded()
 def to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> CanonicalClips:
     """Warp examples, already at the model's phase, to its canonical time and chart."""
     references = _references(adaptable, examples)

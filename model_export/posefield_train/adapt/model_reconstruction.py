@@ -21,7 +21,7 @@ from posefield.model_file.model_card import ModelCard, TrainingParameters
 from posefield_train.adapt.canonical_clips import AdaptableModel
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
-from posefield_train.contacts.contact_table import ContactTable
+from posefield_train.contacts.contact_model import ContactTable
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import (
@@ -33,9 +33,13 @@ from posefield_train.kriging.kriging_bank import (
     PowerLaw,
 )
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
-from posefield_train.tensor import event_blend
-from posefield_train.tensor.decoder import Decoder, Proportions
-from posefield_train.tensor.event_blend import EventBlend
+from posefield_train.tensor.decoder import (
+    Decoder,
+    EventBlend,
+    Proportions,
+    build_blend,
+    event_weights,
+)
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.pose_vectors import PoseChart
 
@@ -259,5 +263,5 @@ def _event_blend(card: ModelCard, core: Floats, basis: Floats) -> EventBlend | N
     if card.event is None:
         return None
     event = round((card.frames - 1) * card.event.share)
-    weights = event_blend.event_weights(card.frames, event, card.cyclic)
-    return event_blend.build_blend(card.levels[0].event, weights, core, basis)
+    weights = event_weights(card.frames, event, card.cyclic)
+    return build_blend(card.levels[0].event, weights, core, basis)

@@ -29,7 +29,7 @@ from posefield.motion import curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
-from posefield_train.parallel.jobs import Jobs, SerialJobs, ordered_results
+from posefield_train.jobs import Jobs, SerialJobs, ordered_results
 from posefield_train.source import canonical
 from posefield_train.source.canonical import heading
 from posefield_train.source.ingest import Example

@@ -22,7 +22,7 @@ from posefield.common.units import (
 from posefield.model_file.model_card import ROW_VALUES
 from posefield.motion import quat, skeleton
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph import GraphBuilder
 from posefield_train.source import measured_controls
 
 # A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.

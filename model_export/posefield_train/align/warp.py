@@ -16,7 +16,7 @@ from scipy.optimize import lsq_linear
 
 from posefield.common.units import ClipFrames, Floats, PerClip
 from posefield.model_file.model_card import ROW_VALUES
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph import GraphBuilder
 
 DEGREE = 3
 # Least increment as a share of the identity's, so that no pose is frozen.

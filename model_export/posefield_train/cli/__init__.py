@@ -7,7 +7,6 @@ import typer
 from posefield.console.registration import MAKE, register
 from posefield_train.cli import (
     command_adapt,
-    command_convert,
     command_discover,
     command_evaluate,
     command_probe,
@@ -18,7 +17,7 @@ from posefield_train.cli import (
 COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "probe": (command_probe.probe, command_probe.PROBE_EXAMPLES),
     "init": (command_probe.init, command_probe.INIT_EXAMPLES),
-    "convert": (command_convert.convert, command_convert.CONVERT_EXAMPLES),
+    "convert": (command_sample.convert, command_sample.CONVERT_EXAMPLES),
     "discover": (command_discover.discover, command_discover.EXAMPLES),
     "review": (command_discover.review, command_discover.REVIEW_EXAMPLES),
     "sample": (

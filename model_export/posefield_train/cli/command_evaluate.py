@@ -22,7 +22,7 @@ from posefield_train.source import data_folder
 if TYPE_CHECKING:
     from posefield.console.progress import ProgressBar
     from posefield_train.evaluate.protocol import EvaluationResult, ProgressCallback
-    from posefield_train.parallel.jobs import Jobs
+    from posefield_train.jobs import Jobs
     from posefield_train.source.ingest import Example
     from posefield_train.source.recipe import Recipe
 
@@ -70,7 +70,7 @@ class EvaluateOptions:
     @contextmanager
     def executor(self) -> "Iterator[Jobs]":
         """Open the executor of the folds."""
-        from posefield_train.parallel.finished_jobs import FinishedJobs
+        from posefield_train.jobs import FinishedJobs
 
         with executors.jobs(self.scheduler, self.jobs) as own:
             yield FinishedJobs(own, self.resume) if self.resume else own

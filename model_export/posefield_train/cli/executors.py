@@ -11,7 +11,7 @@ import typer
 from posefield.common.errors import InvalidField
 
 if TYPE_CHECKING:
-    from posefield_train.parallel.jobs import Jobs
+    from posefield_train.jobs import Jobs
 
 Scheduler = Annotated[
     str | None,
@@ -56,8 +56,7 @@ class ExecutorOptions:
 @contextmanager
 def parts(options: ExecutorOptions) -> "Iterator[Jobs]":
     """Open an executor of the parts of one training: this process unless others are asked for."""
-    from posefield_train.parallel.finished_jobs import FinishedJobs
-    from posefield_train.parallel.jobs import SerialJobs
+    from posefield_train.jobs import FinishedJobs, SerialJobs
 
     alone = options.jobs is None and options.scheduler is None
     with nullcontext(SerialJobs()) if alone else jobs(options.scheduler, options.jobs) as own:
@@ -70,9 +69,9 @@ def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextMan
     count: number of processes; None for one per core.
     """
     if scheduler is None:
-        from posefield_train.parallel.jobs import ProcessJobs
+        from posefield_train.jobs import ProcessJobs
 
         return nullcontext(ProcessJobs(count))
-    from posefield_train.parallel.jobs import connect
+    from posefield_train.jobs import connect
 
     return connect(scheduler)

@@ -1,22 +1,97 @@
 """Fit of the contacts of a family, and their agreement with clips left out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.units import ClipFrames, Floats
+from posefield.motion import quat
 from posefield.motion.contact_detection import FootContact
 from posefield_train.align.warp import CanonicalTiming
-from posefield_train.contacts import contact_labels, contact_statistics, contact_table
+from posefield_train.contacts import contact_labels
 from posefield_train.contacts.contact_labels import ClipContacts
-from posefield_train.contacts.contact_table import ContactTable
-from posefield_train.kriging import sample_kriging
+from posefield_train.kriging import coefficient_models, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.onnx_graph import GraphBuilder
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
+
+LEAST_COLUMNS, MOST_COLUMNS = 6, 10
+"""Numbers of functions, where there are as many clips."""
+KEPT_VARIATION = 0.95
+"""Share of the squared labels that the functions keep, where MOST_COLUMNS suffice."""
+
+
+@dataclass(frozen=True)
+class ContactTable:
+    """Functions of canonical time whose sums are contact labels. values: (r, K, T)."""
+
+    values: Annotated[Floats, "modes joints frames"]
+
+    def numpy(
+        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+    ) -> Annotated[Floats, "clips frames joints"]:
+        """Return probabilities (B, S, K) of contacts at canonical frames (B, S).
+
+        coefficients: (B, r). As for poses, the functions are interpolated linearly between frames.
+        """
+        rows = quat.interpolate_rows(self._rows, place).reshape(*place.shape, *self._shape)
+        return np.clip(np.einsum("bskr,br->bsk", rows, coefficients), 0.0, 1.0)
+
+    def labels(
+        self, coefficients: Annotated[Floats, "clips modes"]
+    ) -> Annotated[Floats, "clips frames joints"]:
+        """Return the labels (N, T, K) of coefficients (N, r), not clipped."""
+        return np.einsum("rkt,nr->ntk", self.values, coefficients)
+
+    def onnx(self, net: GraphBuilder, coefficients: str, place: str) -> str:
+        """Build `numpy` in a graph, from canonical frames (B, S)."""
+        table, last = net.weights("contact_table", self.values), self.values.shape[2] - 1
+        zero, one, time = net.indices(0), net.indices(1), net.indices(2)
+        first = net("Slice", table, zero, net.indices(last), time)
+        steps = net("Sub", net("Slice", table, one, net.indices(last + 1), time), first)
+        before = net("Min", net("Floor", place), net.number(last - 1.0))
+        column = net("Cast", before, to=6)
+        rise = net("Mul", net("Gather", steps, column, axis=2), net("Sub", place, before))
+        functions = net("Add", net("Gather", first, column, axis=2), rise)
+        # (r, 1, B, 1) beside functions (r, K, B, S).
+        weights = net("Unsqueeze", net("Transpose", coefficients, perm=[1, 0]), net.indices(1, 3))
+        sums = net("ReduceSum", net("Mul", functions, weights), zero, keepdims=0)
+        shares = net("Clip", sums, net.number(0.0), net.number(1.0))
+        return net("Transpose", shares, perm=[1, 2, 0])
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        modes, joints, _ = self.values.shape
+        return joints, modes
+
+    @property
+    def _rows(self) -> Annotated[Floats, "frames values"]:
+        """Return the functions as rows (T, K r)."""
+        return self.values.transpose(2, 1, 0).reshape(self.values.shape[2], -1)
+
+
+def reduce_labels(
+    labels: Annotated[Floats, "clips frames joints"],
+) -> tuple[ContactTable, Annotated[Floats, "clips modes"]]:
+    """Return the functions of labels (N, T, K) and each clip's coefficients (N, r).
+
+    Singular value decomposition over clips, of the labels as they are: the first function is near
+    their mean.
+    """
+    clips, frames, joints = labels.shape
+    rows = labels.transpose(0, 2, 1).reshape(clips, -1)
+    left, sizes, right = np.linalg.svd(rows, full_matrices=False)
+    squares = np.cumsum(np.square(sizes))
+    enough = 1 + int(np.searchsorted(squares, KEPT_VARIATION * squares[-1]))
+    rank = min(max(enough, LEAST_COLUMNS), MOST_COLUMNS, len(sizes))
+    signs = coefficient_models.row_signs(right[:rank])
+    functions = (signs[:, None] * right[:rank]).reshape(rank, joints, frames)
+    return ContactTable(functions), left[:, :rank] * sizes[:rank] * signs
+
 
 Labels = Annotated[Floats, "clips frames joints"]
 
@@ -80,15 +155,15 @@ def fit_contacts(
     if not asked.joints:
         return None, []
     clips = [contact_labels.clip_contacts(example, asked) for example in examples]
-    every = contact_statistics.contact_statistics(clips, asked.joints, asked.cyclic)
+    every = contact_labels.contact_statistics(clips, asked.joints, asked.cyclic)
     notes = _notes(clips, every, [names[joint] for joint in asked.joints], asked.cyclic)
     kept = [place for place, own in enumerate(every) if own is not None]
     if not kept:
         return None, notes
     timing, logs = warps
     labels = contact_labels.canonical_labels(clips, logs, timing.basis, timing.frames)[..., kept]
-    table, coefficients = contact_table.reduce_labels(labels)
-    solved = sample_kriging.solve(pose, samples, coefficients)
+    table, coefficients = reduce_labels(labels)
+    solved = universal_kriging.solve_samples(pose, samples, coefficients)
     accuracy = left_out_accuracy(labels, table.labels(coefficients), pose, samples)
     statistics = tuple(own for own in every if own is not None)
     fitted = FittedContacts(table, solved, statistics, accuracy)
@@ -100,7 +175,7 @@ def left_out_accuracy(
 ) -> ContactAccuracy:
     """Return the errors of labels (N, T, K) predicted from the reduced ones of the other takes."""
     rows, known = labels.reshape(len(labels), -1), reduced.reshape(len(labels), -1)
-    left_out = sample_kriging.leave_out(pose, samples)
+    left_out = universal_kriging.leave_out_samples(pose, samples)
     predicted = np.clip(known - left_out @ known, 0.0, 1.0)
     return ContactAccuracy.measure(predicted, rows, samples.from_mean(rows))
 
@@ -115,7 +190,7 @@ def _notes(
     for place, (own, name) in enumerate(zip(found, names, strict=True)):
         if own is None:
             notes.append(f"{name} contacts nothing in any clip: the model has no contacts of it")
-        elif contact_statistics.without_swings(clips, place, cyclic):
+        elif contact_labels.without_swings(clips, place, cyclic):
             notes.append(
                 f"{name} makes no whole swing between two contacts in any clip: its swings are "
                 f"taken to last {own.swing:g} s, as those of the other joints or as usual"
@@ -132,3 +207,59 @@ def _accuracy_notes(own: ContactAccuracy) -> list[str]:
         f"predicted (Brier score {own.brier:.3f} of clips left out, {own.climatology:.3f} of the "
         "mean over the others)"
     ]
+
+
+FRAMES = 100
+"""Frames of a clip that are compared, evenly over its duration."""
+SHARES = np.linspace(0.0, 1.0, FRAMES)
+
+ContactPredictor = Callable[[Floats], Floats]
+"""Map from shares (F,) of the duration to probabilities (M, F, K) for the clips held out."""
+
+
+@dataclass(frozen=True)
+class HeldOutClips:
+    """Clips that a model was trained on, and clips that were held out."""
+
+    rest: Sequence[Example]
+    held: Sequence[Example]
+
+
+def held_out_accuracies(
+    recipe: Recipe, clips: HeldOutClips, joints: Sequence[int], predict: ContactPredictor
+) -> list[ContactAccuracy]:
+    """Return the accuracy of each clip held out, at equal shares of the durations.
+
+    joints: indices of the predicted ones. Nothing is warped, so that errors of timing count.
+    climatology is that of the mean over the other clips. Empty for cycles that are begun in phase:
+    those held out begin elsewhere than the model's.
+    """
+    if recipe.alignment.begin == "in_phase" and recipe.motion.cyclic:
+        return []
+    mean = _labels_at_shares(recipe, clips.rest, joints).mean(axis=0)
+    pairs = zip(_labels_at_shares(recipe, clips.held, joints), predict(SHARES), strict=True)
+    return [ContactAccuracy.measure(predicted, own, own - mean) for own, predicted in pairs]
+
+
+def mean_accuracy(found: Sequence[ContactAccuracy]) -> dict[str, Any]:
+    """Return the means over clips by name, rounded."""
+    names = ("agreement", "brier", "climatology")
+    return {name: float(f"{np.mean([getattr(one, name) for one in found]):.4g}") for name in names}
+
+
+def accuracy_text(found: Sequence[ContactAccuracy]) -> str:
+    """Return a sentence on the means over clips."""
+    own = mean_accuracy(found)
+    return (
+        f"contacts: {own['agreement']:.1%} of frames agree, Brier score {own['brier']:.3f}; by the "
+        f"mean of the other clips {own['climatology']:.3f}"
+    )
+
+
+def _labels_at_shares(
+    recipe: Recipe, examples: Sequence[Example], joints: Sequence[int]
+) -> Annotated[Floats, "clips frames joints"]:
+    asked = contact_labels.settings(recipe, examples[0].clip.skeleton.names)
+    places = [asked.joints.index(joint) for joint in joints]
+    clips = (contact_labels.clip_contacts(example, asked) for example in examples)
+    return np.stack([clip.at(SHARES)[:, places] for clip in clips])

@@ -8,28 +8,116 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
-from posefield_train.contacts import held_out_contacts
-from posefield_train.contacts.contact_model import ContactAccuracy
-from posefield_train.contacts.held_out_contacts import HeldOutClips
-from posefield_train.evaluate import (
-    compared_motion,
-    folds,
-    motion_errors,
-    predictions,
-    support_flags,
-)
-from posefield_train.evaluate.compared_motion import ComparedMotion
-from posefield_train.evaluate.folds import Fold
-from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield.kriging import support
+from posefield_train.contacts import contact_model
+from posefield_train.contacts.contact_model import ContactAccuracy, HeldOutClips
+from posefield_train.evaluate import motion_errors, predictions
+from posefield_train.evaluate.motion_errors import ComparedMotion, MotionErrors
 from posefield_train.evaluate.predictions import Predictions, Queries
-from posefield_train.evaluate.support_flags import SupportFlags
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.jobs import Jobs, single_threaded
 from posefield_train.kriging import sample_points
-from posefield_train.parallel import single_thread
-from posefield_train.parallel.jobs import Jobs
+from posefield_train.report import significant_digits
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.train import train
+
+# Families of more than MANY takes are held out in PARTS parts of whole takes.
+MANY, PARTS = 40, 12
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Examples that are held out together. held: their indices."""
+
+    held: tuple[int, ...]
+
+    def split(self, examples: Sequence[Example]) -> tuple[list[Example], list[Example]]:
+        """Return the examples to train from, and those held out."""
+        held = set(self.held)
+        rest = [example for i, example in enumerate(examples) if i not in held]
+        return rest, [examples[i] for i in self.held]
+
+
+def clip_folds(examples: Sequence[Example]) -> list[Fold]:
+    """Return folds that hold out every take once, with all of its clips.
+
+    Strides of one take are nearly equal; held out one by one, they would predict each other. Raises
+    TrainingError if all clips are of one take.
+    """
+    numbers = sample_points.take_numbers(examples)
+    takes = [tuple(np.flatnonzero(numbers == take).tolist()) for take in np.unique(numbers)]
+    if len(takes) == 1:
+        raise TrainingError(
+            f"all {len(examples)} clips are of one take, expected two or more takes: none can be "
+            "held out (clips.take states takes)"
+        )
+    if len(takes) > MANY:
+        takes = [sum(takes[part::PARTS], ()) for part in range(PARTS)]
+    return [Fold(take) for take in takes]
+
+
+def performer_folds(examples: Sequence[Example]) -> list[Fold]:
+    """Return folds that hold out every performer once, with all of their clips."""
+    return [Fold(own) for own in _groups([example.row.performer for example in examples])]
+
+
+def _groups(names: Sequence[str]) -> list[tuple[int, ...]]:
+    listed = np.array(names)
+    return [tuple(np.flatnonzero(listed == name).tolist()) for name in sorted(set(names))]
+
+
+BEYOND_SHARE = 0.25
+"""Share of a control's range by which clips are moved beyond it."""
+
+
+@dataclass(frozen=True)
+class SupportFlags:
+    """Shares of clips that were flagged as unsupported.
+
+    alarms: of held-out clips. beyond: of clips moved beyond the range of a control, by control.
+    """
+
+    alarms: float
+    beyond: dict[str, float]
+
+    def facts(self) -> dict[str, Any]:
+        """Return the shares as JSON values."""
+        beyond = {name: significant_digits.round_number(s) for name, s in self.beyond.items()}
+        return {"false_alarms": significant_digits.round_number(self.alarms), "beyond": beyond}
+
+    def text(self) -> str:
+        """Return the shares in a sentence."""
+        beyond = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.beyond.items())
+        return (
+            f"support: {100 * self.alarms:.1f} % of held-out clips are flagged; of clips moved "
+            f"{100 * BEYOND_SHARE:.0f} % of the range beyond a control: {beyond}"
+        )
+
+
+def measure_flags(controls: Floats, names: Sequence[str], parts: Sequence[Fold]) -> SupportFlags:
+    """Return the flags over controls (N, d) of clips held out by folds."""
+    alarms, beyond = [], []
+    for fold in parts:
+        is_held = np.isin(np.arange(len(controls)), fold.held)
+        held, fitted = controls[is_held], support.fit_support(controls[~is_held])
+        alarms.append(~fitted.supported(held))
+        flagged = [_flagged_beyond(fitted, held, control) for control in range(len(names))]
+        beyond.append(np.stack(flagged, axis=1))
+    shares = np.concatenate(beyond).mean(axis=0).tolist()
+    return SupportFlags(float(np.concatenate(alarms).mean()), dict(zip(names, shares, strict=True)))
+
+
+def _flagged_beyond(fitted: support.Support, held: Floats, control: int) -> Floats:
+    """Return the share (H,) of both ends of a control beyond which each held clip is flagged."""
+    room = BEYOND_SHARE * (fitted.high - fitted.low)[control]
+    flagged = []
+    for end in (fitted.low[control] - room, fitted.high[control] + room):
+        moved = held.copy()
+        moved[:, control] = end
+        flagged.append(~fitted.supported(moved))
+    return np.asarray(np.mean(flagged, axis=0))
+
 
 ProgressCallback = Callable[[int, int], None]
 """Callback with the number of parts that are done, and of all parts."""
@@ -108,7 +196,7 @@ def protocols(examples: Sequence[Example]) -> list[str]:
 
 def folds_of(examples: Sequence[Example], protocol: str) -> list[Fold]:
     """Return the folds of a protocol."""
-    return folds.clip_folds(examples) if protocol == "clip" else folds.performer_folds(examples)
+    return clip_folds(examples) if protocol == "clip" else performer_folds(examples)
 
 
 def run_protocol(
@@ -130,7 +218,7 @@ def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) 
         yield result
 
 
-@single_thread.single_threaded()
+@single_threaded()
 def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> PartialResult:
     """Return the result for the clips of one fold. Raises TrainingError as `run_protocol` does."""
     trained = train_fold(recipe, examples, fold)
@@ -148,7 +236,7 @@ def train_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> Train
     queries = Queries(np.stack([e.controls for e in held]), [e.row.labels for e in held])
     # As captured: closing a cycle moves joints, which would favour what closes the same way.
     captured = [
-        compared_motion.motion_of_clip(
+        motion_errors.motion_of_clip(
             example.captured or example.clip,
             predictions.captured_event(recipe, trained, example.landmarks),
         )
@@ -179,7 +267,7 @@ def _contact_accuracies(fold: TrainedFold) -> list[ContactAccuracy]:
 
     joints = [statistics.joint for statistics in fitted.statistics]
     clips = HeldOutClips(fold.rest, fold.held)
-    return held_out_contacts.held_out_accuracies(fold.recipe, clips, joints, predict)
+    return contact_model.held_out_accuracies(fold.recipe, clips, joints, predict)
 
 
 def held_out_result(
@@ -188,7 +276,7 @@ def held_out_result(
     """Return the result of a protocol from those of its folds."""
     clip = examples[0].clip
     controls = np.stack([example.controls for example in examples])
-    flags = support_flags.measure_flags(
+    flags = measure_flags(
         controls, [control.name for control in recipe.controls], folds_of(examples, protocol)
     )
     merged = merge(

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield_train.contacts import held_out_contacts
+from posefield_train.contacts import contact_model
 from posefield_train.evaluate import motion_errors
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.predictions import OURS
 from posefield_train.evaluate.protocol import EvaluationResult
-from posefield_train.report.drawing.significant_digits import round_number
+from posefield_train.report.significant_digits import round_number
 
 DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
 """Distances of `MotionErrors`."""
@@ -154,7 +154,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
         "sigma_ratio": round_number(sigma_ratio(result)),
         "joint_sigma_ratio": {name: round_number(ratio) for name, ratio in ratios.items()},
         **({"support": result.flags.facts()} if result.flags else {}),
-        **({"contacts": held_out_contacts.mean_facts(result.contacts)} if result.contacts else {}),
+        **({"contacts": contact_model.mean_accuracy(result.contacts)} if result.contacts else {}),
         "methods": {summary.name: method_facts(result, summary) for summary in summarize(result)},
     }
 
@@ -269,7 +269,7 @@ def trust_text(result: EvaluationResult) -> list[str]:
         f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
         f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
     )
-    contacts = [held_out_contacts.text(result.contacts)] if result.contacts else []
+    contacts = [contact_model.accuracy_text(result.contacts)] if result.contacts else []
     return [joints, *flags, *contacts]
 
 

@@ -12,10 +12,10 @@ from posefield.motion import skeleton
 from posefield.motion.curves import Curve, as_points
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming
-from posefield_train.contacts.contact_table import ContactTable
+from posefield_train.contacts.contact_model import ContactTable
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import POSE, VARIANCE, KrigingBank
-from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables, Shapes
+from posefield_train.onnx_graph import GraphBuilder, LevelTables, Shapes
 from posefield_train.tensor import decoder_graph
 from posefield_train.tensor.decoder import Decoder, Proportions
 

@@ -18,13 +18,13 @@ from posefield_train.graph import truncation_cost
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.graph.truncation_cost import ParetoFront, RankTriple
-from posefield_train.kriging import sample_kriging, thinning
+from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.thinning import ThinningData
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import Detail
-from posefield_train.tensor import event_blend, truncation_error
-from posefield_train.tensor.decoder import LevelSize
+from posefield_train.tensor import truncation_error
+from posefield_train.tensor.decoder import LevelSize, build_blend
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.truncation_error import EventFrame, TruncationReference
 
@@ -172,13 +172,15 @@ def _event_positions(
 def untruncated(model: FloatModel, full: TuckerTensor, samples: SamplePoints) -> FloatModel:
     """Return the model with the tensor before truncation. samples: of the tensor's clips."""
     bank = model.bank
-    pose = sample_kriging.solve(bank.pose.hyper, samples, full.bases[2])
+    pose = universal_kriging.solve_samples(bank.pose.hyper, samples, full.bases[2])
     decoder = replace(model.decoder, reduced=full)
     event, blend = bank.event, model.decoder.event
     if event and blend:
-        whole = event_blend.build_blend(blend.count, blend.weights, full.core, full.bases[1])
+        whole = build_blend(blend.count, blend.weights, full.core, full.bases[1])
         decoder = replace(decoder, event=whole)
-        event = sample_kriging.solve(event.hyper, samples, full.bases[2][:, : whole.count])
+        event = universal_kriging.solve_samples(
+            event.hyper, samples, full.bases[2][:, : whole.count]
+        )
     return replace(model, bank=replace(bank, pose=pose, event=event), decoder=decoder)
 
 

@@ -16,8 +16,8 @@ from posefield.model_file.model_card import ModelCard, rounded
 from posefield_train.graph import levels, trained_card
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import sample_kriging, thinning
-from posefield_train.parallel import single_thread
+from posefield_train.jobs import single_threaded
+from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
@@ -218,7 +218,7 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
 
 def _left_out(trained: TrainedModel) -> Floats:
     """Return the matrix (N, N) from sample values to leave-one-out residuals."""
-    return sample_kriging.leave_out(trained.pose.hyper, trained.samples)
+    return universal_kriging.leave_out_samples(trained.pose.hyper, trained.samples)
 
 
 def _harmonic_deviations(trained: TrainedModel) -> Deviations:
@@ -275,7 +275,7 @@ class ExportedModel:
     parity: float
 
 
-@single_thread.single_threaded()
+@single_threaded()
 def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> ExportedModel:
     """Return the exported model with all its levels; equal data give equal bytes.
 
@@ -307,7 +307,7 @@ def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) 
     return ExportedModel(model, model.onnx(model_card.dump(written), about), written, parity)
 
 
-@single_thread.single_threaded()
+@single_threaded()
 def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
     """Return an unchecked file of the finest level alone, for measurements only."""
     size = recipe.size.model_copy(update={"levels": []})

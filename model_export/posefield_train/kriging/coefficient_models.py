@@ -6,7 +6,8 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import ClipBones, Floats, SampleControls, SampleValues
-from posefield_train.kriging import kriging_tuning, sample_kriging, sample_points
+from posefield_train.jobs import Jobs
+from posefield_train.kriging import kriging_tuning, sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, PowerLawFit
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import SamplePoints
@@ -22,11 +23,8 @@ from posefield_train.kriging.tuning_loss import (
     TuningProblem,
 )
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.parallel.jobs import Jobs
 from posefield_train.source.recipe_sections import Kriging
-from posefield_train.tensor import event_blend
-from posefield_train.tensor.decoder import Proportions
-from posefield_train.tensor.event_blend import COEFFICIENTS
+from posefield_train.tensor.decoder import COEFFICIENTS, Proportions, event_distances
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.truncation_error import EventFrame, TruncationReference
 
@@ -82,10 +80,7 @@ def compare_models(
     pose, second = (model.residuals for model in models)
     blended = pose.copy()
     blended[:, :COEFFICIENTS] = second[:, :COEFFICIENTS]
-    found = (
-        event_blend.event_distances(reference, full, event, residuals)
-        for residuals in (pose, blended)
-    )
+    found = (event_distances(reference, full, event, residuals) for residuals in (pose, blended))
     return EventErrors(*(float(np.sqrt(np.mean(np.square(one)))) for one in found))
 
 
@@ -159,7 +154,7 @@ def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues)
     found, least = tuned.hyper, np.exp(SCALE_PRIOR.low)
     for share in LONGER:
         longer = replace(tuned.hyper, scales=np.maximum(share * tuned.hyper.scales, least))
-        residuals = sample_kriging.residuals(longer, samples, values)
+        residuals = universal_kriging.left_out_residuals(longer, samples, values)
         if float(np.mean(_take_squares(samples, residuals))) > limit:
             break
         found = longer
@@ -198,7 +193,9 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     residuals = from_mean - share * predicted
     explained = 1.0 - float(np.sum(np.square(residuals)) / np.sum(np.square(from_mean)))
     shrunk = mean + share * (values - mean)
-    return FittedModel(sample_kriging.solve(found.hyper, samples, shrunk), explained, residuals)
+    return FittedModel(
+        universal_kriging.solve_samples(found.hyper, samples, shrunk), explained, residuals
+    )
 
 
 def factor_of(
@@ -211,7 +208,7 @@ def factor_of(
     left = logs - found.law.logarithms(controls)
     total = float(np.sum(np.square(samples.from_mean(logs))))
     explained = 1.0 - float(np.sum(np.square(found.residuals))) / total
-    solved = sample_kriging.solve(found.hyper, samples, left)
+    solved = universal_kriging.solve_samples(found.hyper, samples, left)
     return FittedModel(solved, explained, found.residuals)
 
 

@@ -17,7 +17,7 @@ from posefield.common.units import Booleans, Floats, Indices, SampleMatrix, Samp
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import sample_points, universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 

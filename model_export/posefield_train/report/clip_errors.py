@@ -5,15 +5,146 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from posefield.common.units import Floats
+from posefield.common.units import UP, Floats
 from posefield.model_file.model_card import Control
+from posefield.motion import quat, skeleton
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report.drawing import left_out_clips, stick_figures, svg_chart
-from posefield_train.report.drawing.html_page import Chapter, Section, Table
-from posefield_train.report.drawing.left_out_clips import BodyMotion
-from posefield_train.report.drawing.svg_chart import Chart
+from posefield_train.report import page
+from posefield_train.report.page import (
+    WIDTH,
+    Chapter,
+    Chart,
+    Section,
+    Table,
+    draw_chart,
+    short_label,
+)
+from posefield_train.source.ingest import Example
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Positions of joints (T, J, 3) and of end sites (T, E, 3), m."""
+
+    joints: Floats
+    tips: Floats
+
+
+def predicted_motion(trained: TrainedModel, clip: int) -> Floats:
+    """Return the slice (D', T) of the motion tensor predicted for a clip from all others."""
+    residual = trained.full.slices(trained.pose.residuals[[clip]])[:, :, 0]
+    return trained.tensor.values[:, :, clip] - residual
+
+
+def body_motion(trained: TrainedModel, clip: int, own_motion: Floats) -> BodyMotion:
+    """Return the body of a clip's performer in a slice (D', T) of the motion tensor."""
+    example, tensor = trained.examples[clip], trained.tensor
+    rotations, root = tensor.chart.poses(tensor.numbers(own_motion[:, :, None])[0])
+    translations = skeleton.translations(example.offsets, root)
+    own = example.clip.skeleton
+    joints, turns = skeleton.forward_kinematics(own.parents, rotations, translations)
+    ends = list(own.tip_joints)
+    return BodyMotion(joints, joints[:, ends] + quat.rotate(turns[:, ends], own.tip_offsets))
+
+
+def clip_label(example: Example) -> str:
+    """Return a clip's name on the page: its file, and its line in the table of clips."""
+    return f"{example.row.place.name.removesuffix('.bvh')} (line {example.row.line})"
+
+
+FRAMES = 6
+MARGIN = 0.25
+"""Gap between two figures, m."""
+
+
+def widest_direction(displacements: Floats) -> Floats:
+    """Return the horizontal direction (3,) along which displacements (..., 3) are largest."""
+    ways = displacements.reshape(-1, 3) * (1.0 - UP)
+    _, vectors = np.linalg.eigh(ways.T @ ways)
+    direction = vectors[:, -1]
+    # A body that faces forward (+z) faces right; in a front view, its left is on the right.
+    return direction if direction[2] + 1e-3 * direction[0] >= 0 else -direction
+
+
+def project(points: Floats, direction: Floats) -> Floats:
+    """Return points (..., 2) of a view with a horizontal direction (3,) to the right, m."""
+    return points @ np.stack([direction, UP], axis=1)
+
+
+@dataclass(frozen=True)
+class PoseStrip:
+    """Captured and predicted bodies at several times, side by side.
+
+    captured, predicted: bones (F, B, 2, 2), m. times: shares of canonical time (F,). floor: height
+    of the lowest captured point or of the ground, m. step: distance from one figure to the next, m.
+    """
+
+    captured: Floats
+    predicted: Floats
+    times: Floats
+    floor: float
+    step: float
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Return width and height, m."""
+        top = max(float(self.captured[..., 1].max()), float(self.predicted[..., 1].max()))
+        return self.step * FRAMES, top - self.floor + 0.5 * MARGIN
+
+    def paint(self, figure: Figure) -> None:
+        """Draw captured bodies dark and predicted ones orange."""
+        ax: Axes = figure.subplots()
+        width, height = self.size
+        ax.axhline(0.0, color=page.FAINT, linewidth=1.0)
+        shown = {
+            "predicted": (self.predicted, page.ORANGE),
+            "captured": (self.captured, page.INK),
+        }
+        for bodies, colour in shown.values():
+            ax.add_collection(LineCollection(list(bodies.reshape(-1, 2, 2)), colors=colour))
+        ax.set(xlim=(0.0, width), ylim=(self.floor - 0.06, self.floor + height), aspect="equal")
+        at = self.step * (np.arange(FRAMES) + 0.5)
+        ax.set_xticks(at, [f"{100 * time:.0f} %" for time in self.times])
+        ax.tick_params(length=0)
+        ax.grid(visible=False)
+        ax.yaxis.set_visible(False)
+        ax.spines[:].set_visible(False)
+        handles = [Line2D([], [], color=colour, label=name) for name, (_, colour) in shown.items()]
+        figure.legend(handles=handles[::-1], loc="outside upper left", ncols=2)
+
+
+def pose_strip(
+    captured: BodyMotion, predicted: BodyMotion, bones: tuple[tuple[int, int], ...]
+) -> PoseStrip:
+    """Return both bodies at FRAMES times, drawn relative to the captured root.
+
+    bones: indices of the points at both ends, the tips after the joints.
+    """
+    count = len(captured.joints)
+    frames = np.rint(np.linspace(0, count - 1, FRAMES)).astype(np.int64)
+    moved = captured.joints - captured.joints.mean(axis=0)
+    direction = widest_direction(np.concatenate([moved, captured.joints - predicted.joints]))
+    root = captured.joints[frames, :1] * (1.0 - UP)
+    flat = [
+        project(np.concatenate([body.joints, body.tips], axis=1)[frames] - root, direction)
+        for body in (captured, predicted)
+    ]
+    left = min(float(points[..., 0].min()) for points in flat)
+    right = max(float(points[..., 0].max()) for points in flat)
+    step = right - left + MARGIN
+    at = np.zeros((FRAMES, 1, 2))
+    at[:, 0, 0] = step * np.arange(FRAMES) - left + 0.5 * MARGIN
+    # A family of a single joint has no bones.
+    ends = np.array(bones, dtype=np.int64).reshape(-1, 2)
+    first, second = ((points + at)[:, ends] for points in flat)
+    floor = float(first[..., 1].min(initial=0.0))
+    return PoseStrip(first, second, frames / (count - 1), floor, step)
+
 
 # Clips named in the table, and clips drawn as stick figures.
 NAMED_CLIPS, DRAWN = 10, 3
@@ -50,7 +181,7 @@ def error_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Chapt
         names = (control.name for control in controls)
         clips.append(
             {
-                "clip": left_out_clips.clip_label(example),
+                "clip": clip_label(example),
                 "performer": example.row.performer,
                 "missed_m": float(np.sqrt(trained.left_out_errors[clip])),
                 "controls": dict(zip(names, example.controls.tolist(), strict=True)),
@@ -71,7 +202,7 @@ def error_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Chapt
     )
     if trained.outliers:
         caption += " Outlined bars are possible outliers."
-    chart = svg_chart.draw(
+    chart = draw_chart(
         3.0,
         partial(_paint_bars, clips, rms),
         f"Bar chart of the error of {len(clips)} clips, from {largest} "
@@ -112,15 +243,15 @@ def _paint_bars(clips: list[dict[str, Any]], rms: float, figure: Figure) -> None
         at,
         [100 * clip["missed_m"] for clip in clips],
         width=0.72,
-        color=[svg_chart.ORANGE if i < DRAWN else svg_chart.BLUE for i in at],
-        edgecolor=[svg_chart.INK if clip["against"] else "none" for clip in clips],
+        color=[page.ORANGE if i < DRAWN else page.BLUE for i in at],
+        edgecolor=[page.INK if clip["against"] else "none" for clip in clips],
         linewidth=1.6,
     )
-    ax.axhline(100 * rms, color=svg_chart.INK, linestyle="--", linewidth=0.9)
+    ax.axhline(100 * rms, color=page.INK, linestyle="--", linewidth=0.9)
     ax.grid(visible=False, axis="x")
     ax.set(ylabel="error (cm)", xlim=(-0.7, len(at) - 0.3))
     if len(at) <= MAX_LABELLED_CLIPS:
-        names = [svg_chart.label(clip["performer"]) for clip in clips]
+        names = [short_label(clip["performer"]) for clip in clips]
         ax.set_xticks(at, names, rotation=90, fontsize=min(8.5, 640 / len(at)))
     else:
         ax.set_xticks([])
@@ -151,10 +282,10 @@ class DrawnClip:
 def compare_clip(trained: TrainedModel, clip: int) -> DrawnClip:
     """Return a clip beside its prediction from all other clips."""
     captured, predicted = (
-        left_out_clips.body_motion(trained, clip, motion)
+        body_motion(trained, clip, motion)
         for motion in (
             trained.tensor.values[:, :, clip],
-            left_out_clips.predicted_motion(trained, clip),
+            predicted_motion(trained, clip),
         )
     )
     squared = np.sum(np.square(captured.joints - predicted.joints), axis=-1)
@@ -205,12 +336,12 @@ def _drawn(trained: TrainedModel, drawn: DrawnClip) -> tuple[dict[str, Any], Cha
     figure, performer = example.clip.skeleton, example.row.performer
     farthest = np.argsort(-drawn.joint_rms, kind="stable")[:NAMED_JOINTS]
     facts: dict[str, Any] = {
-        "clip": left_out_clips.clip_label(example),
+        "clip": clip_label(example),
         "performer": performer,
         "drawn_rms_m": drawn.rms,
         "root_rms_m": float(drawn.joint_rms[0]),
         "farthest_joints_m": {figure.names[i]: float(drawn.joint_rms[i]) for i in farthest},
-        "nearest_clip": left_out_clips.clip_label(trained.examples[drawn.nearest]),
+        "nearest_clip": clip_label(trained.examples[drawn.nearest]),
         "nearest_half_ranges": drawn.nearest_distance,
         "nearest_differs_m": drawn.nearest_rms,
     }
@@ -227,6 +358,6 @@ def _drawn(trained: TrainedModel, drawn: DrawnClip) -> tuple[dict[str, Any], Cha
     alt = f"Stick figures of {facts['clip']}: as captured, and as predicted from other clips."
     bones = [(parent, child) for child, parent in enumerate(figure.parents) if parent >= 0]
     bones += [(joint, len(figure) + tip) for tip, joint in enumerate(figure.tip_joints)]
-    strip = stick_figures.pose_strip(drawn.captured, drawn.predicted, tuple(bones))
-    height = min(3.4, svg_chart.WIDTH * strip.size[1] / strip.size[0] + 0.5)
-    return facts, svg_chart.draw(height, strip.paint, alt, caption)
+    strip = pose_strip(drawn.captured, drawn.predicted, tuple(bones))
+    height = min(3.4, WIDTH * strip.size[1] / strip.size[0] + 0.5)
+    return facts, draw_chart(height, strip.paint, alt, caption)

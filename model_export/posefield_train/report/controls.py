@@ -19,8 +19,8 @@ from posefield.synthesis import trust
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report.drawing import svg_chart
-from posefield_train.report.drawing.html_page import Chapter, Section, Table
+from posefield_train.report import page
+from posefield_train.report.page import Chapter, Section, Table, draw_chart, short_label
 
 BINS = 16
 # Joints named, and captures suggested.
@@ -78,7 +78,7 @@ def coverage_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Ch
     table = Table("Captured range of each control", ("control", "unit", *titles), rows)
     names = ", ".join(control.name for control in controls)
     errors = np.sqrt(trained.left_out_errors)
-    chart = svg_chart.draw(
+    chart = draw_chart(
         max(3.0, min(9.0, 2.1 * len(controls))),
         partial(_paint_pairs, controls, values, errors, correlation),
         f"Scatter plots of each pair of the controls {names}, over {len(values)} clips.",
@@ -126,16 +126,16 @@ def _paint_pairs(
     for (row, column), ax in np.ndenumerate(axes):
         if row < column:
             text = f"correlation\n{correlation[row, column]:+.2f}"
-            ax.text(0.5, 0.5, text, ha="center", va="center", color=svg_chart.GREY)
+            ax.text(0.5, 0.5, text, ha="center", va="center", color=page.GREY)
             ax.set_axis_off()
         elif row > column:
             x, y = values[:, [column, row]].T
             points = ax.scatter(x, y, c=100 * errors, s=16, cmap="viridis_r")
         else:
-            ax.hist(values[:, row], bins=BINS, color=svg_chart.BLUE)
+            ax.hist(values[:, row], bins=BINS, color=page.BLUE)
             ax.grid(visible=False, axis="x")
             ax.yaxis.get_major_locator().set_params(integer=True)
-    titles = [f"{svg_chart.label(c.name)} ({svg_chart.label(c.unit)})" for c in controls]
+    titles = [f"{short_label(c.name)} ({short_label(c.unit)})" for c in controls]
     for at, title in enumerate(titles):
         axes[-1, at].set_xlabel(title)
         axes[at, 0].set_ylabel(title if at else "clips")
@@ -226,7 +226,7 @@ def calibration_chapter(trained: TrainedModel) -> Chapter:
         ("clips with an error up to 2 sigma", f"{100 * statistics['within_two_sigma']:.0f} %"),
         ("rank correlation of error and sigma", f"{statistics['rank_correlation']:+.2f}"),
     )
-    chart = svg_chart.draw(
+    chart = draw_chart(
         3.3,
         partial(_paint_calibration, predicted, actual),
         f"Scatter plot of error against sigma of {len(actual)} left-out clips, and a "
@@ -261,13 +261,13 @@ def _paint_calibration(predicted: Floats, actual: Floats, figure: Figure) -> Non
     top = 108 * max(float(predicted.max()), float(actual.max()))
     for times, style, label in ((1.0, "-", "error = sigma"), (2.0, ":", "error = 2 sigma")):
         ends = [0.0, top / times]
-        left.plot(ends, [0.0, top], style, color=svg_chart.INK, linewidth=0.9, label=label)
-    left.plot(100 * predicted, 100 * actual, ".", color=svg_chart.BLUE, markersize=7)
+        left.plot(ends, [0.0, top], style, color=page.INK, linewidth=0.9, label=label)
+    left.plot(100 * predicted, 100 * actual, ".", color=page.BLUE, markersize=7)
     left.set(xlabel="sigma (cm)", ylabel="error (cm)", xlim=(0, top), ylim=(0, top))
     left.set_title("left-out clips")
     left.legend(loc="upper left")
-    right.hist(actual / predicted, bins=20, color=svg_chart.BLUE)
-    right.axvline(1.0, color=svg_chart.INK, linewidth=0.9)
+    right.hist(actual / predicted, bins=20, color=page.BLUE)
+    right.axvline(1.0, color=page.INK, linewidth=0.9)
     right.set(xlabel="error / sigma", ylabel="clips", title="error / sigma")
     right.grid(visible=False, axis="x")
     right.yaxis.get_major_locator().set_params(integer=True)

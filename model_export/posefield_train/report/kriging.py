@@ -6,7 +6,7 @@ from posefield.model_file.model_card import Control
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging.kriging_bank import POSE
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
-from posefield_train.report.drawing.html_page import Chapter, Section, Table
+from posefield_train.report.page import Chapter, Section, Table
 
 _MEANING = {
     "pose": "joint rotations and root path",

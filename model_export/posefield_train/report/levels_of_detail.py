@@ -15,7 +15,7 @@ from posefield.inference import level_selection, session
 from posefield.inference.level_selection import Camera
 from posefield.model_file.model_card import Level
 from posefield_train.graph.onnx_export import ExportedModel
-from posefield_train.report.drawing.html_page import Chapter, Section, Table
+from posefield_train.report.page import Chapter, Section, Table
 
 # Common resolution and field of view of games: 1080 lines, 60 degrees vertically.
 CAMERA = Camera(np.zeros(3), math.radians(60.0), 1080.0)

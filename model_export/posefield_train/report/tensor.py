@@ -11,8 +11,15 @@ from posefield.common.units import Booleans, Floats
 from posefield_train.align.warp import FIT_TIMES, MINIMUM_INCREMENT
 from posefield_train.graph import truncation_cost
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report.drawing import left_out_clips, svg_chart
-from posefield_train.report.drawing.html_page import Chapter, Section, Table
+from posefield_train.report import clip_errors, page
+from posefield_train.report.page import (
+    Chapter,
+    Section,
+    Table,
+    draw_chart,
+    plain_logarithm,
+    short_label,
+)
 from posefield_train.tensor import hosvd
 
 # Error limits, m, for which the smallest size is listed.
@@ -105,7 +112,7 @@ def truncation_chapter(trained: TrainedModel) -> Chapter:
     titles = ("ranks", "error (cm)", "numbers stored", "compression", "of the core alone")
     table = Table("Smallest size for an error limit", ("error limit", *titles), rows)
     missed = 100 * float(np.sqrt(trained.left_out_errors.mean()))
-    chart = svg_chart.draw(
+    chart = draw_chart(
         3.7,
         partial(_paint_sizes, every, (numbers, error), missed),
         f"Truncation error against numbers stored, and against ranks; chosen: {error:.2f} cm "
@@ -131,13 +138,13 @@ def _paint_sizes(
     """Draw the front with the chosen size, and the error over two ranks. missed: error, cm."""
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     errors, marks = every.front()
-    left.loglog(marks, 100 * errors, color=svg_chart.BLUE, label="smallest error at this size")
-    left.plot(*chosen, "o", color=svg_chart.ORANGE, label="chosen", zorder=3)
+    left.loglog(marks, 100 * errors, color=page.BLUE, label="smallest error at this size")
+    left.plot(*chosen, "o", color=page.ORANGE, label="chosen", zorder=3)
     label = f"error of a left-out clip: {missed:.1f} cm"
-    left.axhline(missed, color=svg_chart.FAINT, linestyle="--", label=label)
+    left.axhline(missed, color=page.FAINT, linestyle="--", label=label)
     left.set(xlabel="numbers stored", ylabel="error (cm)", title="size")
-    svg_chart.plain_logarithm(left.xaxis)
-    svg_chart.plain_logarithm(left.yaxis)
+    plain_logarithm(left.xaxis)
+    plain_logarithm(left.yaxis)
     left.legend(loc="lower left")
     r1, r2, r3 = every.chosen
     shown = 100 * every.errors[:, r2 - 1, :].T
@@ -146,9 +153,9 @@ def _paint_sizes(
     at = np.arange(1, shown.shape[1] + 1), np.arange(1, shown.shape[0] + 1)
     levels = [level for level in (0.5, 1, 2, 5, 10) if shown.min() < level < shown.max()]
     if levels:
-        lines = right.contour(*at, shown, levels, colors=svg_chart.INK, linewidths=0.7)
+        lines = right.contour(*at, shown, levels, colors=page.INK, linewidths=0.7)
         right.clabel(lines, fmt="%g cm", fontsize=8)
-    right.plot(r1, r3, "o", color=svg_chart.ORANGE, clip_on=False)
+    right.plot(r1, r3, "o", color=page.ORANGE, clip_on=False)
     right.grid(visible=False)
     title = f"ranks, with {r2} of frames"
     right.set(xlabel="rank of degrees of freedom", ylabel="rank of samples", title=title)
@@ -189,7 +196,7 @@ def warp_chapter(trained: TrainedModel) -> Chapter:
     order = np.argsort(-warps.stretches, kind="stable")
     clips = [
         {
-            "clip": left_out_clips.clip_label(trained.examples[i]),
+            "clip": clip_errors.clip_label(trained.examples[i]),
             "duration_s": float(trained.aligned.durations[i]),
             "largest_stretch": float(warps.stretches[i]),
             "at_share": float(warps.change_times[i]),
@@ -216,7 +223,7 @@ def warp_chapter(trained: TrainedModel) -> Chapter:
     )
     heading = ("clip", "duration (s)", "factor", "at")
     table = Table("Clips with the largest change of speed", heading, rows)
-    chart = svg_chart.draw(
+    chart = draw_chart(
         3.5,
         partial(_paint_maps, warps.maps[order], clips),
         f"Time maps of {len(clips)} clips, and the largest change of speed of each; "
@@ -238,7 +245,7 @@ def _shift_text(trained: TrainedModel) -> tuple[str, ...]:
     return (
         "Before the alignment the start of each cycle was moved to a common phase, by "
         f"{100 * np.sqrt(np.mean(np.square(shifts))):.1f} % of a cycle (RMS), and of "
-        f"{left_out_clips.clip_label(trained.examples[most])} by {100 * shifts[most]:+.1f} %. The "
+        f"{clip_errors.clip_label(trained.examples[most])} by {100 * shifts[most]:+.1f} %. The "
         "end of the cycle and its landmarks moved with it.",
     )
 
@@ -263,15 +270,15 @@ def _paint_maps(maps: Floats, clips: list[dict[str, Any]], figure: Figure) -> No
     """Draw the maps of clips, the largest change of speed first, and the changes."""
     left, right = figure.subplots(1, 2)
     for row in maps[NAMED_CLIPS:]:
-        left.plot(FIT_TIMES, row, color=svg_chart.FAINT, linewidth=0.8)
-    left.plot([0, 1], [0, 1], color=svg_chart.INK, linewidth=0.8, linestyle="--")
+        left.plot(FIT_TIMES, row, color=page.FAINT, linewidth=0.8)
+    left.plot([0, 1], [0, 1], color=page.INK, linewidth=0.8, linestyle="--")
     for row, one, style in zip(maps, clips, ("-", "--", ":"), strict=False):
-        label = svg_chart.label(one["clip"])
-        left.plot(FIT_TIMES, row, style, color=svg_chart.ORANGE, label=label)
+        label = short_label(one["clip"])
+        left.plot(FIT_TIMES, row, style, color=page.ORANGE, label=label)
     left.legend(loc="lower right", fontsize=7.5)
     left.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")
     at = np.arange(len(clips))
-    colours = [svg_chart.ORANGE if i < NAMED_CLIPS else svg_chart.BLUE for i in at]
+    colours = [page.ORANGE if i < NAMED_CLIPS else page.BLUE for i in at]
     right.bar(at, [one["largest_stretch"] for one in clips], width=0.72, color=colours)
     right.set(ylabel="largest change of speed (factor)", title="clips", ylim=(1.0, None))
     right.set_xticks([])

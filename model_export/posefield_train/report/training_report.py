@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report import clip_errors, controls, kriging, tensor
-from posefield_train.report.drawing import significant_digits
-from posefield_train.report.drawing.html_page import Chapter, Page, Section, Table
+from posefield_train.report import clip_errors, controls, kriging, significant_digits, tensor
 from posefield_train.report.levels_of_detail import LevelCosts
+from posefield_train.report.page import Chapter, Page, Section, Table
 
 REPORT_VERSION = 2
 """Version of the JSON: increased when a name or a unit changes."""

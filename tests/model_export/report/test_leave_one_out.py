@@ -5,7 +5,7 @@ import pytest
 
 from posefield_train.align import time_alignment
 from posefield_train.kriging import universal_kriging
-from posefield_train.report.drawing import left_out_clips
+from posefield_train.report import clip_errors
 
 # Two ways to one solution of the same equations differ by rounding, m.
 ROUNDING = 1e-8
@@ -35,7 +35,7 @@ def clip(request, trained):
 
 def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
     everyone = np.arange(len(trained.examples))
-    found = left_out_clips.predicted_motion(trained, clip)
+    found = clip_errors.predicted_motion(trained, clip)
     alone = predicted(trained, everyone[everyone != clip], clip)
     assert np.abs(found - alone).max() < ROUNDING
     # Negative control: with the clip itself the prediction is another.
@@ -50,9 +50,7 @@ def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
     expected = time_alignment.joint_positions(trained.aligned, trained.skeleton.parents, offsets)[
         clip
     ]
-    body = left_out_clips.body_motion(trained, clip, trained.tensor.values[:, :, clip])
+    body = clip_errors.body_motion(trained, clip, trained.tensor.values[:, :, clip])
     assert np.abs(body.joints - expected).max() < ROUNDING
-    guess = left_out_clips.body_motion(
-        trained, clip, left_out_clips.predicted_motion(trained, clip)
-    )
+    guess = clip_errors.body_motion(trained, clip, clip_errors.predicted_motion(trained, clip))
     assert np.abs(guess.joints - expected).max() > SEEN

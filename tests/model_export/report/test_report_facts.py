@@ -12,7 +12,6 @@ from posefield_train.graph.trained_model import Outlier
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.report import clip_errors, tensor
 from posefield_train.report import controls as chapters
-from posefield_train.report.drawing import left_out_clips
 from posefield_train.report.tensor import TimeWarps
 
 # JSON holds six digits.
@@ -55,9 +54,9 @@ def test_every_clip_is_there_the_worst_first(facts, trained):
         sorted(np.sqrt(trained.left_out_errors), reverse=True), rel=DIGITS
     )
     worst = trained.examples[int(np.argmax(trained.left_out_errors))]
-    assert facts["clips"]["clips"][0]["clip"] == left_out_clips.clip_label(worst)
+    assert facts["clips"]["clips"][0]["clip"] == clip_errors.clip_label(worst)
     assert facts["clips"]["clips"][0]["performer"] == worst.row.performer
-    assert facts["figures"]["worst"][0]["clip"] == left_out_clips.clip_label(worst)
+    assert facts["figures"]["worst"][0]["clip"] == clip_errors.clip_label(worst)
 
 
 def test_performers_add_up_to_all_clips(trained):
@@ -152,7 +151,7 @@ def test_clips_are_listed_by_their_change_of_speed_with_the_shifts_of_cycles(tra
     )
     stretches = [clip["largest_stretch"] for clip in shifted.facts["clips"]]
     assert stretches == sorted(stretches, reverse=True) and stretches[-1] >= 1.0
-    assert f"{left_out_clips.clip_label(first)} by -12.5 %" in shifted.section.paragraphs[-1]
+    assert f"{clip_errors.clip_label(first)} by -12.5 %" in shifted.section.paragraphs[-1]
     assert {clip["shift"] for clip in shifted.facts["clips"]} == {0.0, -0.125}
     plain = tensor.warp_chapter(trained).section.paragraphs
     assert len(plain) == len(shifted.section.paragraphs) - 1
@@ -177,7 +176,7 @@ def test_an_outlier_is_listed_with_the_evidence(trained, controls):
     odd = clip_errors.error_chapter(replace(trained, outliers=outliers), controls)
     first, chart = odd.section.tables[0], odd.section.charts[0]
     assert first.caption == "Possible outliers" and "Outlined" in chart.caption
-    label = left_out_clips.clip_label(trained.examples[3])
+    label = clip_errors.clip_label(trained.examples[3])
     assert first.rows == ((label, "lies far away; leaps"),)
     assert [clip["clip"] for clip in odd.facts["clips"] if clip["against"]] == [label]
     clean = clip_errors.error_chapter(trained, controls)

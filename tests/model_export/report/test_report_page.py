@@ -15,7 +15,7 @@ import pytest
 
 from posefield_train.report import clip_errors, training_report
 from posefield_train.report import controls as control_chapters
-from posefield_train.report.drawing import svg_chart
+from posefield_train.report.page import LABEL, draw_chart
 from posefield_train.report.training_report import TrainingStep
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
@@ -139,7 +139,7 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
         trained, (replace(first, name=long), *others)
     ).section
     (svg,) = (drawn.svg.decode() for drawn in chapter.charts)
-    assert f"{'a' * (svg_chart.LABEL - 1)}… (m)" in svg and long not in svg
+    assert f"{'a' * (LABEL - 1)}… (m)" in svg and long not in svg
     assert long in chapter.tables[0].rows[0]
     examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
     bars = clip_errors.error_chapter(
@@ -152,11 +152,11 @@ def test_charts_do_not_depend_on_the_users_matplotlib_settings():
     def paint(figure):
         figure.subplots().plot([1, 2], [3, 4])
 
-    expected = svg_chart.draw(1.0, paint, "", "")
+    expected = draw_chart(1.0, paint, "", "")
     with matplotlib.rc_context({"lines.linewidth": 9.0, "svg.fonttype": "path"}):
-        assert svg_chart.draw(1.0, paint, "", "") == expected
+        assert draw_chart(1.0, paint, "", "") == expected
     # Negative control: another curve gives another file.
-    assert svg_chart.draw(1.0, lambda figure: figure.subplots().plot([1, 3]), "", "") != expected
+    assert draw_chart(1.0, lambda figure: figure.subplots().plot([1, 3]), "", "") != expected
 
 
 def test_two_reports_of_a_model_differ_only_in_the_times(

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file, onnx_file
-from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.kriging.kriging_graph import COVARIANCES
+from posefield_train.onnx_graph import GraphBuilder
 
 MODELS = ("model_path", "labelled_path", "walk_path", "measured_walk_path")
 

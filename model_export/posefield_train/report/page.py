@@ -1,10 +1,16 @@
-"""Charts as SVG images in one style; equal data give equal bytes."""
+"""Self-contained HTML page of sections, tables and SVG charts in one style.
+
+Equal data give equal bytes.
+"""
 
 import base64
 import io
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib import style
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -63,7 +69,7 @@ class Chart:
         return f"data:image/svg+xml;base64,{base64.b64encode(self.svg).decode()}"
 
 
-def draw(height: float, paint: Callable[[Figure], None], alt: str, caption: str) -> Chart:
+def draw_chart(height: float, paint: Callable[[Figure], None], alt: str, caption: str) -> Chart:
     """Return the chart that `paint` draws on an empty figure of WIDTH × height inches."""
     buffer = io.BytesIO()
     # "default" undoes the settings of the user's own matplotlibrc.
@@ -74,7 +80,7 @@ def draw(height: float, paint: Callable[[Figure], None], alt: str, caption: str)
     return Chart(buffer.getvalue(), alt, caption)
 
 
-def label(text: str) -> str:
+def short_label(text: str) -> str:
     """Return a user-given name as the label of a chart, with "…" for what exceeds LABEL."""
     return text if len(text) <= LABEL else f"{text[: LABEL - 1]}…"
 
@@ -83,3 +89,69 @@ def plain_logarithm(axis: Axis) -> None:
     """Label a logarithmic axis with plain numbers; the default labels are formulas."""
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter("")
+
+
+_NUMBER = re.compile(r"[-+]?[\d.,]+( ?%| cm)?")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Table of text cells: caption, column titles, and rows of as many cells."""
+
+    caption: str
+    heading: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    @property
+    def numeric(self) -> tuple[bool, ...]:
+        """Return, per column, True if all cells are numbers or empty."""
+        return tuple(
+            all(not cell or _NUMBER.fullmatch(cell) for cell in column)
+            for column in zip(*self.rows, strict=True)
+        )
+
+
+@dataclass(frozen=True)
+class Section:
+    """Section of a page. name: its anchor, of letters and hyphens, unique in the page."""
+
+    name: str
+    title: str
+    paragraphs: tuple[str, ...]
+    tables: tuple[Table, ...] = ()
+    charts: tuple[Chart, ...] = ()
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """Part of a report. facts: JSON values, in metres, seconds and shares. section: of the page."""
+
+    facts: Any
+    section: Section
+
+
+@dataclass(frozen=True)
+class Page:
+    """Page of sections.
+
+    kind: type of document, such as "training report". lead: text below the title. figures: name and
+    value of the key figures at the top.
+    """
+
+    kind: str
+    title: str
+    lead: str
+    figures: Sequence[tuple[str, str]]
+    sections: Sequence[Section]
+
+    def html(self) -> bytes:
+        """Return the file; all text is escaped."""
+        environment = Environment(
+            loader=PackageLoader("posefield_train.report"),
+            autoescape=True,
+            undefined=StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            keep_trailing_newline=True,
+        )
+        return environment.get_template("page.html").render(page=self).encode()

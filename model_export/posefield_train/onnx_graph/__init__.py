@@ -1,1 +1,0 @@
-"""Builder of ONNX graphs."""

@@ -1,1 +1,0 @@
-"""Outlier detection: clips that do not fit their family."""

@@ -1,1 +1,0 @@
-"""Jobs in processes or on a cluster."""
