@@ -24,8 +24,7 @@ from timing import in_turn
 
 from posefield.batch import clip_archive
 from posefield.encode import archives
-from posefield.encode.formats import CLIP_ENCODERS
-from posefield.http import clip_operations
+from posefield.http import archive_operations
 from posefield.http.api.settings import Settings
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -110,7 +109,7 @@ def _first(client: httpx.Client, body: bytes) -> None:
 
 def _made(model: Synthesizer, body: bytes) -> int:
     """Bytes of the same archive without a server."""
-    order = clip_operations.decode_order(model, CLIP_ENCODERS, body, Settings())
+    order = archive_operations.clip_order(model, body, Settings())
     return sum(map(len, archives.zip(clip_archive.archive_members(order))))
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from posefield.http import header_fields
+from posefield.http import responses
 
 ROOT = Path(__file__).parents[1]
 LAYERS = "packages import only those below them"
@@ -146,4 +146,4 @@ def test_an_entity_tag_depends_on_every_library_that_makes_answers():
     roots = {name.partition(".")[0] for name in imported} & distributions.keys()
     libraries = {name for root in roots for name in distributions[root]}
     assert "usd-core" in libraries
-    assert libraries - {"posefield"} <= set(header_fields.LIBRARIES)
+    assert libraries - {"posefield"} <= set(responses.LIBRARIES)

@@ -64,7 +64,7 @@ def test_an_id_that_is_none_is_replaced(given, ask):
 
 
 def test_a_failure_shows_its_id_and_nothing_else(caplog):
-    async def fails(service, request):
+    async def fails(request):
         raise RuntimeError("secret /etc/path")
 
     app = build_app(

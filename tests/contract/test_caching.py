@@ -7,7 +7,7 @@ import pytest
 import recorded
 from asking import asker
 
-from posefield.http import header_fields
+from posefield.http import responses
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.registry.model_registry import ModelRegistry
@@ -36,7 +36,7 @@ def test_what_a_client_has_is_not_sent_again(rest, ask, controls):
     [('"a"', True), ('W/"a"', True), ('"b", "a"', True), ("*", True), ('"b"', False), ("a", False)],
 )
 def test_an_if_none_match_is_a_list_compared_weakly(given, held):
-    assert header_fields.matches_tag(given, '"a"') is held
+    assert responses.matches_tag(given, '"a"') is held
 
 
 def test_a_tag_is_known_without_asking_the_model(loaded, controls):
@@ -78,14 +78,14 @@ def test_a_tag_holds_for_the_name_and_the_hash(ask, loaded, controls):
 
 
 def test_tags_follow_from_the_code(tmp_path, monkeypatch):
-    before = header_fields.code_digest()
-    assert before == header_fields.code_digest()
+    before = responses.code_digest()
+    assert before == responses.code_digest()
     # Another version of a library, as it would be found before the one that is installed.
     about = tmp_path / "numpy-0.0.0.dist-info" / "METADATA"
     about.parent.mkdir()
     about.write_text("Metadata-Version: 2.1\nName: numpy\nVersion: 0.0.0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    assert header_fields.code_digest() != before
+    assert responses.code_digest() != before
 
 
 @pytest.mark.parametrize(

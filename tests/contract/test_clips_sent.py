@@ -15,11 +15,9 @@ from test_server import address, process
 from posefield.batch.clip_archive import CLIPS
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.http.api import contract
+from posefield.http import archive_operations
 from posefield.http.api.settings import Settings
-from posefield.http.app import build_app
-from posefield.http.clip_operations import query_clips
-from posefield.http.operations import OPERATIONS
+from posefield.http.app import create_app
 
 PATH = "/v1/models/reach/clips"
 MANY = 1000
@@ -38,10 +36,15 @@ def counting(most=MANY):
     return dataclasses.replace(CLIP_ENCODERS["usdc"], write=write), made
 
 
-def served(loaded, encoder):
+@pytest.fixture
+def served(loaded, monkeypatch):
     """The application with one encoder in place of the others for many clips."""
-    handlers = {"queryClipsInFormat": query_clips({"usdc": encoder})}
-    return build_app(contract.load_contract(), {**OPERATIONS, **handlers}, loaded, Settings())
+
+    def serve(encoder):
+        monkeypatch.setattr(archive_operations, "CLIP_ENCODERS", {"usdc": encoder})
+        return create_app(loaded, Settings())
+
+    return serve
 
 
 def asked(controls, count, extension="usdc"):
@@ -58,9 +61,9 @@ def settled(made):
 
 
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
-def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, loaded, controls):
+def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, served, controls):
     encoder, made = counting()
-    with listening(served(loaded, encoder)) as base, httpx.Client(timeout=30) as client:
+    with listening(served(encoder)) as base, httpx.Client(timeout=30) as client:
         body = asked(controls, MANY)
         with client.stream("POST", f"{base}{PATH}.{kind}", json=body) as answer:
             assert next(answer.iter_raw())
@@ -70,12 +73,12 @@ def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, l
 
 
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
-def test_an_archive_that_cannot_be_finished_breaks_off(kind, loaded, controls, caplog):
+def test_an_archive_that_cannot_be_finished_breaks_off(kind, served, controls, caplog):
     encoder, _ = counting(most=2 * CLIPS)
     got = bytearray()
     headers = {"x-request-id": "id-7"}
     with (
-        listening(served(loaded, encoder)) as base,
+        listening(served(encoder)) as base,
         caplog.at_level(logging.ERROR),
         pytest.raises(httpx.RemoteProtocolError, match="incomplete chunked read"),
         httpx.stream(

@@ -9,8 +9,7 @@ import yaml
 from posefield.http.api import contract, problems
 from posefield.http.api.settings import Settings
 from posefield.http.app import build_app
-from posefield.http.operations import OPERATIONS
-from posefield.http.steps import Steps
+from posefield.http.operations import FORMATS, OPERATIONS
 from posefield.registry.model_registry import ModelRegistry
 
 
@@ -26,8 +25,8 @@ def test_routes_and_operations_are_the_same_set(spec, app):
     }
     assert len({path.partition(".{")[0] for path in spec["paths"]}) > 10
     # HEAD is answered wherever GET is, and the contract says so in its introduction.
-    places = app.site.places.places
-    served = {(m, place.template) for place in places for m in place.routes if m != "HEAD"}
+    paths = app.service.routes.paths
+    served = {(m, path.template) for path in paths for m in path.routes if m != "HEAD"}
     assert served == agreed
 
 
@@ -38,13 +37,12 @@ def test_an_operation_without_a_handler_stops_the_start():
         build_app(agreed, handlers, ModelRegistry({}), Settings())
 
 
-@pytest.mark.parametrize(
-    "name", [n for n, h in OPERATIONS.items() if isinstance(h, Steps) and h.formats]
-)
+@pytest.mark.parametrize("name", [*FORMATS, *(f"{name}InFormat" for name in FORMATS)])
 def test_formats_and_media_types_are_those_of_the_encoders(name):
     (operation,) = (o for o in contract.load_contract().operations if o.id == name)
-    encoders = {form: each.media_type for form, each in OPERATIONS[name].formats.items()}
-    assert all(form == each.extension for form, each in OPERATIONS[name].formats.items())
+    formats = FORMATS[name.removesuffix("InFormat")]
+    encoders = {form: each.media_type for form, each in formats.items()}
+    assert all(form == each.extension for form, each in formats.items())
     assert sorted(operation.media_types) == sorted(encoders.values())
     assert operation.formats == (encoders if "{format}" in operation.path else {})
 

@@ -39,11 +39,11 @@ def with_key(**headers):
     return lambda app: answered(asker(closed)("GET", "/metrics", headers=headers))
 
 
-async def stuck(service, request):
+async def stuck(request):
     await asyncio.sleep(100)
 
 
-async def broken(service, request):
+async def broken(request):
     raise ZeroDivisionError
 
 

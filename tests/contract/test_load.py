@@ -7,7 +7,7 @@ import httpx
 import pytest
 from starlette.responses import Response
 
-from posefield.http import request_cycle
+from posefield.http import request, request_cycle
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import build_app
@@ -30,7 +30,7 @@ async def ask_many(app, paths, **headers):
         return await asyncio.gather(*(client.get(path, headers=headers) for path in paths))
 
 
-async def slow(service, request):
+async def slow(request):
     await asyncio.sleep(0.3)
     return Response("done")
 
@@ -46,7 +46,7 @@ def test_more_requests_than_can_be_answered_are_turned_away():
     assert alive.status_code == 200
 
 
-async def stuck(service, request):
+async def stuck(request):
     await asyncio.sleep(100)
 
 
@@ -77,7 +77,7 @@ def test_a_client_may_have_less_patience_but_not_more(prefer, expected):
 
 def test_a_task_cancelled_by_others_is_not_late():
     async def cancelled():
-        watch = request_cycle.DeadlineTimer()
+        watch = request.DeadlineTimer()
         task = asyncio.create_task(watch.within(30.0, asyncio.sleep(60)))
         await asyncio.sleep(0)
         task.cancel()

@@ -27,7 +27,7 @@ from posefield.http.app import build_app
 from posefield.http.server import StartAnnouncement, lifespan
 from posefield.http.operations import OPERATIONS
 from posefield.http.api.settings import Settings
-async def block_the_loop(service, request):
+async def block_the_loop(request):
     time.sleep(100)
 own = socket.create_server(("127.0.0.1", 0))
 line = StartAnnouncement("at http://127.0.0.1:%d" % own.getsockname()[1], threading.Semaphore(1))

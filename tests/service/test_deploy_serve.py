@@ -10,7 +10,7 @@ import yaml
 
 import posefield
 from posefield.common.errors import InvalidField
-from posefield.http import header_fields
+from posefield.http import request
 from posefield.http.access import access_control, api_keys
 from posefield.http.api import contract, settings
 from posefield.http.api.problems import RequestError
@@ -155,8 +155,8 @@ def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path)
 def test_pods_may_use_the_names_of_the_service(host, objects, container):
     name = objects["Service"]["metadata"]["name"]
     assert host.startswith((name, "10."))
-    known = header_fields.host_names(environment(container)["POSEFIELD_HOSTS"], "POSEFIELD_HOSTS")
-    limits = header_fields.HeadLimits(100, 1000, known)
+    known = request.host_names(environment(container)["POSEFIELD_HOSTS"], "POSEFIELD_HOSTS")
+    limits = request.HeadLimits(100, 1000, known)
     scope = {"raw_path": b"/", "query_string": b"", "http_version": "1.1"}
     limits.check(scope | {"headers": [(b"host", host.encode())]})
     # Negative control.

@@ -1,36 +1,31 @@
-"""ASGI application of the contract's operations."""
+"""Building of the ASGI application from the contract's operations and the settings."""
 
 import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
-from functools import partial
 from pathlib import Path
-
-from starlette.types import Receive, Scope, Send
 
 from posefield.characters import user_character
 from posefield.characters.user_character import EMPTY, CharacterFolder
-from posefield.common.errors import UnknownFormat, did_you_mean
-from posefield.http import header_fields, request_cycle, static_page
+from posefield.encode.conventions import Format
+from posefield.http import request, responses, static_page
 from posefield.http.access import access_control
-from posefield.http.api import contract, problems
+from posefield.http.api import contract
 from posefield.http.api.contract import Contract, Operation
-from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
-from posefield.http.header_fields import HeadLimits
-from posefield.http.operations import OPERATIONS
+from posefield.http.operations import FORMATS, OPERATIONS
 from posefield.http.readiness import Readiness
-from posefield.http.request_cycle import ServerState
-from posefield.http.routing import Route, RouteTree
-from posefield.http.steps import Handler, Service, Steps
+from posefield.http.request import HeadLimits, Service
+from posefield.http.request_cycle import App
+from posefield.http.routing import Handler, Route, RouteTree
 from posefield.http.telemetry import LogBuffer
 from posefield.registry.model_registry import FixedRegistry, ModelRegistry
 
 log = logging.getLogger(__name__)
-Lifespan = Callable[[ServerState], AbstractAsyncContextManager[None]]
+Lifespan = Callable[[Service], AbstractAsyncContextManager[None]]
 
 
-def no_background_tasks(site: ServerState) -> AbstractAsyncContextManager[None]:
+def no_background_tasks(service: Service) -> AbstractAsyncContextManager[None]:
     """Return a lifespan without background tasks."""
     return nullcontext()
 
@@ -40,7 +35,7 @@ def create_app(
     settings: Settings,
     log: LogBuffer | None = None,
     lifespan: Lifespan = no_background_tasks,
-) -> "App":
+) -> App:
     """Return the application of the contract for some models.
 
     log: of requests; None for none. lifespan: context of the background tasks of the server.
@@ -55,96 +50,67 @@ def build_app(
     settings: Settings,
     log: LogBuffer | None = None,
     lifespan: Lifespan = no_background_tasks,
-) -> "App":
+) -> App:
     """Return the application of a contract and the handlers of its operations.
 
     handlers: by operationId. Raises ValueError for an operation without a handler, a handler
-    without an operation and formats that differ from the handler's, and InvalidField or FileError
+    without an operation and formats that differ from the encoders', and InvalidField or FileError
     for invalid settings of access, origins, hosts or characters.
     """
-    _check_complete({operation.id for operation in agreed.operations}, set(handlers))
-    readiness = Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models
-    rules = access_control.from_settings(settings)
-    origins = header_fields.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
+    ids = {operation.id for operation in agreed.operations}
+    if ids != set(handlers):
+        raise ValueError(
+            f"operations without a handler {sorted(ids - set(handlers))}, "
+            f"handlers without an operation {sorted(set(handlers) - ids)}"
+        )
+    policy = access_control.from_settings(settings)
+    origins = responses.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
+    characters = _characters(settings)
+    hosts = request.host_names(settings.hosts, f"{PREFIX}HOSTS")
     service = Service(
-        readiness,
+        RouteTree(
+            route
+            for operation in agreed.operations
+            for route in _routes(operation, handlers[operation.id])
+        ),
+        HeadLimits(settings.url_limit, settings.head_limit, hosts),
+        Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models,
         settings,
         agreed.version,
         static_page.static_pages(agreed),
-        rules,
+        policy,
         origins,
         log,
-        characters=_characters(settings),
+        characters,
     )
-    places = RouteTree(
-        route
-        for operation in agreed.operations
-        for route in _routes(operation, handlers[operation.id])
-    )
-    hosts = header_fields.host_names(settings.hosts, f"{PREFIX}HOSTS")
-    limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
-    return App(ServerState(places, service, partial(_missing, places), limits), lifespan)
+    return App(service, lifespan)
 
 
 def _characters(settings: Settings) -> CharacterFolder:
     """Return the characters of users; a file that cannot be used is logged and stops no other."""
     if not settings.characters:
         return EMPTY
-    found = user_character.read_folder(Path(settings.characters), settings.character_prefix)
-    for fault in found.faults:
+    folder = user_character.read_folder(Path(settings.characters), settings.character_prefix)
+    for fault in folder.faults:
         log.warning("character %s cannot be used: %s", fault.file, fault.reason)
-    return found
+    return folder
 
 
 def _routes(operation: Operation, handler: Handler) -> Iterator[Route]:
     """Yield the routes of an operation: one per format if its path ends in `{format}`, else one."""
-    formats = handler.formats if isinstance(handler, Steps) else {}
-    offers = tuple((name, each.media_type) for name, each in formats.items())
-    _check_formats(operation, dict(offers))
+    encoders = FORMATS.get(operation.id.removesuffix("InFormat"), {})
+    _check_formats(operation, encoders)
     if not operation.formats:
+        offers = tuple((name, encoder.media_type) for name, encoder in encoders.items())
         yield Route(operation, handler, offers=offers)
     for name in operation.formats:
         yield Route(operation, handler, name)
 
 
-def _check_formats(operation: Operation, encoders: Mapping[str, str]) -> None:
-    """Raise ValueError unless the contract lists the handler's formats and media types."""
+def _check_formats(operation: Operation, encoders: Mapping[str, Format]) -> None:
+    """Raise ValueError unless the contract lists the encoders' formats and media types."""
+    media_types = {name: encoder.media_type for name, encoder in encoders.items()}
     agreed = dict(operation.formats), {*operation.media_types}
-    made = dict(encoders if operation.formats else {}), {*encoders.values()}
-    if (operation.formats or encoders) and agreed != made:
-        raise ValueError(f"{operation.id}: the contract has {agreed}, its handler {made}")
-
-
-class App:
-    """ASGI application; see `request_cycle` for a request."""
-
-    def __init__(self, site: ServerState, lifespan: Lifespan) -> None:
-        self.site = site
-        self._lifespan = lifespan
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "http":
-            await request_cycle.handle(self.site, scope, receive, send)
-        elif scope["type"] == "lifespan":
-            await receive()
-            async with self._lifespan(self.site):
-                await send({"type": "lifespan.startup.complete"})
-                await receive()
-            await send({"type": "lifespan.shutdown.complete"})
-
-
-def _check_complete(agreed: set[str], handled: set[str]) -> None:
-    if agreed != handled:
-        raise ValueError(
-            f"operations without a handler {sorted(agreed - handled)}, "
-            f"handlers without an operation {sorted(handled - agreed)}"
-        )
-
-
-def _missing(places: RouteTree, path: str) -> Exception:
-    """Return the error of a path that is not in the contract."""
-    if found := places.other_formats(path):
-        asked, known = found
-        hint = did_you_mean(asked, known)
-        return UnknownFormat("format", f"no format {asked!r}{hint}; there are {', '.join(known)}")
-    return RequestError(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")
+    encoded = media_types if operation.formats else {}, {*media_types.values()}
+    if (operation.formats or encoders) and agreed != encoded:
+        raise ValueError(f"{operation.id}: the contract has {agreed}, its handler {encoded}")

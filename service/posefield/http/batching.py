@@ -54,26 +54,31 @@ class ClipBatcher:
         self,
         model: Synthesizer,
         question: ClipQuestion,
-        most: int,
+        longest: int,
         encoder: ClipEncoder,
         convention: Convention,
     ) -> EncodedClip:
         """Return the clip of a question and its file; the batch does not affect its bytes.
 
-        most: largest number of frames. Raises as `clips.synthesize_clip` does.
+        longest: largest number of frames. Raises as `clips.synthesize_clip` does.
         """
+        if encoder.inline_limit:
+            answer = clips.synthesize_clip(model, question, longest)
+            return EncodedClip(answer, await self.file(encoder, convention, answer))
         if clip_batch.longest(model, question) > MAX_BATCHED_FRAMES:
             answer = await worker_threads.run_in_thread(
-                clips.synthesize_clip, model, question, most
+                clips.synthesize_clip, model, question, longest
             )
             return EncodedClip(answer, await self.file(encoder, convention, answer))
-        key = encoder.extension, convention, model.identity, question.level, most
-        work = partial(_encoded_clips, model, most, encoder, convention)
-        made: EncodedClip = await self._result(key, question, work)
-        return made
+        key = encoder.extension, convention, model.identity, question.level, longest
+        work = partial(_encoded_clips, model, longest, encoder, convention)
+        clip: EncodedClip = await self._result(key, question, work)
+        return clip
 
     async def file(self, encoder: ClipEncoder, convention: Convention, answer: ClipAnswer) -> bytes:
         """Return the file of an answer; the batch does not affect its bytes."""
+        if len(answer.clip) <= encoder.inline_limit:
+            return encoder.encode(answer, convention)
         if len(answer.clip) > MAX_BATCHED_FRAMES:
             return await worker_threads.run_in_thread(encoder.encode, answer, convention)
 

@@ -1,18 +1,15 @@
-"""Steps of crowd requests: poses of many characters, and walking crowds.
+"""Operations that answer with crowds: poses of many characters, and walking crowds.
 
 All lists of a body are columns of the same length, the number of characters; a scalar applies to
 each of them. Without a list there is one character.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractAsyncContextManager
-from dataclasses import dataclass
 from itertools import chain
 from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
-from starlette.requests import Request
 from starlette.responses import Response
 
 from posefield.common.errors import FormError, InvalidField
@@ -21,27 +18,25 @@ from posefield.encode.character import character
 from posefield.encode.formats import (
     CROWD_ENCODERS,
     CROWD_WRITERS,
-    CrowdWriter,
-    TableEncoder,
     max_poses,
 )
 from posefield.encode.usd_crowd import crowd_size
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
-from posefield.http import responses, steps, worker_threads
+from posefield.http import responses
 from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
 from posefield.http.api.settings import Settings
-from posefield.http.steps import Context, Steps, from_url
+from posefield.http.request import ServiceRequest, read_body
+from posefield.http.worker_threads import CROWD_LIMITER, run_in_thread
 from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.locomotion import walking_crowd
 from posefield.locomotion import walking_crowd as orders
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.model_file.model_card import ModelCard
-from posefield.motion.clip import CrowdClip, CrowdPoses, Placement
+from posefield.motion.clip import CrowdClip, Placement
 from posefield.question import json_decoding as bodies
 from posefield.question.motion_question import (
     DEFAULT_BODY,
     MAX_TAKE,
-    BodyKind,
     ExtrapolationPolicy,
     LabelValue,
     RootMode,
@@ -55,6 +50,8 @@ from posefield.validation.crowd_validation import (
     LabelColumn,
 )
 
+# The default of Accept is binary USD.
+WALK_FORMATS = {"usdc": CROWD_WRITERS["usdc"], **CROWD_WRITERS}
 DEFAULT_PIXELS = 1.0
 VALUES, FEWEST = 64, 100_000
 """Maximum values of a character, and minimum number of characters that the limit allows for."""
@@ -278,113 +275,37 @@ def _check_size(order: CrowdOrder, flat: bool, settings: Settings) -> None:
         )
 
 
-Crowds = Context[TableEncoder[CrowdPoses]]
-Walks = Context[CrowdWriter]
+async def answer_crowd(request: ServiceRequest) -> Response:
+    """Answer with the poses of a crowd of any characters, whose body is decoded in a thread."""
+    model, service, settings = request.model, request.service, request.service.settings
+    encoder, card = CROWD_ENCODERS[request.format], request.model.session.card
+    body = await read_body(request, settings.crowd_body_limit, service.bodies)
+    fitting = max_poses(settings.output_limit, len(card.skeleton), encoder, len(card.curves))
+    largest = min(settings.crowd_limit, encoder.most, fitting)
+
+    def work() -> bytes:
+        question = of_body(body, largest)
+        return encoder.encode(crowd_synthesis.synthesize_crowd(model, question))
+
+    content = await run_in_thread(work, limiter=CROWD_LIMITER)
+    return responses.attachment(content, encoder, model.name)
 
 
-def places(context: object, task: object) -> AbstractAsyncContextManager[None]:
-    """Return the limit on crowds."""
-    return worker_threads.CROWD_LIMITER
+async def answer_walk(request: ServiceRequest) -> Response:
+    """Answer with a walking crowd as USD, whose motions are computed as they are sent."""
+    model, writer = request.model, CROWD_WRITERS[request.format]
+    question = await request.decode(WalkQuestion)
+    order = checked_order(question, writer.extension, model.session.card, request.service.settings)
 
+    def work() -> tuple[CrowdClip, Iterator[bytes]]:
+        # The gait of a model is measured at its first use.
+        crowd = walking_feet.build_crowd(model, model.gait, order)
+        body = question.body or DEFAULT_BODY
+        return crowd, writer.stream(crowd, question.instancing, body)
 
-@dataclass(frozen=True)
-class CrowdTask:
-    """Body of a crowd request, decoded with its poses. most: largest number of characters."""
-
-    content: bytes
-    most: float
-
-
-async def read_crowd(context: Crowds, request: Request) -> bytes:
-    """Return the body, whose decoding takes a thread."""
-    service = context.service
-    return await steps.read_body(request, service.settings.crowd_body_limit, service.bodies)
-
-
-async def limit_crowd(context: Crowds, content: bytes) -> CrowdTask:
-    """Return the body with the limits of the settings and the format."""
-    settings, encoder = context.service.settings, context.form
-    card = context.model.session.card
-    sizes = len(card.skeleton), encoder, len(card.curves)
-    fits = max_poses(settings.output_limit, *sizes)
-    return CrowdTask(content, min(settings.crowd_limit, encoder.most, fits))
-
-
-async def pose_crowd(context: Crowds, task: CrowdTask) -> CrowdPoses:
-    """Return the poses of a crowd."""
-
-    def work() -> CrowdPoses:
-        question = of_body(task.content, task.most)
-        return crowd_synthesis.synthesize_crowd(context.model, question)
-
-    return await worker_threads.within(work)
-
-
-async def encode_crowd(context: Crowds, task: CrowdTask, answer: CrowdPoses) -> bytes:
-    """Return the poses as a file."""
-    return await worker_threads.within(context.form.encode, answer)
-
-
-def send_crowd(context: Crowds, answer: CrowdPoses, content: bytes) -> Response:
-    """Return the response."""
-    return responses.attachment(content, context.form, context.model.name)
-
-
-QUERY_CROWD = Steps(
-    CROWD_ENCODERS, read_crowd, limit_crowd, places, pose_crowd, encode_crowd, send_crowd
-)
-
-
-@dataclass(frozen=True)
-class WalkTask:
-    """A walking crowd within the limits of the settings.
-
-    instancing: how USD repeats characters. body: that they have.
-    """
-
-    order: CrowdOrder
-    instancing: str
-    body: BodyKind
-
-
-async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
-    """Return the order of a walking crowd; InvalidField beyond the limits."""
-    card, settings = context.model.session.card, context.service.settings
-    order = checked_order(question, context.form.extension, card, settings)
-    return WalkTask(order, question.instancing, question.body or DEFAULT_BODY)
-
-
-async def plan_walk(context: Walks, task: WalkTask) -> CrowdClip:
-    """Return the crowd with planned paths, whose motions are computed as they are sent."""
-    model = context.model
-    # The gait of a model is measured at its first use.
-    return await worker_threads.within(
-        lambda: walking_feet.build_crowd(model, model.gait, task.order)
-    )
-
-
-async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:
-    """Return an iterator over the pieces of the file."""
-    return await worker_threads.within(context.form.stream, answer, task.instancing, task.body)
-
-
-def send_walk(context: Walks, answer: CrowdClip, content: Iterator[bytes]) -> Response:
-    """Return the response that streams the crowd."""
-    share, said = float(answer.facts["outside_share"]), list(answer.facts.get("warnings", ()))
+    crowd, pieces = await run_in_thread(work, limiter=CROWD_LIMITER)
+    share, warnings = float(crowd.facts["outside_share"]), list(crowd.facts.get("warnings", ()))
     if share:
         outside = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
-        said.insert(0, outside)
-    sent = responses.sent(content, worker_threads.CROWD_LIMITER)
-    return responses.stream(sent, context.form, context.model, said)
-
-
-# The default of Accept is binary USD.
-GET_CROWD = Steps(
-    {"usdc": CROWD_WRITERS["usdc"], **CROWD_WRITERS},
-    from_url(WalkQuestion),
-    limit_walk,
-    places,
-    plan_walk,
-    encode_walk,
-    send_walk,
-)
+        warnings.insert(0, outside)
+    return responses.stream(pieces, writer, model.name, warnings, CROWD_LIMITER, model.identity)

@@ -1,45 +1,215 @@
-"""Responses of operations: JSON documents, and files with headers for the facts of trust."""
+"""Responses of operations, and the headers of all: caching, CORS and security.
+
+The response to a GET depends only on the model file, the request line, the code and the rounding of
+this machine. Their digest is its strong entity tag; computing it takes two microseconds.
+
+CORS (Fetch standard) allows no other origin by default. Browser credentials (cookies) are never
+allowed: clients authenticate by a header that the page sets, so a page cannot act with its
+visitor's identity.
+
+`X-Frame-Options` is omitted since `frame-ancestors` replaces it. Only pages need `Referrer-Policy`,
+since data has no links. The proxy that terminates TLS sets `Strict-Transport-Security`.
+"""
 
 import json
-from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
+import platform
+import re
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping, Sequence
+from hashlib import blake2b
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import orjson
 from anyio import CapacityLimiter
 from starlette.responses import Response, StreamingResponse
 
+import posefield
+from posefield.common.errors import InvalidField
 from posefield.encode.conventions import Format
 from posefield.http import worker_threads
-from posefield.model_file import model_card as cards
 from posefield.question.performance_report import PerformanceReport
 from posefield.question.results import Trust
-from posefield.registry.model_registry import ModelRegistry
-from posefield.synthesis.synthesizer import Synthesizer
+
+NO_STORE = b"no-store"
+IMMUTABLE = b"max-age=31536000, immutable"
+NO_CACHE = b"no-cache"
+PUBLIC = b"public, "
+
+LIBRARIES = ("backports.zstd", "msgspec", "nanoarrow", "numpy", "onnxruntime", "orjson", "usd-core")
+"""Libraries whose versions can affect the bytes of a response."""
+
+
+class NotModified(Exception):
+    """The client's cached response is current (304)."""
+
+
+def code_digest() -> bytes:
+    """Return a digest of the sources, the library versions and the machine type.
+
+    Responses depend on these, on the model and on the request.
+    """
+    digest = blake2b(digest_size=16)
+    root = Path(posefield.__file__).parent
+    for source in sorted(
+        [each for kind in ("py", "yaml", "npz") for each in root.rglob(f"*.{kind}")]
+    ):
+        digest.update(source.relative_to(root).as_posix().encode() + b"\0")
+        digest.update(source.read_bytes())
+    for name in LIBRARIES:
+        digest.update(f"{name} {version(name)}\0".encode())
+    digest.update(platform.machine().encode())
+    return digest.digest()
+
+
+def entity_tag(*parts: bytes, coding: str | None = None) -> str:
+    """Return the strong entity tag of a response that depends only on `parts`.
+
+    coding: content coding of the response, if any.
+    """
+    digest = blake2b(b"\0".join(parts), digest_size=16).hexdigest()
+    return f'"{digest}-{coding}"' if coding else f'"{digest}"'
+
+
+def matches_tag(given: str, own: str) -> bool:
+    """Return True if an If-None-Match header matches an entity tag.
+
+    The comparison is weak (RFC 9110, 13.1.2). given: the header. own: the tag.
+    """
+    if given == own:
+        return True
+    return given.strip() == "*" or own in (t.strip().removeprefix("W/") for t in given.split(","))
+
+
+def cache_control(model: str, alias_seconds: int, closed: bool) -> bytes:
+    """Return the Cache-Control of a response of a model.
+
+    model: key in the path; with a hash the response is immutable, with the name alone it stays
+    fresh for `alias_seconds`, and must be revalidated for 0. closed: the service needs credentials,
+    so only private caches may store the response.
+    """
+    whose = b"private, " if closed else PUBLIC
+    if "@" in model:
+        return whose + IMMUTABLE
+    return whose + (b"max-age=%d" % alias_seconds if alias_seconds else NO_CACHE)
+
+
+Headers = list[tuple[bytes, bytes]]
+
+ANY_ORIGIN = frozenset({b"*"})
+
+# As browsers serialise it: scheme, host in lower case, and the port unless it is the default.
+_ORIGIN = re.compile(r"https?://([a-z0-9.-]+|\[[0-9a-f:]+\])(:[0-9]{1,5})?")
+
+_EXPOSED_HEADERS = b", ".join(
+    (
+        *(b"Allow", b"Content-Disposition", b"ETag", b"Retry-After", b"WWW-Authenticate"),
+        # Tells a page that Content-Length is that of compressed content.
+        b"Content-Encoding",
+        *(b"Posefield-Duration", b"Posefield-Inferred", b"Posefield-Missed", b"Posefield-Model"),
+        *(b"Posefield-Sigma", b"Posefield-Supported", b"Posefield-Warning"),
+        b"X-Request-Id",
+    )
+)
+_ALLOWED_HEADERS = b", ".join(
+    (
+        *(b"Authorization", b"Content-Type", b"If-None-Match", b"Prefer"),
+        *(b"Traceparent", b"Tracestate", b"X-Request-Id"),
+    )
+)
+_MAX_AGE = b"7200"
+"""Lifetime of a preflight response, s; browsers accept at most two hours."""
+
+
+def parse_origins(text: str, field: str) -> frozenset[bytes]:
+    """Return the origins of a comma-separated text, `*` for all.
+
+    field: name of the setting. Raises InvalidField for an invalid origin.
+    """
+    origins = frozenset(filter(None, (part.strip() for part in text.split(","))))
+    if origins == {"*"}:
+        return ANY_ORIGIN
+    for origin in sorted(origins):
+        if not _ORIGIN.fullmatch(origin):
+            raise InvalidField(field, f"{origin!r}, expected https://host or https://host:port")
+    return frozenset(origin.encode() for origin in origins)
+
+
+def cors_headers(origin: bytes | None, allowed: frozenset[bytes]) -> Headers:
+    """Return the CORS headers of a response.
+
+    origin: header Origin of the request, if any. allowed: origins of the settings.
+    """
+    if not allowed:
+        return []
+    if allowed == ANY_ORIGIN:
+        return [(b"access-control-allow-origin", b"*"), *_EXPOSE]
+    # Caches must separate responses by origin, also those without one.
+    varying = (b"vary", b"Origin")
+    if origin not in allowed:
+        return [varying]
+    return [varying, (b"access-control-allow-origin", origin), *_EXPOSE]
+
+
+_EXPOSE = [(b"access-control-expose-headers", _EXPOSED_HEADERS)]
+
+
+def preflight_headers(allow: bytes) -> Headers:
+    """Return the headers of a preflight response, beside `cors_headers`.
+
+    allow: methods of the path.
+    """
+    return [
+        (b"access-control-allow-methods", allow),
+        (b"access-control-allow-headers", _ALLOWED_HEADERS),
+        (b"access-control-max-age", _MAX_AGE),
+    ]
+
+
+def is_preflight(given: Mapping[bytes, bytes]) -> bool:
+    """Return True if an OPTIONS request with these headers is a CORS preflight."""
+    return b"origin" in given and b"access-control-request-method" in given
+
+
+DATA_HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
+    # Concerns embedding without CORS; it does not block requests that CORS allows.
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+"""Headers of data responses."""
+
+PAGE_HEADERS = tuple(pair for pair in DATA_HEADERS if pair[0] != b"content-security-policy")
+"""Headers of HTML pages; `page_headers` returns their own Content-Security-Policy."""
+
+
+def security_headers(media_type: str | None, status: int = 200) -> tuple[tuple[bytes, bytes], ...]:
+    """Return the security headers of a response.
+
+    A 304 has no Content-Security-Policy: it would replace that of the browser's cached page, which
+    could then load nothing.
+    """
+    return PAGE_HEADERS if media_type == "text/html" or status == 304 else DATA_HEADERS
+
+
+def page_headers(script: str, style: str) -> dict[str, str]:
+    """Return the headers of an HTML page that loads nothing from other origins.
+
+    script, style: sources of a Content-Security-Policy.
+    """
+    sources = f"default-src 'none'; script-src {script}; style-src {style}; connect-src 'self'"
+    # Workers come from the page itself, which reads motion files in them.
+    workers = "worker-src blob:"
+    more = "img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'none'"
+    return {
+        "Content-Security-Policy": f"{sources}; {workers}; {more}; frame-ancestors 'none'",
+        "Referrer-Policy": "no-referrer",
+    }
 
 
 def json_document(content: Any) -> Response:
     """Return a JSON response of plain values."""
     return Response(orjson.dumps(content), media_type="application/json")
-
-
-def model_list(library: ModelRegistry) -> dict[str, Any]:
-    """Return the ModelList (schema of the contract) of a library."""
-    return {"models": [_model_summary(library.versions(name)) for name in library.models]}
-
-
-def _model_summary(versions: Sequence[Synthesizer]) -> dict[str, Any]:
-    newest = versions[0]
-    return {
-        "name": newest.name,
-        "identity": newest.identity,
-        "versions": [model.identity for model in versions],
-        "description": newest.session.card.description,
-    }
-
-
-def card_document(model: Synthesizer) -> dict[str, Any]:
-    """Return the ModelCard (schema of the contract) of a model."""
-    return {"identity": model.identity, **cards.plain_values(model.session.card)}
 
 
 def attachment(content: bytes, form: Format, model: str) -> Response:
@@ -48,15 +218,23 @@ def attachment(content: bytes, form: Format, model: str) -> Response:
 
 
 def stream(
-    pieces: AsyncIterator[bytes], form: Format, model: Synthesizer, warnings: Sequence[str]
+    pieces: Iterable[bytes],
+    form: Format,
+    name: str,
+    warnings: Sequence[str],
+    limiter: CapacityLimiter,
+    model: str | None = None,
 ) -> Response:
-    """Return a response that streams a file to download.
+    """Return a response that streams a file to download, made in threads within a limit.
 
-    warnings: sent as headers.
+    name: of the file, without extension. warnings: sent as headers. model: identity, in a header.
     """
-    headers = {**_disposition(form, model.name), "Posefield-Model": model.identity}
-    sent = StreamingResponse(pieces, headers=headers, media_type=form.media_type)
-    return _add_warnings(sent, warnings)
+    headers = _disposition(form, name)
+    if model is not None:
+        headers["Posefield-Model"] = model
+    sent = _sent(merged_chunks(pieces), limiter)
+    response = StreamingResponse(sent, headers=headers, media_type=form.media_type)
+    return _add_warnings(response, warnings)
 
 
 def _disposition(form: Format, model: str) -> dict[str, str]:
@@ -96,16 +274,6 @@ def performance_file(content: bytes, form: Format, report: PerformanceReport) ->
     return _add_warnings(made, report.warnings)
 
 
-def performance_archive(
-    pieces: AsyncIterator[bytes], form: Format, warnings: Sequence[str]
-) -> Response:
-    """Return a response that streams an archive of performances; warnings: sent as headers."""
-    headers = _disposition(form, "performances")
-    return _add_warnings(
-        StreamingResponse(pieces, headers=headers, media_type=form.media_type), warnings
-    )
-
-
 def _add_warnings(response: Response, warnings: Sequence[str]) -> Response:
     for warning in warnings:
         # A JSON string is ASCII, and its quotes protect commas, which separate joined headers.
@@ -130,11 +298,11 @@ def merged_chunks(pieces: Iterable[bytes]) -> Iterator[bytes]:
         yield b"".join(held)
 
 
-async def sent(pieces: Iterator[bytes], places: CapacityLimiter) -> AsyncIterator[bytes]:
+async def _sent(pieces: Iterator[bytes], limiter: CapacityLimiter) -> AsyncIterator[bytes]:
     """Yield the pieces, each generated in a thread after the previous one was sent.
 
     pieces: none may be empty. When the client disconnects, generation stops after the current
     piece.
     """
-    while piece := await worker_threads.run_in_thread(next, pieces, b"", places=places):
+    while piece := await worker_threads.run_in_thread(next, pieces, b"", limiter=limiter):
         yield piece

@@ -3,34 +3,38 @@
 A path that ends in `{format}` has one entry per format, so that its look-up is as fast.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from starlette.responses import Response
+
 from posefield.http import negotiation
 from posefield.http.api.contract import Operation
 from posefield.http.negotiation import Offers
-from posefield.http.steps import Handler
+
+Handler = Callable[[Any], Awaitable[Response]]
+"""Function of an operation, which answers a `request.ServiceRequest`."""
 
 
 @dataclass(frozen=True)
 class Route:
     """An operation at one path, and its handler.
 
-    format: format at the end of the path, None for a path without. offers: formats for the
+    format: format at the end of the path, empty for a path without. offers: formats for the
     negotiation by Accept; empty without negotiation.
     """
 
     operation: Operation
     handler: Handler
-    format: str | None = None
+    format: str = ""
     offers: Offers = ()
 
     @cached_property
     def path(self) -> str:
         """Path template of the contract, with the format filled in."""
-        return self.operation.path.replace("{format}", self.format or "")
+        return self.operation.path.replace("{format}", self.format)
 
     @cached_property
     def name(self) -> bytes:
@@ -47,8 +51,8 @@ class Route:
     @cached_property
     def vary(self) -> bytes:
         """Value of the Vary header: request headers that the response depends on."""
-        named = ("Accept", bool(self.offers)), ("Accept-Encoding", self.compresses)
-        return ", ".join(name for name, heeded in named if heeded).encode()
+        headers = ("Accept", bool(self.offers)), ("Accept-Encoding", self.compresses)
+        return ", ".join(name for name, matters in headers if matters).encode()
 
 
 @dataclass(frozen=True)
@@ -67,22 +71,21 @@ class PathRoutes:
 class _TreeNode:
     """Node of the tree.
 
-    fixed: children by segment. any: child of a path parameter, and `name` the parameter's name.
-    place: routes of the path that ends here.
+    fixed: children by segment. parameter: child of a path parameter, and `name` the parameter's
+    name. routes: of the path that ends here.
     """
 
     fixed: dict[str, "_TreeNode"] = field(default_factory=dict)
-    any: "_TreeNode | None" = None
+    parameter: "_TreeNode | None" = None
     name: str = ""
-    place: PathRoutes | None = None
+    routes: PathRoutes | None = None
 
 
 class RouteTree:
-    """Routing table: places by path."""
+    """Routing table. paths: routes of each path."""
 
     def __init__(self, routes: Iterable[Route]) -> None:
         self._root = _TreeNode()
-        self.places: list[PathRoutes] = []
         by_path: dict[str, dict[str, Route]] = {}
         self._formats: dict[str, dict[str, None]] = {}
         for route in routes:
@@ -90,49 +93,44 @@ class RouteTree:
             if route.format:
                 stem = route.path.removesuffix(f".{route.format}")
                 self._formats.setdefault(stem, {})[route.format] = None
-        for path, own in by_path.items():
-            self._add(_path_routes(path, own))
-
-    def _add(self, place: PathRoutes) -> None:
-        branch = self._root
-        for part in place.template.split("/"):
-            branch = _child_node(branch, part)
-        branch.place = place
-        self.places.append(place)
+        self.paths = [_path_routes(*item) for item in by_path.items()]
+        for path in self.paths:
+            node = self._root
+            for segment in path.template.split("/"):
+                node = _child_node(node, segment)
+            node.routes = path
 
     def find(self, path: str) -> tuple[PathRoutes, dict[str, str]] | None:
-        """Return the place of a path and its non-empty path parameters; None if unknown."""
-        branch, values = self._root, {}
-        for part in path.split("/"):
-            known = branch.fixed.get(part)
-            if known is None and part and branch.any is not None:
-                values[branch.name] = part
-                known = branch.any
-            if known is None:
+        """Return the routes of a path and its non-empty path parameters; None if unknown."""
+        node, values = self._root, {}
+        for segment in path.split("/"):
+            child = node.fixed.get(segment)
+            if child is None and segment and node.parameter is not None:
+                values[node.name] = segment
+                child = node.parameter
+            if child is None:
                 return None
-            branch = known
-        return (branch.place, values) if branch.place else None
+            node = child
+        return (node.routes, values) if node.routes else None
 
     def other_formats(self, path: str) -> tuple[str, Iterable[str]] | None:
         """Return the unknown format that a path ends in and the known formats of that path."""
-        asked = path.rpartition("/")[2].partition(".")[2]
-        found = self.find(path.removesuffix(f".{asked}"))
+        unknown = path.rpartition("/")[2].partition(".")[2]
+        found = self.find(path.removesuffix(f".{unknown}"))
         known = self._formats.get(found[0].template) if found else None
-        return (asked, known) if asked and known else None
+        return (unknown, known) if unknown and known else None
 
 
-def _child_node(branch: _TreeNode, part: str) -> _TreeNode:
-    if not part.startswith("{"):
-        return branch.fixed.setdefault(part, _TreeNode())
-    if branch.any is None:
-        branch.any, branch.name = _TreeNode(), part.strip("{}")
-    if branch.name != part.strip("{}"):
-        raise ValueError(f"{part} and {{{branch.name}}} at one place of the contract's paths")
-    return branch.any
+def _child_node(node: _TreeNode, segment: str) -> _TreeNode:
+    if not segment.startswith("{"):
+        return node.fixed.setdefault(segment, _TreeNode())
+    if node.parameter is None:
+        node.parameter, node.name = _TreeNode(), segment.strip("{}")
+    if node.name != segment.strip("{}"):
+        raise ValueError(f"{segment} and {{{node.name}}} at one place of the contract's paths")
+    return node.parameter
 
 
 def _path_routes(path: str, routes: dict[str, Route]) -> PathRoutes:
-    own: dict[str, Any] = dict(routes)
-    if "GET" in own:
-        own["HEAD"] = own["GET"]
-    return PathRoutes(path, own, ", ".join(sorted({*own, "OPTIONS"})))
+    methods = {**routes, "HEAD": routes["GET"]} if "GET" in routes else routes
+    return PathRoutes(path, methods, ", ".join(sorted({*methods, "OPTIONS"})))

@@ -36,9 +36,10 @@ from posefield.common.cancellation import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
 from posefield.http import metrics, telemetry, worker_threads
 from posefield.http.api.settings import Settings
-from posefield.http.app import App, create_app
+from posefield.http.app import create_app
 from posefield.http.readiness import Readiness
-from posefield.http.request_cycle import ServerState
+from posefield.http.request import Service
+from posefield.http.request_cycle import App
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry.model_registry import ReloadingRegistry, VersionLimits
 
@@ -126,12 +127,11 @@ class StartAnnouncement:
 
 @asynccontextmanager
 async def lifespan(
-    site: ServerState, shelf: ReloadingRegistry, announcement: StartAnnouncement
+    service: Service, shelf: ReloadingRegistry, announcement: StartAnnouncement
 ) -> AsyncIterator[None]:
     """Run the reload of models, the heartbeat and the SIGTERM handler during the server's life."""
-    service = site.service
     _drain_on_sigterm(service.readiness, service.settings.drain)
-    beat = asyncio.create_task(_heartbeat(site, service.settings.unresponsive))
+    beat = asyncio.create_task(_heartbeat(service, service.settings.unresponsive))
     with shelf.watch(service.settings.reload):
         announcement.write()
         yield
@@ -142,7 +142,7 @@ async def lifespan(
     faulthandler.dump_traceback_later(FORCED_EXIT_DELAY, exit=True)
 
 
-async def _heartbeat(site: ServerState, unresponsive: int) -> None:
+async def _heartbeat(service: Service, unresponsive: int) -> None:
     """Reset the watchdog, update the gauge of open requests and check the parent, once a second.
 
     A blocked event loop does not reset the watchdog, a C thread that does not need the GIL. After
@@ -154,7 +154,7 @@ async def _heartbeat(site: ServerState, unresponsive: int) -> None:
     while True:
         if unresponsive:
             faulthandler.dump_traceback_later(unresponsive, exit=True)
-        metrics.set_open_requests(site.open)
+        metrics.set_open_requests(service.open)
         if parent is not None and not parent.is_alive():
             signal.raise_signal(signal.SIGTERM)
             return

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import orjson
 
-from posefield.http import header_fields
+from posefield.http import responses
 from posefield.http.api import contract
 from posefield.http.api.contract import Contract
 
@@ -84,7 +84,7 @@ def headers(content: bytes) -> dict[str, str]:
         digest = b64encode(sha256(text).digest()).decode()
         hashes[tag.decode()].append(f"'sha256-{digest}'")
     script, style = (" ".join(hashes[tag]) or NO_SOURCE for tag in hashes)
-    return header_fields.page_headers(script, style)
+    return responses.page_headers(script, style)
 
 
 _INLINE = re.compile(rb"<(script|style)\b[^>]*>(.*?)</\1>", re.DOTALL)

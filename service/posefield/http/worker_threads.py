@@ -43,14 +43,14 @@ _UNBOUNDED = CapacityLimiter(math.inf)
 async def run_in_thread(
     work: Callable[[*Arguments], Result],
     *arguments: *Arguments,
-    places: CapacityLimiter = SYNTHESIS_LIMITER,
+    limiter: CapacityLimiter = SYNTHESIS_LIMITER,
 ) -> Result:
-    """Call `work` in a thread within the limit `places`, and return its result.
+    """Call `work` in a thread within a limit, and return its result.
 
     If the awaiting task is cancelled, the work is asked to stop (`posefield.common.cancellation`),
     and counts against the limit until it has stopped.
     """
-    async with places:
+    async with limiter:
         return await within(work, *arguments)
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.common.errors import FormError
-from posefield.http import steps
+from posefield.http.request import query_pairs
 from posefield.question import json_decoding, text_decoding
 from posefield.question.model_question import SigmaQuestion, WhyQuestion
 from posefield.question.motion_question import FileQuestion, PoseQuestion
@@ -49,7 +49,7 @@ def test_bytes_that_are_no_question_are_refused(content):
 @given(st.text(alphabet="ab&=;%+2f é", max_size=24))
 def test_a_query_is_read_as_the_standard_library_reads_it(text):
     raw = text.encode()
-    assert steps.query_pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)
+    assert query_pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)
 
 
 PAIRS = [("turn", "20"), ("stature", "1.7")]

@@ -10,7 +10,7 @@ from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd_crowd import crowd_writer
-from posefield.http import clip_operations, crowd_operations
+from posefield.http import archive_operations, crowd_operations
 from posefield.http.api.settings import Settings
 from posefield.locomotion import gait, walking_crowd
 from posefield.locomotion.walking_crowd import CrowdOrder
@@ -76,9 +76,7 @@ def suggested(model, walk):
 def archived(model, walk):
     """An archive of clips."""
     asked = {"format": "usdc", "clips": [{"controls": controls(model)}] * 20}
-    found = clip_operations.decode_order(
-        model, CLIP_ENCODERS, json.dumps(asked).encode(), Settings()
-    )
+    found = archive_operations.clip_order(model, json.dumps(asked).encode(), Settings())
     return list(clip_archive.archive_members(found))
 
 

@@ -5,13 +5,13 @@ import re
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.http import header_fields
+from posefield.http import responses
 
-ALLOWED = header_fields.parse_origins("https://a.example, http://localhost:5173", "ORIGINS")
+ALLOWED = responses.parse_origins("https://a.example, http://localhost:5173", "ORIGINS")
 
 
 def test_an_origin_is_allowed_by_its_very_name():
-    given = dict(header_fields.cors_headers(b"https://a.example", ALLOWED))
+    given = dict(responses.cors_headers(b"https://a.example", ALLOWED))
     assert given[b"access-control-allow-origin"] == b"https://a.example"
     assert given[b"vary"] == b"Origin"
     shown = given[b"access-control-expose-headers"].split(b", ")
@@ -30,14 +30,14 @@ def test_an_origin_is_allowed_by_its_very_name():
     ],
 )
 def test_every_other_is_not_but_caches_are_told(origin):
-    assert header_fields.cors_headers(origin, ALLOWED) == [(b"vary", b"Origin")]
+    assert responses.cors_headers(origin, ALLOWED) == [(b"vary", b"Origin")]
 
 
 def test_credentials_of_browsers_are_never_allowed():
-    for allowed in (ALLOWED, header_fields.ANY_ORIGIN):
+    for allowed in (ALLOWED, responses.ANY_ORIGIN):
         for pair in (
-            *header_fields.cors_headers(b"https://a.example", allowed),
-            *header_fields.preflight_headers(b"GET"),
+            *responses.cors_headers(b"https://a.example", allowed),
+            *responses.preflight_headers(b"GET"),
         ):
             assert b"credentials" not in pair[0]
 
@@ -47,4 +47,4 @@ def test_credentials_of_browsers_are_never_allowed():
 )
 def test_what_is_no_origin_is_refused(text):
     with pytest.raises(InvalidField, match=re.escape("ORIGINS: ")):
-        header_fields.parse_origins(text, "ORIGINS")
+        responses.parse_origins(text, "ORIGINS")

@@ -5,9 +5,8 @@ import asyncio
 import pytest
 from starlette.requests import Request
 
-from posefield.http import steps
 from posefield.http.api.problems import RequestError
-from posefield.http.steps import FREE_BYTES, BodyMemory
+from posefield.http.request import FREE_BYTES, BodyMemory, read_body
 
 LIMIT = 4 * FREE_BYTES
 
@@ -29,7 +28,7 @@ def request(*chunks, **headers):
 
 
 def read(asked, memory=None):
-    return asyncio.run(steps.read_body(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
+    return asyncio.run(read_body(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
 
 
 def refused(asked, memory=None):

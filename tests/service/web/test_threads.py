@@ -73,9 +73,9 @@ def test_cancelled_work_stops_and_leaves_nothing_in_the_log_unless_it_fails(kind
 def test_a_place_is_held_until_work_that_does_not_look_has_ended(times):
     async def scene():
         places, work, next_one = CapacityLimiter(1), Work(looks=False, seconds=0.3), Work()
-        task = asyncio.create_task(worker_threads.run_in_thread(work, places=places))
+        task = asyncio.create_task(worker_threads.run_in_thread(work, limiter=places))
         await begun(work)
-        waiting = asyncio.create_task(worker_threads.run_in_thread(next_one, places=places))
+        waiting = asyncio.create_task(worker_threads.run_in_thread(next_one, limiter=places))
         for _ in range(times):
             task.cancel()
             await asyncio.sleep(0.01)

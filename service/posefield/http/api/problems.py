@@ -69,7 +69,7 @@ UNKNOWN_HOST = ProblemKind(421, "unknown-host", "The service does not answer und
 HEAD_TOO_LARGE = ProblemKind(431, "head-too-large", "The request's head is too large")
 
 HEAD_PROBLEMS = (UNKNOWN_HOST, URL_TOO_LONG, HEAD_TOO_LARGE)
-"""Kinds raised before routing; see service/posefield/http/header_fields.py."""
+"""Kinds raised before routing; see `request.HeadLimits`."""
 LOAD_PROBLEMS = (OVERLOADED, DEADLINE_EXCEEDED, NOT_READY)
 REQUEST_PROBLEMS = (
     BAD_PARAMETER,
