@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+import posefield_train
 from posefield.common.units import Floats
-from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.sample import sample_files
-from posefield_train.source import ingest, recipe
+from posefield_train.source import recipe
 from posefield_train.source.ingest import Example
 
 
@@ -59,9 +59,8 @@ def make(folder: Path) -> Family:
     start = time.perf_counter()
     with threadpool_limits(limits=1):
         own = recipe.read(path)
-        examples, notes = ingest.ingest(own, path.parent)
-        trained = train.train(own, examples, lambda _: None)
-        exported = onnx_export.export_model(own, trained, notes)
+        trained = posefield_train.train(own, path.parent)
+        exported = onnx_export.export_model(trained)
     return of(trained, exported, time.perf_counter() - start)
 
 

@@ -23,7 +23,7 @@ from posefield_train.families.found_families import FamilyRow
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.train import train
+from posefield_train.training import train_examples
 
 RESULTS = Path(__file__).resolve().parents[1] / "docs/results"
 ACTIONS = ("grabHighR", "depositFloorR", "kickLFront1Reps")
@@ -86,7 +86,7 @@ def _errors(
     told: Recipe, rest: Sequence[Example], held: Sequence[Example]
 ) -> list[tuple[float, float]]:
     """Return the relative mean and the absolute root mean square of each held-out clip, m."""
-    trained = train(told, rest, lambda _: None)
+    trained = train_examples(told, rest)
     asked = Queries(np.stack([one.controls for one in held]), [{}] * len(held))
     made = predictions.predict_posefield(told, trained, asked)
     found = []

@@ -22,6 +22,7 @@ import numpy as np
 from evaluation import ground_truth
 from rows import Row, record, table
 
+import posefield_train
 from posefield.common.units import Floats
 from posefield_train.evaluate import motion_errors, predictions
 from posefield_train.evaluate.motion_errors import ComparedMotion
@@ -32,8 +33,7 @@ from posefield_train.jobs import single_threaded
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.sample import sample_family, sample_files
 from posefield_train.sample.sample_controls import parse_controls
-from posefield_train.source import ingest, recipe
-from posefield_train.train import train
+from posefield_train.source import recipe
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build/scale"
@@ -52,9 +52,8 @@ def measure(clips: int) -> dict[str, Any]:
     file = sample_files.write_family(place, sample_family.samples(clips))
     before, start = _cpu(), time.perf_counter()
     own = recipe.read(file)
-    examples, notes = ingest.ingest(own, file.parent)
-    trained = train(own, examples, lambda _: None)
-    exported = onnx_export.export_model(own, trained, notes)
+    trained = posefield_train.train(own, file.parent)
+    exported = onnx_export.export_model(trained)
     spent, wall = _cpu() - before, time.perf_counter() - start
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     used = use(exported.content) if clips == USED else {}

@@ -11,8 +11,9 @@ import fixture_cache
 import numpy as np
 from families import face_files, sample_walk
 
+import posefield_train
 from posefield.common.units import Floats
-from posefield_train import train
+from posefield_train import training
 from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
@@ -119,7 +120,7 @@ def trained(model: str) -> TrainedModel:
     """Return a small model, trained."""
     return fixture_cache.value(
         f"{model}-trained",
-        lambda: train.train(RECIPES[model](), examples(model), lambda _: None),
+        lambda: training.train_examples(RECIPES[model](), examples(model)),
     )
 
 
@@ -127,7 +128,7 @@ def trained(model: str) -> TrainedModel:
 def exported(model: str) -> ExportedModel:
     """Return a small model with its levels of detail and the content of its file."""
     return fixture_cache.value(
-        f"{model}-exported", lambda: onnx_export.export_model(RECIPES[model](), trained(model), [])
+        f"{model}-exported", lambda: onnx_export.export_model(trained(model))
     )
 
 
@@ -136,9 +137,8 @@ def captured(name: str, data: Path) -> tuple[Recipe, TrainedModel, ExportedModel
     own = recipe.read(data_folder.RECIPES / f"{name}.toml")
 
     def build() -> tuple[TrainedModel, ExportedModel]:
-        found, notes = ingest.ingest(own, data)
-        made = train.train(own, found, lambda _: None)
-        return made, onnx_export.export_model(own, made, notes)
+        made = posefield_train.train(own, data)
+        return made, onnx_export.export_model(made)
 
     place = zlib.crc32(str(data.resolve()).encode())
     return own, *fixture_cache.value(f"{name}-{place}", build)

@@ -14,13 +14,13 @@ import sys
 from pathlib import Path
 import fixture_models
 from families import sample_walk
-from posefield_train import train
+from posefield_train import training
 from posefield_train.graph import onnx_export
 from posefield_train.source import ingest
 
 own = sample_walk.recipe()
 found, _ = ingest.ingest(own, sample_walk.write_walk(Path(sys.argv[1])))
-onnx_export.export_model(own, train.train(own, found, lambda _: None), [])
+onnx_export.export_model(training.train_examples(own, found))
 for module in list(sys.modules.values()):
     file = getattr(module, "__file__", None) or ""
     if file.startswith(sys.argv[2]) and "/.venv" not in file:

@@ -20,7 +20,7 @@ from posefield_train.report.significant_digits import round_number
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import PERFORMER
-from posefield_train.train import train
+from posefield_train.training import train_examples
 
 MIN_OTHER_TAKES = 3
 """Fewest other takes of the performer for which a clip is predicted."""
@@ -43,7 +43,7 @@ def predict_unnamed(
     alone = [name for name in recipe.kriging.label if name != PERFORMER]
     kriging = recipe.kriging.model_copy(update={"label": alone})
     plain = recipe.model_copy(update={"kriging": kriging})
-    untold = train(plain, shown, lambda _: None)
+    untold = train_examples(plain, shown)
     return {
         NO_PERFORMER: predictions.predict_posefield(plain, untold, unnamed),
         ASKED_OPEN: predictions.predict_posefield(recipe, trained, unnamed),

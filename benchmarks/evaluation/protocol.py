@@ -31,7 +31,7 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import Jobs, single_threaded
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.train import train
+from posefield_train.training import train_examples
 
 TRUTH = "truth"
 BATCH = 50
@@ -101,7 +101,7 @@ def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str)
     rest, held = fold.split(examples)
     methods.check_lines(rest, tuple(control.name for control in recipe.controls))
     trained = protocol.train_fold(recipe, examples, fold)
-    file = onnx_export.export_finest(recipe, trained.trained)
+    file = onnx_export.export_finest(trained.trained)
     # Methods that only one protocol has.
     if name == "clip":
         more: dict[str, Any] = new_performers.predict_unnamed(
@@ -152,8 +152,8 @@ def run_against_truth(
 ) -> Result:
     """Return the result at control points (C, d) of the procedural family."""
     methods.check_lines(list(examples), tuple(control.name for control in recipe.controls))
-    trained = train(recipe, examples, lambda _: None)
-    file = onnx_export.export_finest(recipe, trained)
+    trained = train_examples(recipe, examples)
+    file = onnx_export.export_finest(trained)
     batches = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
     run_jobs = jobs.run(_run_truth_batch, batches, (recipe, trained, file))
     parts = list(protocol.with_progress(run_jobs, len(batches), report))

@@ -25,10 +25,9 @@ import pickle
 from dataclasses import is_dataclass
 from functools import cache
 from importlib.metadata import version
+from importlib.resources import files
 from pathlib import Path
 
-import posefield
-import posefield_train
 from posefield.common import atomic_files
 from posefield.common.errors import FileError
 
@@ -154,6 +153,7 @@ def connect(address: str) -> Iterator[DaskJobs]:
 
 
 SUFFIX = ".result"
+PACKAGES = ("posefield", "posefield_train")
 ARRAY_MAKERS = ("_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype")
 CHECKSUM_BYTES = hashlib.sha256().digest_size
 
@@ -177,9 +177,9 @@ class FinishedJobs:
         """
         common = joblib.hash((code_key(), f"{function.__module__}.{function.__name__}", shared))
         listed = list(arguments)
-        files = [self.folder / f"{joblib.hash((common, own))}{SUFFIX}" for own in listed]
+        paths = [self.folder / f"{joblib.hash((common, own))}{SUFFIX}" for own in listed]
         left = []
-        for number, file in enumerate(files):
+        for number, file in enumerate(paths):
             kept = read_result(file)
             if kept:
                 yield kept[0]
@@ -187,7 +187,7 @@ class FinishedJobs:
                 left.append((number, listed[number]))
         for number, result in self.jobs.run(_numbered_result, left, (function, shared)):
             content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
-            atomic_files.write(hashlib.sha256(content).digest() + content, files[number])
+            atomic_files.write(hashlib.sha256(content).digest() + content, paths[number])
             yield result
 
 
@@ -222,7 +222,7 @@ class _DataUnpickler(pickle.Unpickler):
         package = module.partition(".")[0]
         if package == "numpy" and name in ARRAY_MAKERS:
             return super().find_class(module, name)
-        if package in (posefield.__name__, posefield_train.__name__):
+        if package in PACKAGES:
             found = super().find_class(module, name)
             if isinstance(found, type) and is_dataclass(found):
                 return found
@@ -233,10 +233,10 @@ class _DataUnpickler(pickle.Unpickler):
 def code_key() -> str:
     """Return a key over the sources of both packages and the versions of the libraries."""
     found = hashlib.sha256()
-    for package in (posefield, posefield_train):
-        (place,) = package.__path__
-        for file in sorted(Path(place).rglob("*.py")):
-            found.update(file.relative_to(place).as_posix().encode())
+    for package in PACKAGES:
+        folder = Path(str(files(package)))
+        for file in sorted(folder.rglob("*.py")):
+            found.update(file.relative_to(folder).as_posix().encode())
             found.update(hashlib.sha256(file.read_bytes()).digest())
     for name in LIBRARIES:
         found.update(f"{name} {version(name)}".encode())

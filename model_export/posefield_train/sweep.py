@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from posefield.common.errors import InvalidField, TrainingError
-from posefield_train import train
+from posefield_train import training
 from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.jobs import Jobs, single_threaded
@@ -39,11 +39,13 @@ def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterat
     )
 
 
-def _train_model(name: str, own: Recipe, examples: list[Example], notes: list[str]) -> SweepResult:
-    with single_threaded():
-        try:
-            ingest.check_presets(own, examples)
-            trained = train.train(own, examples, lambda _: None)
-            return SweepResult(name, onnx_export.export_model(own, trained, notes))
-        except TrainingError as error:
-            return SweepResult(name, error)
+@single_threaded()
+def _train_model(
+    name: str, recipe: Recipe, examples: list[Example], notes: list[str]
+) -> SweepResult:
+    try:
+        ingest.check_presets(recipe, examples)
+        trained = training.train_examples(recipe, examples, notes=notes)
+        return SweepResult(name, onnx_export.export_model(trained))
+    except TrainingError as error:
+        return SweepResult(name, error)

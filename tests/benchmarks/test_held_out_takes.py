@@ -9,7 +9,7 @@ from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield_train.evaluate.protocol import Fold
 from posefield_train.graph import onnx_export
-from posefield_train.train import train
+from posefield_train.training import train_examples
 
 HELD = (0, 1, 2)
 
@@ -19,7 +19,7 @@ def file(strides):
     """A model of the strides but three."""
     rest, _ = Fold(HELD).split(strides)
     recipe = sample_walk.recipe()
-    return onnx_export.export_finest(recipe, train(recipe, rest, lambda _: None))
+    return onnx_export.export_finest(train_examples(recipe, rest))
 
 
 @pytest.fixture(scope="module")

@@ -8,15 +8,15 @@ from pathlib import Path
 import environment
 from families import quadruped_walk, sample_walk
 
+import posefield_train
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files
-from posefield_train.source import ingest, recipe
+from posefield_train.source import recipe
 from posefield_train.source.recipe import Recipe
 
 ROOT = environment.ROOT
@@ -86,8 +86,7 @@ def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
 
 
 def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
-    examples, notes = ingest.ingest(own, data)
-    exported = onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes)
+    exported = onnx_export.export_model(posefield_train.train(own, data))
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))
     return model, exported.content
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from families import sample_walk
 
+import posefield_train
 from posefield.common.errors import TrainingError
 from posefield.motion import quat
-from posefield_train import train
+from posefield_train import training
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.evaluate import motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
@@ -28,7 +29,7 @@ def recipe():
 @pytest.fixture(scope="module")
 def trained(recipe, tmp_path_factory):
     folder = newcomers.write(tmp_path_factory.mktemp("family") / "small")
-    return train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
+    return posefield_train.train(recipe, folder)
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +177,7 @@ def walkers(strides):
     named = [
         replace(e, row=replace(e.row, performer="ab"[i % 2])) for i, e in enumerate(strides[3:])
     ]
-    trained = train.train(recipe, named, lambda _: None)
+    trained = training.train_examples(recipe, named)
     return recipe, trained, strides[:3]
 
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import posefield_train
 from posefield import cli
 from posefield.inference import session
 from posefield.model_file import checked_file
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
 from posefield_train.cli import commands
 from posefield_train.graph import onnx_export
-from posefield_train.source import canonical, ingest
+from posefield_train.source import canonical
 
 SHOWN = (2.0, 7.0, 12.5)
 SAID = ("--performer", "cy", "--unit", "1", "--up", "y", "--licence", "CC0-1.0")
@@ -30,9 +30,9 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def base(folder):
     recipe = newcomers.recipe()
-    trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
+    trained = posefield_train.train(recipe, folder)
     path = folder / "small.onnx"
-    path.write_bytes(onnx_export.export_model(recipe, trained, []).content)
+    posefield_train.export(trained, path)
     return path
 
 

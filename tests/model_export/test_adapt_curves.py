@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from families import face_motion
 
+import posefield_train
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.align import phase_alignment
-from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points
-from posefield_train.source import ingest
 
 SHOWN = [(0.2, 0.3), (0.5, 0.8), (0.85, 0.4)]
 ASKED = {"smile": 0.6, "openness": 0.5}
@@ -39,13 +37,13 @@ def alone(request):
 @pytest.fixture(scope="module")
 def trained(folder, alone):
     recipe = expressions.recipe(alone)
-    return train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
+    return posefield_train.train(recipe, folder)
 
 
 @pytest.fixture(scope="module")
 def base(trained, alone, tmp_path_factory):
     path = tmp_path_factory.mktemp("base") / "faces.onnx"
-    path.write_bytes(onnx_export.export_model(expressions.recipe(alone), trained, []).content)
+    posefield_train.export(trained, path)
     return path
 
 

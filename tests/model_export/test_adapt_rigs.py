@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from families import quadruped_walk
 
+import posefield_train
 from posefield.common.units import UP
 from posefield.motion import bvh_writer, quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train import train
 from posefield_train.adapt import model_reconstruction, new_clips
-from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files
 from posefield_train.source import ingest, motion_readers, recipe
 
@@ -24,10 +23,9 @@ def family(tmp_path_factory):
     """Recipe, examples and model file of the quadruped, whose files face -x."""
     folder = tmp_path_factory.mktemp("family") / "quadruped"
     own = recipe.read(sample_files.write_folder(folder, quadruped_walk.files()))
-    examples, notes = ingest.ingest(own, folder)
-    exported = onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes)
-    (folder / "model.onnx").write_bytes(exported.content)
-    return own, examples, folder / "model.onnx"
+    trained = posefield_train.train(own, folder)
+    posefield_train.export(trained, folder / "model.onnx")
+    return own, trained.examples, folder / "model.onnx"
 
 
 def below_a_dummy(clip):

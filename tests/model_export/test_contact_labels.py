@@ -12,7 +12,7 @@ from posefield.common.errors import RecipeError
 from posefield.inference import session
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.motion import bvh_writer
-from posefield_train import train
+from posefield_train import training
 from posefield_train.contacts import contact_labels, contact_model
 from posefield_train.contacts.contact_model import FRAMES, SHARES, HeldOutClips
 from posefield_train.evaluate import protocol, summary
@@ -80,7 +80,7 @@ def test_contacts_of_the_table_stand_for_detected_ones(rail):
         left, _, hand = clip.contacts[:-1].T
         assert np.array_equal(hand, (frames >= 9.5) & (frames <= 19.5))
         assert np.array_equal(left, (frames <= 5.5) | (frames >= 29.5))
-    trained = train.train(own, examples, lambda _: None)
+    trained = training.train_examples(own, examples)
     names = trained.skeleton.names
     found = [names[one.joint] for one in trained.contacts.statistics]
     assert found == ["LeftFoot", "RightFoot", RAIL]

@@ -16,7 +16,7 @@ from posefield_train.evaluate.protocol import Fold
 from posefield_train.jobs import ProcessJobs
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
-from posefield_train.train import train
+from posefield_train.training import train_examples
 
 CLIPS = 12
 # In this process: starting others takes longer, and test_eval_cluster does.
@@ -111,7 +111,7 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
     )
 
     def errors(examples):
-        trained = train(recipe, examples, lambda _: None)
+        trained = train_examples(recipe, examples)
         motions = predictions.predict(recipe, trained, queries).motions
         return {
             name: motion_errors.compare_motions(made, captured, (joint,)).relative.mean

@@ -62,7 +62,7 @@ def test_the_core_blends_two_predictions_by_the_weights(blended):
 
 
 def test_the_graph_and_the_service_read_the_same_blend(blended, small_recipe, exported):
-    made = onnx_export.export_model(small_recipe, blended, [])
+    made = onnx_export.export_model(blended)
     assert made.parity < 1e-5, "of the joints, at random inputs of all levels"
     finest, *coarse = made.card.levels
     assert finest.event == 5 and {level.event for level in coarse} == {0}

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from minimal import SKELETON, ingested, recipe_with, write_clips
 
+import posefield_train
 from posefield.common.errors import RecipeError
 from posefield.motion import quat
 from posefield.motion.clip import assemble
 from posefield.motion.measures import Measure
-from posefield_train import train
+from posefield_train import training
 from posefield_train.adapt import model_reconstruction, new_clips
 from posefield_train.graph import onnx_export
-from posefield_train.source import ingest
 from posefield_train.tensor import truncation_error
 
 FRAMES, HAND = 41, SKELETON.names.index("LeftHand")
@@ -43,12 +43,12 @@ def read(tmp_path):
 def test_the_highest_place_is_a_landmark_that_is_aligned(read):
     recipe, examples = read(LIFTED, **EVENT)
     assert [example.landmarks[0] for example in examples] == pytest.approx(PEAKS)
-    trained = train.train(recipe, examples, lambda _: None)
+    trained = training.train_examples(recipe, examples)
     moment = truncation_error.event_frame(recipe, trained.examples)
     assert (moment.joint, moment.frame) == (HAND, round(19 * np.mean(PEAKS)))
     heights = trained.aligned.rotations[:, :, 3, 3]
     assert np.abs(np.argmax(heights, axis=1) - moment.frame).max() <= 1
-    card = onnx_export.export_model(recipe, trained, []).card
+    card = onnx_export.export_model(trained).card
     assert card.making.landmarks == {"highest": pytest.approx(np.mean(PEAKS), abs=1e-6)}
     assert card.event.share == pytest.approx(np.mean(PEAKS), abs=1e-4)
 
@@ -75,9 +75,8 @@ def test_a_new_performers_clips_are_aligned_by_the_same_moment(read, tmp_path):
     rows = [f"{i}.bvh,{i},{'ab'[i % 2]}" for i in range(8)]
     write_clips(tmp_path, clips)
     (tmp_path / "clips.csv").write_text("\n".join(["file,v,who", *rows]) + "\n")
-    examples, notes = ingest.ingest(recipe, tmp_path)
-    trained = train.train(recipe, examples, lambda _: None)
-    content = onnx_export.export_model(recipe, trained, notes).content
+    trained = posefield_train.train(recipe, tmp_path)
+    content = onnx_export.export_model(trained).content
     reopened = model_reconstruction.reconstruct(content, "a model")
     (tmp_path / "new").mkdir()
     write_clips(tmp_path / "new", [raised(0.6, 0.9)])

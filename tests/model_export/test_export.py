@@ -13,14 +13,14 @@ import onnx
 import onnxruntime
 import pytest
 
+import posefield_train
+from posefield import load
 from posefield.common.errors import ExportRefused
 from posefield.inference import session
 from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.motion import quat
-from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.graph.float_model import ModelOutputs
-from posefield_train.source import ingest, recipe
 
 # The gate's figure, m: float32 against float64.
 GATE = 1e-4
@@ -79,9 +79,18 @@ def asked(exported, opened):
 
 
 def made_in_this_process(path, folder):
-    own = recipe.read(path)
-    examples, notes = ingest.ingest(own, folder)
-    return onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes).content
+    recipe = posefield_train.read_recipe(path)
+    return onnx_export.export_model(posefield_train.train(recipe, folder)).content
+
+
+def test_a_model_is_trained_and_opened_in_python(quick_recipe, reaching_folder, tmp_path):
+    recipe = posefield_train.read_recipe(quick_recipe)
+    model = posefield_train.train(recipe, str(reaching_folder))
+    exported = posefield_train.export(model, tmp_path / "quick.onnx")
+    clip = load(tmp_path / "quick.onnx").clip(turn=20)
+    assert clip.clip.skeleton.names == exported.card.skeleton.names and clip.trust.sigma > 0.0
+    with pytest.raises(AttributeError, match="no attribute 'learn'"):
+        posefield_train.learn(recipe)
 
 
 @pytest.mark.system

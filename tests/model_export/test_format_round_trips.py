@@ -7,7 +7,7 @@ import pytest
 from exported_clips import FORMATS, encoded
 from fixture_models import RECIPES, strides_folder
 
-from posefield_train import train
+from posefield_train import training
 from posefield_train.source import ingest, motion_file, motion_readers
 
 SAME = 1e-5
@@ -62,7 +62,7 @@ def models(tmp_path_factory):
         table = (source / "strides.csv").read_text().replace(".bvh", f".{ending}")
         (folder / "strides.csv").write_text(table)
         examples, _ = ingest.ingest(recipe, folder)
-        found[ending] = train.train(recipe, examples, lambda _: None)
+        found[ending] = training.train_examples(recipe, examples)
     return found
 
 

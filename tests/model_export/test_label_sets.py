@@ -10,7 +10,7 @@ from scipy.optimize import check_grad
 
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
-from posefield_train import train
+from posefield_train import training
 from posefield_train.kriging import sample_points, thinning, universal_kriging
 from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.kriging_graph import COVARIANCES
@@ -174,7 +174,9 @@ def left_out_error(labels, examples):
     """Leave-one-out error, m, of a model that knows some label sets."""
     recipe = sample_walk.styled_recipe()
     kriging = recipe.kriging.model_copy(update={"label": labels})
-    made = train.train(recipe.model_copy(update={"kriging": kriging}), examples, lambda _: None)
+    made = training.train_examples(
+        recipe.model_copy(update={"kriging": kriging}), examples, lambda _: None
+    )
     return float(np.sqrt(made.left_out_errors.mean()))
 
 

@@ -9,10 +9,10 @@ from families import sample_walk
 from minimal import SKELETON, plain_recipe, recipe_with, small_clip, write_clips
 from test_phase import cycle
 
+import posefield_train
 from posefield.model_file import checked_file, model_card
 from posefield.motion import measures
 from posefield.motion.measures import Measure, MeasuredMotion
-from posefield_train import train
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
 from posefield_train.source import ingest, measured_controls
@@ -158,9 +158,8 @@ def test_a_cycle_begun_elsewhere_is_measured_from_there():
 @pytest.fixture(scope="module")
 def made(strides):
     own = auto_recipe(*AUTO[:2])
-    found, notes = ingest.ingest(own, strides)
-    trained = train.train(own, found, lambda _: None)
-    return own, trained, onnx_export.export_model(own, trained, notes).card
+    trained = posefield_train.train(own, strides)
+    return own, trained, onnx_export.export_model(trained).card
 
 
 def test_a_models_examples_are_what_is_measured_of_its_clips(made):

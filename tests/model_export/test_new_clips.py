@@ -6,9 +6,9 @@ import newcomers
 import numpy as np
 import pytest
 
+import posefield_train
 from posefield.common.errors import RecipeError
 from posefield.motion.measures import Measure
-from posefield_train import train
 from posefield_train.adapt import model_reconstruction, new_clips
 from posefield_train.graph import onnx_export
 from posefield_train.source import ingest
@@ -22,10 +22,8 @@ METRES = Source(metres_per_unit=1.0, up="y")
 def reopened(tmp_path_factory):
     folder = newcomers.write(tmp_path_factory.mktemp("family") / "small")
     recipe = newcomers.recipe()
-    trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
-    return model_reconstruction.reconstruct(
-        onnx_export.export_model(recipe, trained, []).content, "small.onnx"
-    )
+    trained = posefield_train.train(recipe, folder)
+    return model_reconstruction.reconstruct(onnx_export.export_model(trained).content, "small.onnx")
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.motion import quat
-from posefield_train import train
+from posefield_train import training
 from posefield_train.graph import onnx_export
 from posefield_train.source import take_groups
 from posefield_train.source.canonical import place
@@ -93,7 +93,7 @@ def quick_recipe(small_recipe):
 def planted(recipe, examples, clip):
     own = list(examples)
     own[PLANTED] = replace(own[PLANTED], clip=clip)
-    return train.train(recipe, own, lambda _: None)
+    return training.train_examples(recipe, own)
 
 
 def only_note(trained, example):
@@ -130,7 +130,7 @@ def test_a_clip_of_another_performer_is_named_with_whose_it_is(quick_recipe, exa
     note = only_note(trained, own)
     assert f"from those of {own.row.performer} elsewhere (" in note
     assert f"and by 0.0 cm from those of {other.row.performer}" in note
-    card = onnx_export.export_model(quick_recipe, trained, ["said before"]).card
+    card = onnx_export.export_model(replace(trained, notes=("said before",))).card
     assert card.diagnostics["notes"][:2] == [*trained.outlier_notes(), "said before"]
 
 
@@ -143,6 +143,6 @@ def test_two_strangers_are_told_apart_from_those_whom_they_mislead(quick_recipe,
     own = list(examples)
     for index, plant in ((PLANTED, kicking), (PLANTED + 2, mirrored)):
         own[index] = replace(own[index], clip=plant(own[index].clip))
-    notes = train.train(quick_recipe, own, lambda _: None).outlier_notes()
+    notes = training.train_examples(quick_recipe, own).outlier_notes()
     lines = {f"line {examples[i].row.line}" for i in (PLANTED, PLANTED + 2)}
     assert {note.partition(",")[0] for note in notes} == lines

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from minimal import recipe_with, small_clip, write_clips
 
+import posefield_train
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
 from posefield.motion import quat
@@ -14,10 +15,8 @@ from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.report import levels_of_detail, training_report
-from posefield_train.source import ingest
 
 BRANCHES = 8
 
@@ -46,13 +45,13 @@ def test_a_skeleton_of_any_size_trains_and_is_written(tmp_path, joints):
     family = [clip(joints, value) for value in range(8)]
     folder = write_clips(tmp_path / "clips", family)
     own = recipe_with(motion={"facing": "none"})
-    examples, notes = ingest.ingest(own, folder)
-    exported = onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes)
+    trained = posefield_train.train(own, folder)
+    exported = onnx_export.export_model(trained)
     model = Synthesizer("tiny", session.open_bytes(exported.content, "tiny"))
     answer = clips.synthesize_clip(model, ClipQuestion(controls={"speed": 3.0}, fps=30.0))
-    assert len(answer.clip.skeleton) == joints and notes == []
+    assert len(answer.clip.skeleton) == joints and trained.notes == ()
     # The clip in the middle was seen.
-    wanted = examples[3].clip.positions()
+    wanted = trained.examples[3].clip.positions()
     assert np.abs(answer.clip.positions()[-1] - wanted[-1]).max() < 0.05
     for encoder in CLIP_ENCODERS.values():
         assert len(encoder.encode(answer)) > 500
@@ -61,9 +60,8 @@ def test_a_skeleton_of_any_size_trains_and_is_written(tmp_path, joints):
 def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path):
     clips = [small_clip(0.3 * np.sin(i), 21 + i % 3) for i in range(8)]
     recipe = recipe_with(motion={"cyclic": True})
-    examples, notes = ingest.ingest(recipe, write_clips(tmp_path, clips))
-    trained = train.train(recipe, examples, lambda _: None)
-    exported = onnx_export.export_model(recipe, trained, notes)
+    trained = posefield_train.train(recipe, write_clips(tmp_path, clips))
+    exported = onnx_export.export_model(trained)
     levels = levels_of_detail.time_levels(exported)
     facts = json.loads(training_report.render(trained, exported, levels, []).json)
     assert [level["effector_m"] for level in facts["levels"]["levels"]] == [None] * 4

@@ -10,7 +10,7 @@ from minimal import ingested, recipe_with, small_clip
 from posefield.common.errors import RecipeError
 from posefield.common.units import UP
 from posefield.motion import quat
-from posefield_train import train
+from posefield_train import training
 from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
 from posefield_train.adapt.adapted_file import NewPerformer
 from posefield_train.graph import onnx_export, trained_card
@@ -163,11 +163,11 @@ def test_the_model_file_keeps_takes_that_are_no_files(read, tmp_path):
         ("file,v,take", STATED, (0, 0, 1, 1, 2, 2, 3, 3)),
         ("file,v,other", {}, ()),
     ):
-        examples, _, notes = read(EIGHT, rows, head, **own)
+        examples, *_ = read(EIGHT, rows, head, **own)
         recipe = recipe_with(**own)
-        trained = train.train(recipe, examples, lambda _: None)
+        trained = training.train_examples(recipe, examples)
         assert trained.samples.groups.tolist() == list(expected or range(8))
-        exported = onnx_export.export_model(recipe, trained, notes)
+        exported = onnx_export.export_model(trained)
         assert exported.card.making.takes == expected
 
 
@@ -177,8 +177,8 @@ def test_an_adapted_model_keeps_its_takes_and_adds_those_of_new_clips(tmp_path):
         replace(example, take=f"{example.row.performer} {i // 6}")
         for i, example in enumerate(ingest.ingest(recipe, folder)[0])
     ]
-    trained = train.train(recipe, examples, lambda _: None)
-    content = onnx_export.export_model(recipe, trained, []).content
+    trained = training.train_examples(recipe, examples)
+    content = onnx_export.export_model(trained).content
     reopened = model_reconstruction.reconstruct(content, "a model")
     before = reopened.card.making.takes
     assert len(before) == newcomers.CLIPS and len(set(before)) == 9

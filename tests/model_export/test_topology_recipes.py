@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from expressed_skeletons import arms_first, random_turns, renamed, with_joint, with_rest
 
+import posefield_train
 from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer
-from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_family
 from posefield_train.source import ingest, recipe
@@ -76,13 +76,12 @@ def expressed(clips, some=slice(None)):
 
 def predictions(own, folder):
     """Values of the training's tensor in the order of the clips, and left-out errors, m."""
-    examples, notes = ingest.ingest(own, folder)
-    trained = train.train(own, examples, lambda _: None)
+    trained = posefield_train.train(own, folder)
     errors = {
         example.row.place.name: np.sqrt(error)
         for example, error in zip(trained.examples, trained.left_out_errors, strict=True)
     }
-    return trained, notes, np.array([errors[name] for name in sorted(errors)])
+    return trained, trained.notes, np.array([errors[name] for name in sorted(errors)])
 
 
 def test_another_rest_pose_order_and_names_give_the_same_predictions(trials, tmp_path):
@@ -93,7 +92,7 @@ def test_another_rest_pose_order_and_names_give_the_same_predictions(trials, tmp
     assert wanted.mean() > 0.005
     assert found == pytest.approx(wanted, rel=1e-3)
     assert any("33 joints became 23 by their roles" in note for note in notes)
-    exported = onnx_export.export_model(plain, trained, notes)
+    exported = onnx_export.export_model(trained)
     assert exported.card.roles["rightHand"] == "rightHand"
     assert exported.card.roles["upperChest"] == "spine3"
     assert "LeftThumb1" not in exported.card.skeleton.names

@@ -9,7 +9,7 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import UP
 from posefield.motion import skeleton
 from posefield.motion.clip import assemble
-from posefield_train import train
+from posefield_train import training
 from posefield_train.sample import noise_free
 from posefield_train.sample import sample_controls as ranges
 from posefield_train.source import canonical
@@ -44,7 +44,7 @@ def full_ranks(few):
 @pytest.fixture(scope="module")
 def exact(small_recipe, few, full_ranks):
     """A model without a nugget, of which nothing is cut off."""
-    return train.train(with_size(small_recipe, 0.0, full_ranks), few, quiet)
+    return training.train_examples(with_size(small_recipe, 0.0, full_ranks), few)
 
 
 def positions(parents, rotations, root, offsets):
@@ -79,7 +79,7 @@ def test_without_nugget_and_at_full_ranks_the_samples_come_back(exact, few):
 
 
 def test_with_a_nugget_they_do_not_come_back(small_recipe, few, full_ranks):
-    trained = train.train(with_size(small_recipe, 0.1, full_ranks), few, quiet)
+    trained = training.train_examples(with_size(small_recipe, 0.1, full_ranks), few)
     assert miss(trained, few) > 100 * EXACT
 
 
@@ -118,8 +118,10 @@ def test_the_whole_model_plays_the_samples_in_their_own_time(exact, few):
 
 def test_the_order_of_the_examples_does_not_matter(small_recipe, few, full_ranks, exact, rng):
     recipe = with_size(small_recipe, 0.0, full_ranks)
-    shuffled = train.train(recipe, [few[i] for i in rng.permutation(len(few))], quiet)
-    fewer = train.train(with_size(small_recipe, 0.0, [94, 40, len(few) - 1]), few[1:], quiet)
+    shuffled = training.train_examples(recipe, [few[i] for i in rng.permutation(len(few))])
+    fewer = training.train_examples(
+        with_size(small_recipe, 0.0, [94, 40, len(few) - 1]), few[1:], quiet
+    )
     bank, parents = exact.model.bank, few[0].clip.skeleton.parents
     points = rng.uniform(bank.low, bank.high, (30, 4))
     times = np.tile(np.linspace(0.0, 1.5, 7), (30, 1))
@@ -198,5 +200,5 @@ def test_sigma_says_how_far_the_truth_may_lie(trained, examples, rng):
 def test_equal_controls_without_a_nugget_are_refused(small_recipe, few, full_ranks):
     twins = [*few[:-1], replace(few[-1], controls=few[3].controls)]
     with pytest.raises(TrainingError, match=f"samples 4 and {len(few)} have equal controls"):
-        train.train(with_size(small_recipe, 0.0, full_ranks), twins, quiet)
-    assert train.train(with_size(small_recipe, 0.2, [10, 8, 10]), twins, quiet).model
+        training.train_examples(with_size(small_recipe, 0.0, full_ranks), twins)
+    assert training.train_examples(with_size(small_recipe, 0.2, [10, 8, 10]), twins).model

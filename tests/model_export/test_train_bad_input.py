@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from minimal import recipe_with, small_clip, write_clips
 
+import posefield_train
 from posefield.common.errors import RecipeError, TrainingError
-from posefield_train import train
 from posefield_train.graph import onnx_export, trained_card
 from posefield_train.graph.trained_model import Outlier
 from posefield_train.source import ingest, recipe
@@ -26,9 +26,8 @@ def model(tmp_path):
         if rows is not None:
             (tmp_path / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
         own = recipe_with(**sections)
-        examples, notes = ingest.ingest(own, tmp_path)
-        trained = train.train(own, examples, lambda _: None)
-        return trained, onnx_export.export_model(own, trained, notes)
+        trained = posefield_train.train(own, tmp_path)
+        return trained, onnx_export.export_model(trained)
 
     return of
 
@@ -128,7 +127,7 @@ def test_a_measured_control_of_one_value_is_refused_with_its_cause(tmp_path, aut
     plain["controls"] = [{"name": "found", "auto": auto, "description": "Measured"}]
     own = recipe.Recipe.model_validate(plain)
     with pytest.raises(TrainingError, match=r"'found' has the value .* in all 8") as refused:
-        train.train(own, ingest.ingest(own, tmp_path)[0], lambda _: None)
+        posefield_train.train(own, tmp_path)
     assert said in str(refused.value)
 
 
@@ -158,7 +157,7 @@ def test_what_is_the_same_in_many_clips_is_one_note_and_the_worst_come_first(mod
     kinds = ("duration", "size", *["far"] * 7)
     against = tuple(Outlier(i % 8, kind, f"{kind} {i}") for i, kind in enumerate(kinds))
     noisy = replace(trained, findings=found, examples=shifted, outliers=against)
-    own = trained_card.training_notes(recipe_with(), noisy, ["of the files"])
+    own = trained_card.training_notes(replace(noisy, notes=("of the files",)))
     rows = [example.row.named for example in shifted]
     assert own == [
         f"{rows[1]}: size 1",
@@ -174,4 +173,4 @@ def test_what_is_the_same_in_many_clips_is_one_note_and_the_worst_come_first(mod
         "begun 17% of its cycle later than it was cut",
     ]
     few = replace(noisy, findings=jumps[:3], outliers=(), examples=trained.examples)
-    assert len(trained_card.training_notes(recipe_with(), few, [])) == 3
+    assert len(trained_card.training_notes(few)) == 3

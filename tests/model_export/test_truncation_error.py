@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import TrainingError
-from posefield_train import train
+from posefield_train import training
 from posefield_train.align import time_alignment
 from posefield_train.graph import truncation_cost
 from posefield_train.source.recipe_sections import Event
@@ -139,7 +139,7 @@ def test_training_cuts_off_little_beside_what_it_cannot_predict(small_recipe, tr
 
 
 def test_squares_average_to_one_and_hands_err_more_than_hips(judge, trained):
-    found = train.joint_error_shares(judge, trained.full, trained.pose, None)
+    found = training.joint_error_shares(judge, trained.full, trained.pose, None)
     assert np.mean(np.square(found)) == pytest.approx(1.0, abs=1e-3)
     assert found == pytest.approx(trained.joints, rel=1e-9)
     hand, hips = map(trained.skeleton.names.index, ("RightHand", "Hips"))
@@ -161,7 +161,7 @@ def test_shares_are_of_distances_to_the_prediction_by_what_is_usual_of_each_clip
         total += squares / trained.pose.variances[clip]
         plain += squares
     expected = np.sqrt(total / total.mean())
-    found = train.joint_error_shares(judge, trained.full, trained.pose, None)
+    found = training.joint_error_shares(judge, trained.full, trained.pose, None)
     assert found == pytest.approx(expected, rel=1e-6)
     # Negative control: with all clips counted alike it would be another.
     assert found != pytest.approx(np.sqrt(plain / plain.mean()), rel=1e-4)
@@ -169,11 +169,11 @@ def test_shares_are_of_distances_to_the_prediction_by_what_is_usual_of_each_clip
 
 def test_travel_moves_all_joints_alike(judge, trained):
     far = np.full((len(trained.examples), 3), 100.0)
-    found = train.joint_error_shares(judge, trained.full, trained.pose, far)
+    found = training.joint_error_shares(judge, trained.full, trained.pose, far)
     assert np.ptp(found) < 0.01 < np.ptp(trained.joints)
 
 
 def test_what_is_met_exactly_errs_evenly(judge, trained):
     met = replace(trained.pose, residuals=np.zeros_like(trained.pose.residuals))
-    found = train.joint_error_shares(judge, trained.full, met, None)
+    found = training.joint_error_shares(judge, trained.full, met, None)
     assert np.array_equal(found, np.ones(len(trained.skeleton)))

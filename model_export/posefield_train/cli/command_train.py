@@ -17,7 +17,6 @@ from posefield_train.source import data_folder
 if TYPE_CHECKING:
     from posefield_train.graph.onnx_export import ExportedModel
     from posefield_train.graph.trained_model import TrainedModel
-    from posefield_train.source.recipe import Recipe
 
 
 STEPS, REPORT_STEPS = 5, 7
@@ -71,28 +70,26 @@ def _train(
     json: bool,
 ) -> None:
     # SciPy and onnx take a second to import, and other commands do not need them.
-    from posefield_train import train
-    from posefield_train.graph import onnx_export
-    from posefield_train.source import ingest, recipe
+    from posefield_train import training
+    from posefield_train.source import ingest
 
     output_files.expect_onnx(output)
-    own = recipe.read_accepted(recipe_file)
+    recipe = training.read_recipe(recipe_file)
     steps = REPORT_STEPS if report else STEPS
     with executors.parts(executor) as jobs, ProgressPrinter("training", steps) as progress:
         progress(f"reading {recipe_file}")
-        examples, notes = ingest.ingest(own, data or recipe_file.parent)
+        examples, notes = ingest.ingest(recipe, data or recipe_file.parent)
         clips = len(examples)
         share = min(max((clips - SMALL) / (LARGE - SMALL), 0.0), 1.0)
         pairs = zip(STEP_SECONDS_PER_CLIP[SMALL], STEP_SECONDS_PER_CLIP[LARGE], strict=True)
         seconds = [clips * ((1.0 - share) * few + share * many) for few, many in pairs]
         progress.expect([*seconds, *(REPORT_SECONDS if report else ())])
-        ingest.check_presets(own, examples)
-        trained = train.train(own, examples, progress, jobs)
+        ingest.check_presets(recipe, examples)
+        trained = training.train_examples(recipe, examples, progress, jobs, notes)
         progress("writing the graph and comparing it with the reference")
-        exported = onnx_export.export_model(own, trained, notes)
-        atomic_files.write(exported.content, output)
+        exported = training.export(trained, output)
         if report:
-            _write_report(own, trained, exported, progress, report)
+            _write_report(trained, exported, progress, report)
         progress("done")
     typer.echo(output_files.format_output(exported, output, json))
 
@@ -109,7 +106,6 @@ REPORT_SECONDS = (0.2, 3.0)
 
 
 def _write_report(
-    recipe: "Recipe",
     trained: "TrainedModel",
     exported: "ExportedModel",
     progress: ProgressPrinter,

@@ -20,7 +20,7 @@ from posefield_train.kriging import sample_points
 from posefield_train.report import significant_digits
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.train import train
+from posefield_train.training import train_examples
 
 # Families of more than MANY takes are held out in PARTS parts of whole takes.
 MANY, PARTS = 40, 12
@@ -229,7 +229,7 @@ def train_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> Train
     """Return the model of the clips that a fold does not hold out."""
     rest, held = fold.split(examples)
     try:
-        trained = train(recipe, rest, lambda _: None)
+        trained = train_examples(recipe, rest)
     except TrainingError as error:
         named = ", ".join(sorted({example.row.place.name for example in held}))
         raise TrainingError(f"with {named} held out: {error}") from error

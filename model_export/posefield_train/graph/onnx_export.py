@@ -18,7 +18,6 @@ from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import single_threaded
 from posefield_train.kriging import thinning, universal_kriging
-from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -276,19 +275,19 @@ class ExportedModel:
 
 
 @single_threaded()
-def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> ExportedModel:
+def export_model(trained: TrainedModel) -> ExportedModel:
     """Return the exported model with all its levels; equal data give equal bytes.
 
     Raises TrainingError for levels of detail that cannot be made, and ExportRefused if the parity
     check fails.
     """
-    notes = trained_card.training_notes(recipe, trained, notes)
-    laddered = levels.build_levels(recipe, trained)
+    notes = trained_card.training_notes(trained)
+    laddered = levels.build_levels(trained.recipe, trained)
     takes = estimate(trained)
     found = laddered.levels
 
     def own_card(parity: float) -> ModelCard:
-        return takes.on_card(trained_card.build_card(recipe, trained, found, notes, parity))
+        return takes.on_card(trained_card.build_card(trained.recipe, trained, found, notes, parity))
 
     return check_and_export(laddered.model, own_card)
 
@@ -308,8 +307,9 @@ def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) 
 
 
 @single_threaded()
-def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
+def export_finest(trained: TrainedModel) -> bytes:
     """Return an unchecked file of the finest level alone, for measurements only."""
+    recipe = trained.recipe
     size = recipe.size.model_copy(update={"levels": []})
     # Held-out clips narrow the sampled ranges, which presets have to lie in.
     alone = recipe.model_copy(update={"size": size, "presets": {}})

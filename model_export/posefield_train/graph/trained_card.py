@@ -59,17 +59,14 @@ MEANINGS = {
 """Kinds of findings in joints, those that say the most about the model first."""
 
 
-def training_notes(recipe: Recipe, trained: TrainedModel, imported: Sequence[str]) -> list[str]:
-    """Return all notes of a training, the most consequential first.
-
-    imported: notes on the motion files, ranked.
-    """
+def training_notes(trained: TrainedModel) -> list[str]:
+    """Return all notes of a training, the most consequential first."""
     return [
         *trained.outlier_notes(),
         *repeat_notes(trained),
         *disagreement_notes(trained),
-        *sample_points.data_notes(recipe, trained.examples),
-        *imported,
+        *sample_points.data_notes(trained.recipe, trained.examples),
+        *trained.notes,
         *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
         *phase_alignment.shift_notes(trained.examples),
         *trained.contact_notes,

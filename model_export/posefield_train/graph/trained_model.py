@@ -14,6 +14,7 @@ from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
 from posefield_train.tensor.truncation_error import TruncationErrors
@@ -50,9 +51,10 @@ class TrainedModel:
     leave-one-out residuals (N, m) of each quantity but the pose. truncation_errors: of the reduced
     tensor. joints: leave-one-out error (J,) of each joint as a share of the root mean square of
     all. outliers: evidence against clips that do not fit. contacts: of the feet, None without them.
-    contact_notes: assumptions about them.
+    contact_notes: assumptions about them. notes: of the import.
     """
 
+    recipe: Recipe
     model: FloatModel
     examples: tuple[Example, ...]
     samples: SamplePoints
@@ -72,6 +74,7 @@ class TrainedModel:
     outliers: tuple[Outlier, ...] = ()
     contacts: FittedContacts | None = None
     contact_notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def listed(self) -> Annotated[Indices, "listed"]:

@@ -1,13 +1,15 @@
-"""Training of a model from examples: alignment, tensor, HOSVD, kriging.
+"""Training of a model: examples, alignment, tensor, HOSVD, kriging.
 
 The steps follow Mukai & Kuriyama 2006, section 2.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from posefield.common import atomic_files
 from posefield.common.units import Floats
 from posefield.motion.curves import Curve
 from posefield.motion.skeleton import Skeleton
@@ -18,8 +20,9 @@ from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.contacts import contact_model
 from posefield_train.contacts.contact_model import FittedContacts
-from posefield_train.graph import truncation_cost, warped_errors
+from posefield_train.graph import onnx_export, truncation_cost, warped_errors
 from posefield_train.graph.float_model import FloatModel
+from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import Jobs, ordered_results, single_threaded
 from posefield_train.kriging import (
@@ -34,7 +37,8 @@ from posefield_train.kriging.kriging_bank import KrigingBank, PowerLaw
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.source import canonical
+from posefield_train.source import canonical, ingest
+from posefield_train.source import recipe as recipe_file
 from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
@@ -57,6 +61,14 @@ StepCallback = Callable[[str], None]
 """Callback for progress messages."""
 
 
+def _silent(step: str) -> None: ...
+
+
+def read_recipe(path: Path | str) -> Recipe:
+    """Return the recipe of a TOML file; RecipeError names the invalid key."""
+    return recipe_file.read_accepted(Path(path))
+
+
 @dataclass(frozen=True)
 class _VectorizedClips:
     """Aligned clips as pose vectors.
@@ -75,25 +87,42 @@ class _VectorizedClips:
     controls: Floats
 
 
-def train(
+def train(recipe: Recipe, folder: Path | str, report: StepCallback = _silent) -> TrainedModel:
+    """Return the model of a recipe whose motion data are in a folder.
+
+    report: called with a description of each step. Raises RecipeError if data cannot be read,
+    TrainingError as `train_examples` and for a preset outside the data.
+    """
+    report("reading the clips")
+    examples, notes = ingest.ingest(recipe, Path(folder))
+    ingest.check_presets(recipe, examples)
+    return train_examples(recipe, examples, report, notes=notes)
+
+
+def export(model: TrainedModel, path: Path | str) -> ExportedModel:
+    """Write the .onnx file of a model with its levels of detail; equal data give equal bytes.
+
+    Raises TrainingError and ExportRefused as `onnx_export.export_model` does.
+    """
+    exported = onnx_export.export_model(model)
+    atomic_files.write(exported.content, Path(path))
+    return exported
+
+
+@single_threaded()
+def train_examples(
     recipe: Recipe,
     examples: Sequence[Example],
-    report: StepCallback,
+    report: StepCallback = _silent,
     jobs: Jobs = kriging_tuning.SERIAL,
+    notes: Sequence[str] = (),
 ) -> TrainedModel:
     """Return a model of a recipe's examples.
 
     report: called with a description of each step. jobs: executor of the parts that need not wait
-    for each other, which give the same bytes on all. Raises TrainingError if the samples do not
-    determine a kriging model.
+    for each other, which give the same bytes on all. notes: of the import, for the model card.
+    Raises TrainingError if the samples do not determine a kriging model.
     """
-    with single_threaded():
-        return _train(recipe, examples, report, jobs)
-
-
-def _train(
-    recipe: Recipe, examples: Sequence[Example], report: StepCallback, jobs: Jobs
-) -> TrainedModel:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
     outliers.check_family(recipe, examples)
@@ -109,7 +138,7 @@ def _train(
     canonical.return_freed_memory()
     report("fitting the fields")
     trained = _fit_and_truncate(recipe, examples, moved, full, jobs)
-    return replace(trained, outliers=outliers.find_outliers(recipe, trained))
+    return replace(trained, outliers=outliers.find_outliers(recipe, trained), notes=tuple(notes))
 
 
 # Root mean square distance of joints, m, that each of the three projections of a large tensor may
@@ -359,6 +388,7 @@ def _fit_and_truncate(
     hyper = fits.pose.hyper
     contacts, notes = contact_model.fit_contacts(recipe, examples, moved.samples, hyper, warps)
     return TrainedModel(
+        recipe,
         _with_contacts(model, contacts),
         tuple(examples),
         moved.samples,
