@@ -21,7 +21,7 @@ from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTa
 from posefield.inference.session import PredictionState, Session
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
-from posefield.question import value_validation
+from posefield.question import motion_question
 from posefield.question.motion_question import MotionQuestion
 from posefield.question.results import PoseAnswer, Trust
 from posefield.validation import question_validation
@@ -335,7 +335,7 @@ class ConstraintSolver:
         for index, goal in enumerate(targets):
             if goal.time is not None:
                 field = f"targets/{index}/time"
-                value_validation.check_rounded_range(field, goal.time, 0.0, held.duration, "s")
+                motion_question.check_rounded_range(field, goal.time, 0.0, held.duration, "s")
 
 
 def _same_joints_and_frame(a: PositionConstraint, b: PositionConstraint, last: float) -> bool:

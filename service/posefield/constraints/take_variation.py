@@ -24,8 +24,7 @@ from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
-from posefield.question.motion_question import MotionQuestion
-from posefield.question.value_validation import check_take
+from posefield.question.motion_question import MotionQuestion, check_take
 from posefield.validation.question_validation import ValidatedQuestion
 
 FIELD_CACHE, DEVIATION_CACHE = 64, 4096

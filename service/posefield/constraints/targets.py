@@ -21,7 +21,7 @@ from posefield.model_file import answer_bounds
 from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
-from posefield.question import value_validation
+from posefield.question import motion_question
 from posefield.question.motion_question import MotionQuestion, Target
 from posefield.question.results import ConstraintResult, split_results
 from posefield.validation import question_validation
@@ -153,16 +153,16 @@ def _joint_target(card: ModelCard, index: int, target: Target) -> JointTarget:
     if len(target.position) != 3:
         raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
     x, y, z = (
-        value_validation.check_number(f"{field}/position/{a}", v)
+        motion_question.check_number(f"{field}/position/{a}", v)
         for a, v in enumerate(target.position)
     )
     for axis, value in enumerate((x, y, z)):
-        value_validation.check_range(
+        motion_question.check_range(
             f"{field}/position/{axis}", value, -MAX_COORDINATE, MAX_COORDINATE, "m"
         )
     when = target.when
     if not isinstance(when, str):
-        time = value_validation.check_number(f"{field}/time", when)
+        time = motion_question.check_number(f"{field}/time", when)
         if not 0.0 <= time <= question_validation.duration_range(card)[1]:
             raise InvalidField(
                 f"{field}/time",

@@ -24,7 +24,7 @@ from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.script import Script, Source
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
 from posefield.performance.walk_steps import entries_of, entry_range, target_frames
-from posefield.question import performance_question, value_validation
+from posefield.question import motion_question, performance_question
 from posefield.question.motion_question import MotionQuestion, Target, replace
 from posefield.question.results import split_results
 from posefield.synthesis import synthesizer
@@ -155,7 +155,7 @@ def _checked(index: int, target: Target) -> tuple[float, ...]:
             f"targets/{index}/position", f"{len(target.position)} numbers, expected three"
         )
     return tuple(
-        value_validation.check_number(f"targets/{index}/position/{axis}", value)
+        motion_question.check_number(f"targets/{index}/position/{axis}", value)
         for axis, value in enumerate(target.position)
     )
 

@@ -26,7 +26,7 @@ from posefield.performance.limb_targets import WorldTarget
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline
-from posefield.question import value_validation
+from posefield.question import motion_question
 from posefield.question.performance_question import Hold
 
 STREAM = 4
@@ -161,7 +161,7 @@ def hold_passage(
     planned, as their contacts go on. Raises InvalidField for a time without a frame, a joint that
     no arm or leg leads to, and as `HeldBody.look_at` does.
     """
-    seconds = value_validation.check_number("hold", seconds)
+    seconds = motion_question.check_number("hold", seconds)
     count = round(seconds * RATE)
     if count < 1:
         raise InvalidField("hold", f"{seconds:g} s, expected at least {1.0 / RATE:.3g} s")
@@ -174,7 +174,7 @@ def hold_passage(
     miss = 0.0
     if look_at is not None:
         point = np.array(
-            [value_validation.check_number(f"look_at/{i}", own) for i, own in enumerate(look_at)]
+            [motion_question.check_number(f"look_at/{i}", own) for i, own in enumerate(look_at)]
         )
         gaze = body.look_at(before.rotations[-1], before.roots[-1], point)
         # A head cannot turn to a point and back in no time: a short hold turns it by a part.

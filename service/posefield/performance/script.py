@@ -28,7 +28,7 @@ from posefield.performance.passage import (
     match_skeletons,
     scale_heights,
 )
-from posefield.question.motion_question import MotionQuestion
+from posefield.question.motion_question import MotionQuestion, check_number, check_range, check_take
 from posefield.question.performance_question import (
     Act,
     Curve,
@@ -37,7 +37,6 @@ from posefield.question.performance_question import (
     Segment,
     Walk,
 )
-from posefield.question.value_validation import check_number, check_range, check_take
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 

@@ -13,7 +13,7 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.performance.passage import RATE
-from posefield.question.value_validation import check_number
+from posefield.question.motion_question import check_number
 
 Curve = float | Sequence[tuple[float, float]]
 """A number, or pairs of a distance, m, or a time, s, and a value; linear between, constant after

@@ -28,7 +28,7 @@ from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import WalkNote, WalkRequest
 from posefield.performance.walker import Walker, find_walker
-from posefield.question.value_validation import check_number, check_range
+from posefield.question.motion_question import check_number, check_range
 
 MAX_SCALING, SHORT_SCALING = 0.06, 0.15
 """Largest changes of the stride length, as shares, with which a walk stops at a phase: of a walk

@@ -19,8 +19,7 @@ from posefield.locomotion.floor_plane import FloorVectors
 from posefield.performance.passage import FloorMotion
 from posefield.performance.speed_profile import COMFORTABLE, MAX_ACCELERATION, Curve, Scale
 from posefield.performance.walk_paths import FloorPath
-from posefield.question.motion_question import LabelValue
-from posefield.question.value_validation import check_number, check_range
+from posefield.question.motion_question import LabelValue, check_number, check_range
 
 CORNERS = 12
 """Number of corners of the polygon around a disc."""

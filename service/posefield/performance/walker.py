@@ -15,8 +15,7 @@ from posefield.locomotion.gait import ITERATIONS, Gait, requested_labels
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import skeleton
-from posefield.question.motion_question import LabelValue
-from posefield.question.value_validation import check_number, check_range
+from posefield.question.motion_question import LabelValue, check_number, check_range
 from posefield.synthesis import walking_feet
 from posefield.validation.question_validation import label_weights
 

@@ -12,8 +12,8 @@ from posefield.question.motion_question import (
     Labels,
     LabelValue,
     Performer,
+    check_range,
 )
-from posefield.question.value_validation import check_range
 
 MIN_VALUES, MAX_VALUES, MAX_MARGIN = 2, 1024, 1.0
 """Limits of the values per axis of a grid, and of its margin as a share of a control's range."""

@@ -14,7 +14,7 @@ from posefield.inference.onnx_runtime import CURVES
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
-from posefield.question import value_validation
+from posefield.question import motion_question
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.question.results import PoseAnswer
 from posefield.synthesis.synthesizer import Synthesizer
@@ -29,14 +29,14 @@ def time_window(asked: ClipQuestion, duration: float) -> tuple[float, float, flo
 
     Raises InvalidField for values out of range, and for a loop with a start or an end.
     """
-    rate = value_validation.check_number("fps", asked.fps)
-    value_validation.check_range("fps", rate, *FPS_RANGE, "frames a second")
+    rate = motion_question.check_number("fps", asked.fps)
+    motion_question.check_range("fps", rate, *FPS_RANGE, "frames a second")
     last = duration
     if asked.end is not None:
-        end = value_validation.check_number("end", asked.end)
-        last = value_validation.check_rounded_range("end", end, 0.0, duration, "s")
-    start = value_validation.check_number("start", asked.start)
-    start = value_validation.check_rounded_range("start", start, 0.0, last, "s")
+        end = motion_question.check_number("end", asked.end)
+        last = motion_question.check_rounded_range("end", end, 0.0, duration, "s")
+    start = motion_question.check_number("start", asked.start)
+    start = motion_question.check_rounded_range("start", start, 0.0, last, "s")
     if asked.loop and (start > 0.0 or asked.end is not None):
         field, value = ("start", start) if start > 0.0 else ("end", last)
         raise InvalidField(field, f"{value:g} s with loop, expected none: a loop is a whole cycle")
@@ -179,7 +179,7 @@ def prepare(model: Synthesizer, asked: PoseQuestion) -> PreparedPoseQuestion:
     question, times = model.question(asked), asked.times
     if not 1 <= len(times) <= MAX_POSES:
         raise InvalidField("times", f"{len(times)} times, expected 1 to {MAX_POSES}")
-    when = [value_validation.check_number(f"times/{i}", value) for i, value in enumerate(times)]
+    when = [motion_question.check_number(f"times/{i}", value) for i, value in enumerate(times)]
     # The duration is known only after the call of the graph; times beyond the longest plausible
     # clip are limited because they may overflow float32.
     longest = model.durations[1]
@@ -270,8 +270,5 @@ def _check_times(asked: PreparedPoseQuestion, duration: float) -> Floats:
         return asked.when
     times = enumerate(asked.when.tolist())
     return np.array(
-        [
-            value_validation.check_rounded_range(f"times/{i}", t, 0.0, duration, "s")
-            for i, t in times
-        ]
+        [motion_question.check_rounded_range(f"times/{i}", t, 0.0, duration, "s") for i, t in times]
     )

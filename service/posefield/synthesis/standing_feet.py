@@ -22,9 +22,8 @@ from posefield.motion import contact_detection, measures
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.measures import MeasuredMotion
 from posefield.question.floor import LEVEL_FLOOR, Floor
-from posefield.question.motion_question import ClipQuestion
+from posefield.question.motion_question import ClipQuestion, check_number, check_range
 from posefield.question.results import FeetResult, PoseAnswer, StanceResult
-from posefield.question.value_validation import check_number, check_range
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 

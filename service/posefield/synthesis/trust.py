@@ -20,6 +20,7 @@ from posefield.kriging import kriging_model, support
 from posefield.kriging.support import NUGGET, Support, covariances
 from posefield.model_file.model_card import PERFORMER, Control, ModelCard
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
+from posefield.question.motion_question import check_range
 from posefield.question.results import (
     CapturedClip,
     Explanation,
@@ -29,7 +30,6 @@ from posefield.question.results import (
     Suggestions,
     SupportReport,
 )
-from posefield.question.value_validation import check_range
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion

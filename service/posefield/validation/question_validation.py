@@ -14,16 +14,16 @@ from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
-from posefield.question import value_validation
+from posefield.question import motion_question
 from posefield.question.motion_question import (
     ExtrapolationPolicy,
     FileQuestion,
     LabelValue,
     PoseQuestion,
+    check_number,
 )
 from posefield.question.results import Deviation
 from posefield.question.text_decoding import parameters
-from posefield.question.value_validation import check_number
 from posefield.validation.imputation import ControlImputer
 
 # A clip this many times longer or shorter than any captured one is no plausible motion.
@@ -278,8 +278,8 @@ class QuestionValidator:
 def check_control(control: Control, given: float) -> float:
     """Return the value of a control; InvalidField if it is not a number or out of range."""
     field = f"controls/{control.name}"
-    value = value_validation.check_number(field, given)
-    value_validation.check_range(field, value, *accepted_range(control), control.unit)
+    value = motion_question.check_number(field, given)
+    motion_question.check_range(field, value, *accepted_range(control), control.unit)
     return value
 
 

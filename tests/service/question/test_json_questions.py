@@ -11,9 +11,13 @@ from posefield.common.errors import FormError, InvalidField
 from posefield.question import json_decoding as bodies
 from posefield.question.json_decoding import decode_question
 from posefield.question.model_question import SigmaQuestion, WhyQuestion
-from posefield.question.motion_question import ClipsQuestion, FileQuestion, PoseQuestion
+from posefield.question.motion_question import (
+    ClipsQuestion,
+    FileQuestion,
+    PoseQuestion,
+    check_range,
+)
 from posefield.question.performance_question import PerformanceQuestion
-from posefield.question.value_validation import check_range
 from posefield.question.walk_question import WalkQuestion
 
 
