@@ -1,4 +1,4 @@
-"""Families that `posefield discover` offers, against the cuts of long takes by hand.
+"""Families that `posefield discover` offers, against the cuts of long recordings by hand.
 
 The action of a family is that of most of its clips. A clip is right if it has half of its time in
 common with a cut of the family's action. Strides are no action of these takes and are left out.
@@ -19,9 +19,8 @@ import numpy as np
 from hand_cuts import HandCut
 from rows import Row
 
-from posefield_train.discover import take_reading
 from posefield_train.discover.motion_features import Span
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording, read_recordings
 from posefield_train.families import found_families
 from posefield_train.families.found_families import FamilyRow
 
@@ -43,10 +42,10 @@ class JudgedFamily:
 
 @dataclass(frozen=True)
 class Discovery:
-    """Families of takes with their cuts. performers: by file, as they were told. seconds: processor
-    time of the command."""
+    """Families of recordings with their cuts. performers: by file, as they were told. seconds:
+    processor time of the command."""
 
-    takes: tuple[Take, ...]
+    recordings: tuple[Recording, ...]
     cuts: tuple[HandCut, ...]
     families: tuple[JudgedFamily, ...]
     performers: dict[str, str]
@@ -59,14 +58,14 @@ def discover(folder: Path, made: Path) -> Discovery:
     words = [COMMAND, "discover", folder / "bvh", "-o", made, "--licence", LICENCE]
     subprocess.run(words, check=True, capture_output=True)
     seconds = _seconds() - before
-    takes = take_reading.read_takes(folder / "bvh").takes
-    cuts = hand_cuts.read(folder, takes)
+    recordings = read_recordings(folder / "bvh").recordings
+    cuts = hand_cuts.read(folder, recordings)
     facts = json.loads((made / "discover.json").read_text(encoding="utf-8"))
     names = [one["number"] for one in facts["families"] if one["kind"] == "motions"]
     paths = [made / f"family_{number:02d}.toml" for number in names]
-    families = [judge(path, takes, cuts) for path in paths]
-    performers = {file: own["performer"] for file, own in facts["takes"].items()}
-    return Discovery(tuple(takes), tuple(cuts), tuple(families), performers, seconds)
+    families = [judge(path, recordings, cuts) for path in paths]
+    performers = {file: own["performer"] for file, own in facts["recordings"].items()}
+    return Discovery(tuple(recordings), tuple(cuts), tuple(families), performers, seconds)
 
 
 def _seconds() -> float:
@@ -74,9 +73,9 @@ def _seconds() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def judge(recipe: Path, takes: Sequence[Take], cuts: Sequence[HandCut]) -> JudgedFamily:
+def judge(recipe: Path, recordings: Sequence[Recording], cuts: Sequence[HandCut]) -> JudgedFamily:
     """Return an offered family with its action and its right clips."""
-    files = {take.file: (at, take.rate) for at, take in enumerate(takes)}
+    files = {recording.file: (at, recording.rate) for at, recording in enumerate(recordings)}
     rows = found_families.read(recipe.with_suffix(".csv"))
     spans = []
     for row in rows:
@@ -98,7 +97,8 @@ def document(found: Discovery) -> Found:
     """Return counts by action and in all, distances of the ends, and the processor time."""
     actions = sorted({cut.action for cut in found.cuts})
     return {
-        "minutes": sum((len(take) - 1) / take.rate for take in found.takes) / 60.0,
+        "minutes": sum((len(recording) - 1) / recording.rate for recording in found.recordings)
+        / 60.0,
         "seconds": found.seconds,
         "performers": len(set(found.performers.values())),
         "actions": [{"action": action, **_counts_of(found, action)} for action in actions],
@@ -123,7 +123,7 @@ def rows(document: Found) -> list[Row]:
             "processor time",
             document["seconds"],
             "s",
-            f"{minutes:.1f} minutes of takes",
+            f"{minutes:.1f} minutes of recordings",
             5 * minutes,
         ),
     ]

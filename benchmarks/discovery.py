@@ -1,4 +1,4 @@
-"""Discovery in long takes: strides against those cut by hand, and motions like one example.
+"""Discovery in long recordings: strides against those cut by hand, and motions like one example.
 
 R-precision of an example: the share of its best R matches that are one of the R other cuts of its
 action, with half of their time in common at least.
@@ -15,8 +15,9 @@ import hand_cuts
 import numpy as np
 from rows import Row, record, table
 
-from posefield_train.discover import family_search, motion_features, stride_detection, take_reading
+from posefield_train.discover import family_search, motion_features, stride_detection
 from posefield_train.discover.motion_features import Span
+from posefield_train.discover.recordings import read_recordings
 
 ROOT = Path(__file__).resolve().parents[1]
 ACCEPTED, REJECTED = 3, 2
@@ -28,8 +29,8 @@ SAME_STRIDE = 0.8
 def strides(folder: Path) -> list[Row]:
     """Return the figures of strides against those of strides.csv, at 120 frames a second."""
     found = {
-        take.file: [one for one in stride_detection.find_strides(take) if one.travels]
-        for take in take_reading.read_takes(folder).takes
+        recording.file: [one for one in stride_detection.find_strides(recording) if one.travels]
+        for recording in read_recordings(folder).recordings
     }
     cuts = hand_cuts.records(folder / "strides.csv")
     apart = []
@@ -60,10 +61,10 @@ def strides(folder: Path) -> list[Row]:
 def examples(folder: Path) -> list[Row]:
     """Return the figures of each cut of truth.csv as an example."""
     begin = time.process_time()
-    takes = take_reading.read_takes(folder / "bvh").takes
-    corpus = motion_features.build_corpus(takes)
+    recordings = read_recordings(folder / "bvh").recordings
+    corpus = motion_features.build_corpus(recordings)
     reading = time.process_time() - begin
-    truth = [(cut.action, cut.span) for cut in hand_cuts.read(folder, takes)]
+    truth = [(cut.action, cut.span) for cut in hand_cuts.read(folder, recordings)]
     begin = time.process_time()
     precisions = defaultdict(list)
     rounds: dict[str, list[float]] = {"first": [], "least sure": []}
@@ -86,8 +87,8 @@ def examples(folder: Path) -> list[Row]:
     counts = Counter(action for action, _ in truth)
     said = f"{len(truth)} examples of {len(counts)} actions; worst {worst}, "
     said += f"{100.0 * (1.0 - np.mean(precisions[worst])):.0f} %"
-    minutes = sum(len(take) / take.rate for take in takes) / 60.0
-    files_said = f"{minutes:.1f} minutes in {len(takes)} takes"
+    minutes = sum(len(recording) / recording.rate for recording in recordings) / 60.0
+    files_said = f"{minutes:.1f} minutes in {len(recordings)} recordings"
     queries = len(truth) * (1 + 2 * (1 + ACCEPTED))
     accepts = f"{ACCEPTED} accepted, those included, and {REJECTED} rejected"
     return [

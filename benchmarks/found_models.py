@@ -32,7 +32,7 @@ MOST_WORSE = 5.0
 
 
 def compare(found: Discovery, data: Path) -> list[dict[str, Any]]:
-    """Return the errors of models of each action, cm. data: folder of the takes."""
+    """Return the errors of models of each action, cm. data: folder of the recordings."""
     return [_compare(found, action, data) for action in ACTIONS]
 
 

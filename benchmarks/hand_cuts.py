@@ -1,4 +1,4 @@
-"""Cuts of long takes by hand, and the found clips that agree with them."""
+"""Cuts of long recordings by hand, and the found clips that agree with them."""
 
 import csv
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from posefield_train.discover.motion_features import Span
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 
 SAME_MOTION = 0.5
 """Least common time of a found clip and a cut, as a share of the time of both together."""
@@ -23,14 +23,14 @@ class HandCut:
     span: Span
 
 
-def read(folder: Path, takes: Sequence[Take]) -> list[HandCut]:
-    """Return the cuts of truth.csv. folder: that of the table, and of the takes below bvh."""
-    files = [take.file for take in takes]
+def read(folder: Path, recordings: Sequence[Recording]) -> list[HandCut]:
+    """Return the cuts of truth.csv. folder: that of the table, and of the recordings below bvh."""
+    files = [recording.file for recording in recordings]
     found = []
     for row in records(folder / "truth.csv"):
-        take = files.index(row["file"])
+        recording = files.index(row["file"])
         frames = int(row["first_frame"]), int(row["last_frame"])
-        span = Span(take, *(at / takes[take].rate for at in frames))
+        span = Span(recording, *(at / recordings[recording].rate for at in frames))
         found.append(HandCut(row["action"], row["performer"], row["file"], frames, span))
     return found
 
@@ -43,7 +43,7 @@ def records(path: Path) -> list[dict[str, str]]:
 
 def shared(one: Span, other: Span) -> float:
     """Return the common time as a share of the time of both together."""
-    if one.take != other.take:
+    if one.recording != other.recording:
         return 0.0
     common = min(one.end, other.end) - max(one.start, other.start)
     return common / (max(one.end, other.end) - min(one.start, other.start))

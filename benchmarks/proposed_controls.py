@@ -10,7 +10,7 @@ import numpy as np
 from rows import Row, record, table
 
 from posefield_train.discover import control_proposals
-from posefield_train.discover.control_proposals import FamilyClips, TakePrediction
+from posefield_train.discover.control_proposals import FamilyClips, RecordingPrediction
 from posefield_train.source import data_folder, ingest, measured_controls, recipe
 
 RESULTS = Path(__file__).resolve().parents[1] / "docs/results"
@@ -30,8 +30,8 @@ PEAK = {"peak_frame": "highest"}
 class Proposed:
     """Proposal for the clips of a recipe. lacking: controls by hand that are not proposed.
 
-    remaining: share of the variance of left-out takes that is left with the proposed controls, and
-    with those by hand.
+    remaining: share of the variance of left-out recordings that is left with the proposed controls,
+    and with those by hand.
     """
 
     recipe: str
@@ -47,9 +47,14 @@ def propose(name: str, data: Path) -> Proposed:
     examples, _ = ingest.ingest(own, data)
     joints = examples[0].clip.skeleton.names
     motions = [measured_controls.measured_quantities(one.clip) for one in examples]
-    performers, takes = [one.row.performer for one in examples], [one.take for one in examples]
+    performers, recordings = (
+        [one.row.performer for one in examples],
+        [one.recording for one in examples],
+    )
     indices = {str(role): joints.index(joint) for role, joint in own.roles.items()}
-    clips = FamilyClips(tuple(motions), indices, tuple(performers), tuple(takes), own.motion.cyclic)
+    clips = FamilyClips(
+        tuple(motions), indices, tuple(performers), tuple(recordings), own.motion.cyclic
+    )
     found = control_proposals.propose_controls(clips)
     known = {(one.quantity, one.role, one.at) for one in found.controls}
     roles = {joint: str(role) for role, joint in own.roles.items()}
@@ -60,7 +65,9 @@ def propose(name: str, data: Path) -> Proposed:
     }
     values = np.array([one.controls for one in examples])
     given = list(((values - values.mean(axis=0)) / values.std(axis=0)).T)
-    prediction = TakePrediction(control_proposals.motion_coefficients(motions), performers, takes)
+    prediction = RecordingPrediction(
+        control_proposals.motion_coefficients(motions), performers, recordings
+    )
     lacking = tuple(control for control, measure in wanted.items() if measure not in known)
     return Proposed(name, tuple(wanted), lacking, found.remaining[-1], prediction.remaining(given))
 

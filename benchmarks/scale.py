@@ -31,7 +31,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import single_threaded
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.sample import sample_family, sample_files
+from posefield_train.sample import sample_files
 from posefield_train.sample.sample_controls import parse_controls
 from posefield_train.source import recipe
 
@@ -49,7 +49,7 @@ PICTURE = ROOT / "docs/scale.png"
 def measure(clips: int) -> dict[str, Any]:
     """Return the figures of a family of some clips: this process trains it and nothing else."""
     place = FOLDER / f"reaching_{clips}"
-    file = sample_files.write_family(place, sample_family.samples(clips))
+    file = sample_files.write_family(place, sample_files.samples(clips))
     before, start = _cpu(), time.perf_counter()
     own = recipe.read(file)
     trained = posefield_train.train(own, file.parent)
@@ -109,7 +109,7 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
     points = ground_truth.truth_points(ASKED)
     found = _answers(own, trained, points)
     rng = np.random.Generator(np.random.PCG64(SEED))
-    clips = [sample_family.noisy_trial(parse_controls(list(point)), rng) for point in points]
+    clips = [sample_files.noisy_trial(parse_controls(list(point)), rng) for point in points]
     captured = [motion_errors.motion_of_clip(clip, None) for clip in clips]
     squares = [
         motion_errors.compare_motions(made, one, ()).mean_squared_error
@@ -118,7 +118,7 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
     bank = trained.model.bank
     places = bank.points(points, np.zeros((len(points), bank.label_count)))
     sigma = bank.sigma(bank.numpy(places)[VARIANCE])
-    among = np.array([astuple(controls) for _, controls in sample_family.design(ASKED)])
+    among = np.array([astuple(controls) for _, controls in sample_files.design(ASKED)])
     return {
         "truth_cm": _distance(found, points),
         "among_cm": _distance(_answers(own, trained, among), among),

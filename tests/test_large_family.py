@@ -22,10 +22,10 @@ AT = ("-c", "stature=1.7", "-c", "hip_height=0.9", "-c", "turn=20", "-c", "targe
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Family of 320 clips at eight frames, which tells performers apart."""
-    from posefield_train.sample import sample_family, sample_files
+    from posefield_train.sample import sample_files
 
     place = tmp_path_factory.mktemp("large") / "family"
-    sample_files.write_family(place, sample_family.samples(CLIPS))
+    sample_files.write_family(place, sample_files.samples(CLIPS))
     text = (place / "recipe.toml").read_text()
     text = re.sub(r'(?s)(\[\[controls\]\]\nname = "stature"|\[presets\.).*?\n\n', "", text)
     text = text.replace("frames = 100", "frames = 8")

@@ -1,4 +1,4 @@
-"""Tests of discovery on real takes: against cuts by hand, and the controls of recipes by hand."""
+"""Tests of discovery on real recordings, against cuts and controls of recipes by hand."""
 
 import csv
 import shutil
@@ -15,9 +15,9 @@ from posefield_train.discover import (
     found_clips,
     motion_features,
     stride_detection,
-    take_reading,
 )
 from posefield_train.discover.motion_features import Span
+from posefield_train.discover.recordings import read_recordings
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -52,8 +52,8 @@ def table(path):
 def test_strides_are_those_cut_by_hand(unpacked):
     folder = unpacked("cmu_walk")
     found = {
-        take.file: [one for one in stride_detection.find_strides(take) if one.travels]
-        for take in take_reading.read_takes(folder).takes
+        recording.file: [one for one in stride_detection.find_strides(recording) if one.travels]
+        for recording in read_recordings(folder).recordings
     }
     offsets, cuts = [], table(folder / "strides.csv")
     for row in cuts:
@@ -68,7 +68,7 @@ def test_strides_are_those_cut_by_hand(unpacked):
 
 def shared(one, other):
     """Common time of two parts as a share of the time of either."""
-    if one.take != other.take:
+    if one.recording != other.recording:
         return 0.0
     common = min(one.end, other.end) - max(one.start, other.start)
     return common / (max(one.end, other.end) - min(one.start, other.start))
@@ -77,14 +77,16 @@ def shared(one, other):
 def test_one_example_finds_the_motions_of_its_action(unpacked):
     """R-precision: the share of the best R matches that are one of the R other cuts."""
     folder = unpacked("hdm05_long")
-    takes = take_reading.read_takes(folder / "bvh").takes
-    corpus = motion_features.build_corpus(takes)
-    files = [take.file for take in takes]
+    recordings = read_recordings(folder / "bvh").recordings
+    corpus = motion_features.build_corpus(recordings)
+    files = [recording.file for recording in recordings]
     truth = []
     for row in table(folder / "truth.csv"):
-        take = files.index(row["file"])
+        recording = files.index(row["file"])
         frames = int(row["first_frame"]), int(row["last_frame"])
-        truth.append((row["action"], Span(take, *(at / takes[take].rate for at in frames))))
+        truth.append(
+            (row["action"], Span(recording, *(at / recordings[recording].rate for at in frames)))
+        )
     counts = Counter(action for action, _ in truth)
     precisions = []
     for action, example in truth[::4]:
@@ -98,14 +100,19 @@ def test_one_example_finds_the_motions_of_its_action(unpacked):
 def test_families_are_the_actions_of_long_takes(unpacked):
     """Precision and recall of the clips of families that are offered, against cuts by hand."""
     folder = unpacked("hdm05_long")
-    corpus = motion_features.build_corpus(take_reading.read_takes(folder / "bvh").takes)
+    corpus = motion_features.build_corpus(read_recordings(folder / "bvh").recordings)
     joined = motion_features.join_features(corpus)
-    files = [take.file for take in corpus.takes]
+    files = [recording.file for recording in corpus.recordings]
     truth = []
     for row in table(folder / "truth.csv"):
-        take = files.index(row["file"])
+        recording = files.index(row["file"])
         frames = int(row["first_frame"]), int(row["last_frame"])
-        truth.append((row["action"], Span(take, *(at / corpus.takes[take].rate for at in frames))))
+        truth.append(
+            (
+                row["action"],
+                Span(recording, *(at / corpus.recordings[recording].rate for at in frames)),
+            )
+        )
     clips, right, hits = 0, 0, set()
     for family in family_search.find_families(corpus):
         if found_clips.assess(joined, family).reasons:

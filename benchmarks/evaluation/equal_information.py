@@ -48,7 +48,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
                 best[measure] = min(defined, key=lambda one: one["error"])
         tables[information] = {
             "posefield": ours,
-            "takes": len(set(result.takes)),
+            "takes": len(set(result.recordings)),
             "best": {measure: _rounded(one) for measure, one in best.items()},
             "peers": {
                 name: {measure: _rounded(one) for measure, one in row.items()}
@@ -87,7 +87,7 @@ def compare(result: EvaluationResult, measure: str, ours: str, name: str) -> dic
         return None
     difference = theirs - mine
     mean = float(difference.mean())
-    error = summary.clustered_standard_error(difference, np.array(result.takes)[clips])
+    error = summary.clustered_standard_error(difference, np.array(result.recordings)[clips])
     averages = [float(np.mean(errors)) for errors in (mine, theirs)]
     means = [SCALE * (np.sqrt(average) if squared else average) for average in averages]
     # The difference of squares, given as that of their roots.

@@ -59,7 +59,7 @@ def predict_adapted(
     """
     if PERFORMER not in trained.model.bank.labels:
         return {}
-    if len(np.unique(sample_points.take_numbers(held))) <= MIN_OTHER_TAKES:
+    if len(np.unique(sample_points.recording_numbers(held))) <= MIN_OTHER_TAKES:
         return {name: [None] * len(held) for name in ADAPTATION_COUNTS}
     known = canonical_clips.adaptable(recipe, trained)
     return {
@@ -93,7 +93,7 @@ def choose_clips(held: Sequence[Example], asked: int, count: int) -> tuple[int, 
     The first is the nearest to the mean of the controls; each further one is the farthest from
     those before it. Fewer if there are fewer takes.
     """
-    takes, points = sample_points.take_numbers(held), _points(held)
+    takes, points = sample_points.recording_numbers(held), _points(held)
     chosen: list[int] = []
     while len(chosen) < count:
         left = _other_takes(takes, [asked, *chosen])

@@ -17,7 +17,7 @@ from posefield_train.graph.trained_model import Outlier, TrainedModel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.source import clip_joints, frame_faults, measured_controls, take_groups
+from posefield_train.source import clip_joints, frame_faults, measured_controls, recording_groups
 from posefield_train.source.clip_joints import ForeignBones, apart
 from posefield_train.source.control_sources import Auto, Control, ControlMeasured
 from posefield_train.source.ingest import Example
@@ -199,7 +199,7 @@ def _transformed(
     own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
 ) -> Iterator[tuple[str, Floats]]:
     swapped, flipped = (
-        take_groups.mirrored_joints(names),
+        recording_groups.mirrored_joints(names),
         own - 2.0 * (own @ left)[..., None] * left,
     )
     turn = _best_rotation(own, expected)
@@ -216,8 +216,8 @@ def left_direction(joints: Floats, names: tuple[str, ...]) -> Floats:
 
     It is x if no joint names contain sides.
     """
-    swapped = np.array(take_groups.mirrored_joints(names))
-    rights = take_groups.right_joints(names)
+    swapped = np.array(recording_groups.mirrored_joints(names))
+    rights = recording_groups.right_joints(names)
     if not rights:
         return np.array([1.0, 0.0, 0.0])
     # The median over clips ignores a few mirrored clips.

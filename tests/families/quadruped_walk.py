@@ -14,7 +14,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import bvh_writer, quat, skeleton
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
-from posefield_train.sample import two_bone_ik
+from posefield_train.sample import sample_limbs
 from posefield_train.source import facing
 
 RATE = 60.0
@@ -149,7 +149,7 @@ def walk_stride(animal: str, speed: float, turn: float) -> Clip:
         to_ankle = quat.rotate(quat.conj(parent), ankle - positions[:, upper])
         # Knees bend forwards, elbows backwards.
         side = np.array([0.0, 0.0, -1.0 if leg.ahead else 1.0])
-        hip, angle = two_bone_ik.knee(size * BONE, size * BONE, to_ankle, side)
+        hip, angle = sample_limbs.knee(size * BONE, size * BONE, to_ankle, side)
         bend = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), angle)
         shank = quat.mul(parent, quat.mul(hip, bend))
         flat = quat.from_axis_angle(UP, heading)

@@ -15,7 +15,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import bvh_writer, quat
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
-from posefield_train.sample import two_bone_ik
+from posefield_train.sample import sample_limbs
 from posefield_train.source.recipe import Recipe
 
 RATE = 60.0
@@ -146,7 +146,7 @@ def _leg(
     back = quat.conj(pelvis)
     hip = hips + quat.rotate(pelvis, np.array([off * WIDTH, 0.0, 0.0]))
     to_ankle = quat.rotate(back, ankle - hip)
-    upper, angle = two_bone_ik.knee(THIGH, SHIN, to_ankle, np.array([0.0, 0.0, 1.0]))
+    upper, angle = sample_limbs.knee(THIGH, SHIN, to_ankle, np.array([0.0, 0.0, 1.0]))
     bend = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), angle)
     lower = quat.mul(pelvis, quat.mul(upper, bend))
     return [upper, bend, quat.mul(quat.conj(lower), flat)]

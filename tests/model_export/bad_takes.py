@@ -15,7 +15,7 @@ FAR_AWAY = 5
 
 
 def good(seed=20):
-    """A take like those of `rigid_takes.write_takes`, of a third order of motions."""
+    """A recording like those of `rigid_takes.write_takes`, of a third order of motions."""
     return rigid_takes.clip("FSSFSF", seed)
 
 
@@ -34,7 +34,7 @@ def moved(clip, rotations=None, translations=None):
 
 
 def rest_first():
-    """A take that begins with arms forward, after one frame in which all joints are at rest."""
+    """A recording that begins with arms forward, after a frame in which all joints rest."""
     clip = good(21)
     turns = clip.rotations.copy()
     arm_forward = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(-1.2))
@@ -44,7 +44,7 @@ def rest_first():
 
 
 def dropped():
-    """A take in which a frame of a fast motion stands in place of those after it."""
+    """A recording in which a frame of a fast motion stands in place of those after it."""
     clip = good(22)
     speed = np.abs(np.diff(clip.rotations, axis=0)).sum(axis=(1, 2))
     at = int(np.argmax(speed))
@@ -54,7 +54,7 @@ def dropped():
 
 
 def leaping():
-    """A take in which a hand is elsewhere for some frames, as of swapped markers."""
+    """A recording in which a hand is elsewhere for some frames, as of swapped markers."""
     clip = good(23)
     places = clip.translations.copy()
     hand = clip.skeleton.names.index("RightHand")
@@ -63,7 +63,7 @@ def leaping():
 
 
 def mirrored(clip):
-    """The mirror image of a take, with the names of the sides swapped."""
+    """The mirror image of a recording, with the names of the sides swapped."""
     names = clip.skeleton.names
     swap = {"Left": "Right", "Right": "Left"}
     other = [
@@ -75,7 +75,7 @@ def mirrored(clip):
 
 
 def one_frame():
-    """A take of a single frame."""
+    """A recording of a single frame."""
     clip = good()
     return moved(clip, clip.rotations[:1], clip.translations[:1])
 
@@ -89,7 +89,7 @@ def without_legs():
 
 
 def z_up():
-    """The file of a take in a world whose z is up."""
+    """The file of a recording in a world whose z is up."""
     clip = good(25)
     turned = clip.rotations[..., [0, 1, 3, 2]] * [1.0, 1.0, -1.0, 1.0]
     places = clip.translations[..., [0, 2, 1]] * [1.0, -1.0, 1.0]

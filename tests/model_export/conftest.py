@@ -9,11 +9,11 @@ FOUND_WORDS = ("--licence", "CC BY 4.0, by us", "--candidates", "60")
 
 
 @pytest.fixture(scope="session")
-def takes(tmp_path_factory):
-    """Return a folder of four takes of two performers."""
+def recordings(tmp_path_factory):
+    """Return a folder of four recordings of two performers."""
     import rigid_takes
 
-    return rigid_takes.write_takes(tmp_path_factory.mktemp("takes"))
+    return rigid_takes.write_takes(tmp_path_factory.mktemp("recordings"))
 
 
 @pytest.fixture(scope="session")
@@ -23,10 +23,10 @@ def made_once(tmp_path_factory):
 
 
 @pytest.fixture
-def made(posefield, takes, made_once, tmp_path):
+def made(posefield, recordings, made_once, tmp_path):
     """Return a copy of a folder of two or more found families with a stated licence."""
     if not made_once.exists():
-        code, out, err = posefield("discover", takes, "-o", made_once, *FOUND_WORDS)
+        code, out, err = posefield("discover", recordings, "-o", made_once, *FOUND_WORDS)
         assert code == 0, err
-        assert "families of 4 takes" in out
+        assert "families of 4 recordings" in out
     return shutil.copytree(made_once, tmp_path / "recipes")

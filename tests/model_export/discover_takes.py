@@ -1,14 +1,14 @@
-"""Takes for tests of discovery: a body whose feet and hands follow functions of time."""
+"""Recordings for tests of discovery: a body whose feet and hands follow functions of time."""
 
 import numpy as np
 
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 
 RATE = 60.0
 
 
 def body(times, speed=0.0, swing=0.0, period=1.2, hands=None, heading=0.0):
-    """A take of a body that walks along a heading, rad to the left of +z, and moves its hands.
+    """A recording of a body that walks along a heading, rad to the left of +z, and moves its hands.
 
     swing: half of the distance between the feet at its largest, leg lengths. hands: (F, 3), added
     to the right hand.
@@ -40,7 +40,7 @@ def body(times, speed=0.0, swing=0.0, period=1.2, hands=None, heading=0.0):
     return places
 
 
-def take(file, seconds, **kwargs):
-    """A take of a number of seconds."""
+def recording(file, seconds, **kwargs):
+    """A recording of a number of seconds."""
     times = np.arange(round(seconds * RATE) + 1) / RATE
-    return Take(file, RATE, body(times, **kwargs))
+    return Recording(file, RATE, body(times, **kwargs))

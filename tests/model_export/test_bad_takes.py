@@ -12,7 +12,7 @@ import pytest
 import rigid_takes
 from minimal import TOML
 
-from posefield_train.discover import take_reading
+from posefield_train.discover import recordings
 from posefield_train.probe import probe_report
 from posefield_train.source import frame_faults, motion_readers
 
@@ -25,7 +25,7 @@ MANY = 80
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Four good takes among files with faults, a broken link, and a folder with a file's name."""
-    place = rigid_takes.write_takes(tmp_path_factory.mktemp("bad") / "takes")
+    place = rigid_takes.write_takes(tmp_path_factory.mktemp("bad") / "recordings")
     for name, (content, _) in FILES.items():
         (place / name).write_bytes(content)
     (place / "gone.bvh").symlink_to(place / "nowhere")
@@ -35,14 +35,14 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def read(folder):
-    return take_reading.read_takes(folder)
+    return recordings.read_recordings(folder)
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_each_file_is_searched_noted_or_refused_with_its_reason(read, name):
     said = FILES[name][1]
     assert (name in read.refused) == (name not in SEARCHED)
-    assert (name in {take.file for take in read.takes}) == (name in SEARCHED)
+    assert (name in {recording.file for recording in read.recordings}) == (name in SEARCHED)
     if name in SEARCHED:
         assert any(said.removeprefix("note: ") in own for own in read.notes.get(name, [""]))
         assert (name in read.notes) == bool(said)
@@ -51,12 +51,12 @@ def test_each_file_is_searched_noted_or_refused_with_its_reason(read, name):
 
 
 def test_a_folder_without_one_good_file_is_refused_and_nothing_written(posefield, tmp_path):
-    takes = tmp_path / "takes"
-    takes.mkdir()
+    recordings = tmp_path / "recordings"
+    recordings.mkdir()
     for name in set(FILES) - set(SEARCHED) - {"metres.bvh", "z_up.bvh", "other_format.glb"}:
-        (takes / name).write_bytes(FILES[name][0])
-    code, _, err = posefield("discover", takes, "-o", tmp_path / "out")
-    assert code == 3 and "no take that can be searched; such as" in err
+        (recordings / name).write_bytes(FILES[name][0])
+    code, _, err = posefield("discover", recordings, "-o", tmp_path / "out")
+    assert code == 3 and "no recording that can be searched; such as" in err
     assert not (tmp_path / "out").exists()
 
 
@@ -96,11 +96,11 @@ def test_every_command_refuses_a_format_with_the_way_out(posefield, tmp_path, su
 
 
 def test_a_rest_pose_before_the_motion_is_in_no_clip(read):
-    (take,) = (own for own in read.takes if own.file == "rest_first.bvh")
-    assert take.first == 1
-    assert np.array_equal(take.places["leftHand"][0], take.places["leftHand"][1])
-    good = next(own for own in read.takes if own.file == "ann_0.bvh")
-    # All takes rest at first; where the motion goes on from there, nothing is left out.
+    (recording,) = (own for own in read.recordings if own.file == "rest_first.bvh")
+    assert recording.first == 1
+    assert np.array_equal(recording.places["leftHand"][0], recording.places["leftHand"][1])
+    good = next(own for own in read.recordings if own.file == "ann_0.bvh")
+    # All recordings rest at first; where the motion goes on from there, nothing is left out.
     assert good.first == 0
 
 
@@ -121,22 +121,24 @@ def test_copies_are_one_take_of_one_performer_in_the_found_tables(posefield, fol
     assert copies & {row["file"] for row in rows}
     for row in rows:
         own = "copied" if row["file"] in copies else row["file"].removesuffix(".bvh")
-        assert row["take"] == own
+        assert row["recording"] == own
     assert len({row["performer"] for row in rows if row["file"] in copies}) == 1
     table = tmp_path / "like.csv"
     posefield("discover", folder, "--like", "copied.bvh:1-3.5", "-o", table)
-    found = {row["file"]: row["take"] for row in csv.DictReader(table.read_text().splitlines())}
+    found = {
+        row["file"]: row["recording"] for row in csv.DictReader(table.read_text().splitlines())
+    }
     assert {found[name] for name in copies & set(found)} == {"copied"}
     assert len(copies & set(found)) > 1
 
 
 def test_no_clip_is_found_across_a_leap(posefield, folder, tmp_path):
-    table, takes = tmp_path / "like.csv", tmp_path / "takes"
-    takes.mkdir()
+    table, recordings = tmp_path / "like.csv", tmp_path / "recordings"
+    recordings.mkdir()
     for name in ("ann_0.bvh", "bob_1.bvh", "leaping.bvh"):
-        shutil.copy(folder / name, takes / name)
+        shutil.copy(folder / name, recordings / name)
     words = ("--like", "ann_0.bvh:1-3.5", "--most", "400")
-    posefield("discover", takes, *words, "-o", table)
+    posefield("discover", recordings, *words, "-o", table)
     rows = list(csv.DictReader(table.read_text().splitlines()))
     own = [row for row in rows if row["file"] == "leaping.bvh"]
     assert own
@@ -149,8 +151,8 @@ def test_takes_of_two_performances_are_no_copies():
     times = np.arange(240) / discover_takes.RATE
     one = discover_takes.body(times, speed=1.0, swing=0.6)
     other = discover_takes.body(times, speed=1.02, swing=0.61)
-    assert not take_reading.find_copies(["a", "b"], [one, other])
-    found = take_reading.find_copies(["a", "b"], [one, one])
+    assert not recordings.find_copies(["a", "b"], [one, other])
+    found = recordings.find_copies(["a", "b"], [one, one])
     assert found["b"].recording == "a" and "shares frames with" in found["b"].note
 
 
@@ -166,21 +168,21 @@ def test_faults_are_told_from_motions_without():
 def test_the_order_in_which_files_are_listed_does_not_matter(posefield, tmp_path):
     outputs = []
     for order in (1, -1):
-        takes = tmp_path / f"order{order}" / "takes"
-        takes.mkdir(parents=True)
+        recordings = tmp_path / f"order{order}" / "recordings"
+        recordings.mkdir(parents=True)
         good = rigid_takes.write_takes(tmp_path / "good")
         for path in sorted(good.iterdir())[::order]:
-            (takes / path.name).write_bytes(path.read_bytes())
-        (takes / "cut.bvh").write_bytes(FILES["cut.bvh"][0])
+            (recordings / path.name).write_bytes(path.read_bytes())
+        (recordings / "cut.bvh").write_bytes(FILES["cut.bvh"][0])
         output = tmp_path / f"order{order}" / "recipes"
-        assert posefield("discover", takes, "-o", output, *FEW)[0] == 0
+        assert posefield("discover", recordings, "-o", output, *FEW)[0] == 0
         outputs.append({p.name: p.read_text() for p in output.iterdir()})
     one, other = ({n: own.replace("order-1", "order1") for n, own in o.items()} for o in outputs)
     assert one == other
 
 
 def tiny(folder, count):
-    """Write many takes of a second, each of another motion."""
+    """Write many recordings of a second, each of another motion."""
     folder.mkdir()
     base = rigid_takes.clip("FS", 3)
     for index in range(count):
@@ -198,10 +200,10 @@ def test_memory_of_many_files_is_that_of_their_joints_alone(tmp_path):
     """Of each file, only the joints with a role and a few measured frames stay in memory."""
     folder = tiny(tmp_path / "many", MANY)
     tracemalloc.start()
-    read = take_reading.read_takes(folder)
+    read = recordings.read_recordings(folder)
     size, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert len(read.takes) > MANY - 10
+    assert len(read.recordings) > MANY - 10
     assert size < MANY * 100_000
     few = [len(read.figures[f"{index:05d}.bvh"].positions) for index in (0, MANY - 1)]
     assert few == [40, 5]

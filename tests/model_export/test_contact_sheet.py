@@ -21,12 +21,12 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def page(posefield, folder):
-    """The page of a folder of takes."""
+    """The page of a folder of recordings."""
     made = folder / "recipes"
     if not made.exists():
-        takes = rigid_takes.write_takes(folder / "takes")
-        (takes / "broken.bvh").write_text("HIERARCHY <b>")
-        assert posefield("discover", takes, "-o", made, *WORDS)[0] == 0
+        recordings = rigid_takes.write_takes(folder / "recordings")
+        (recordings / "broken.bvh").write_text("HIERARCHY <b>")
+        assert posefield("discover", recordings, "-o", made, *WORDS)[0] == 0
     return made / "index.html"
 
 

@@ -5,7 +5,11 @@ import pytest
 
 from posefield.motion.measures import MeasuredMotion
 from posefield_train.discover import control_proposals
-from posefield_train.discover.control_proposals import FamilyClips, ProposedControl, TakePrediction
+from posefield_train.discover.control_proposals import (
+    FamilyClips,
+    ProposedControl,
+    RecordingPrediction,
+)
 
 ROLES = ("hips", "head", "leftHand", "rightHand", "leftToes", "rightToes")
 REST = np.array(
@@ -30,28 +34,30 @@ def reaching(seed, count=36, moving=True):
         places[:, 0] += wave * [0.1 * height, -0.2 + 0.2 * height, 0.0]
         places += rng.normal(0.0, 0.004, (1, len(ROLES), 3)) * [1.0, 0.0, 1.0]
         motions.append(MeasuredMotion(places, 1.3, np.zeros(3), (-1, 0, 0, 0, 0, 0), REST))
-    takes = [f"take{at % TAKES}" for at in range(count)]
+    recordings = [f"recording{at % TAKES}" for at in range(count)]
     performers = [f"p{at % TAKES % PERFORMERS}" for at in range(count)]
     joints = {role: at for at, role in enumerate(ROLES)}
-    return FamilyClips(tuple(motions), joints, tuple(performers), tuple(takes), False)
+    return FamilyClips(tuple(motions), joints, tuple(performers), tuple(recordings), False)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_residuals_are_those_of_refitting_without_each_take(seed):
     rng = np.random.default_rng(seed)
     values, measures = rng.normal(size=(14, 5)), rng.normal(size=(2, 14))
-    takes = [f"t{at // 3}" for at in range(14)]
-    prediction = TakePrediction(values, [f"p{at % 2}" for at in range(14)], takes)
+    recordings = [f"t{at // 3}" for at in range(14)]
+    prediction = RecordingPrediction(values, [f"p{at % 2}" for at in range(14)], recordings)
     covariance = prediction.covariance(list(measures))
     expected = np.zeros_like(values)
-    for take in set(takes):
-        own = np.array([other == take for other in takes])
+    for recording in set(recordings):
+        own = np.array([other == recording for other in recordings])
         weights = np.linalg.solve(covariance[np.ix_(~own, ~own)], values[~own])
         expected[own] = values[own] - covariance[np.ix_(own, ~own)] @ weights
     found = prediction.residuals(list(measures))
     np.testing.assert_allclose(found, expected, atol=1e-10)
     # Leaving out single clips gives other residuals.
-    single = TakePrediction(values, [f"p{at % 2}" for at in range(14)], [str(i) for i in range(14)])
+    single = RecordingPrediction(
+        values, [f"p{at % 2}" for at in range(14)], [str(i) for i in range(14)]
+    )
     assert np.abs(single.residuals(list(measures)) - expected).max() > 0.01
 
 
@@ -76,7 +82,7 @@ def test_strides_are_controlled_by_their_gait():
         motions.append(
             MeasuredMotion(REST + travelled, 1.0, travel, motion.parents, motion.offsets)
         )
-    family = FamilyClips(tuple(motions), own.joints, own.performers, own.takes, True)
+    family = FamilyClips(tuple(motions), own.joints, own.performers, own.recordings, True)
     found = control_proposals.propose_controls(family)
     assert found.event is None
     assert [one.quantity for one in found.controls[:3]] == ["speed", "turn", "stride_length"]
@@ -84,6 +90,8 @@ def test_strides_are_controlled_by_their_gait():
 
 def test_one_take_cannot_be_left_out():
     own = reaching(0)
-    alone = FamilyClips(own.motions, own.joints, own.performers, ("a",) * len(own.takes), False)
-    with pytest.raises(ValueError, match="clips of one take, expected two takes or more"):
+    alone = FamilyClips(
+        own.motions, own.joints, own.performers, ("a",) * len(own.recordings), False
+    )
+    with pytest.raises(ValueError, match="clips of one recording, expected two recordings or more"):
         control_proposals.propose_controls(alone)

@@ -49,12 +49,12 @@ PARENTS = {"neck": "hips", "head": "neck"} | {
 }
 
 
-def clip_of(take):
-    """A clip whose joints move by translation alone, so that their places are the take's."""
-    roles = list(take.places)
+def clip_of(recording):
+    """A clip whose joints move by translation alone, so that their places are the recording's."""
+    roles = list(recording.places)
     order = ["hips", *(role for role in roles if role != "hips")]
     parents = (-1, *(order.index(PARENTS[role]) for role in order[1:]))
-    places = np.stack([take.places[role] for role in order], axis=1)
+    places = np.stack([recording.places[role] for role in order], axis=1)
     local = places.copy()
     local[:, 1:] -= places[:, parents[1:]]
     tips = tuple(sorted(set(range(len(order))) - set(parents)))
@@ -63,21 +63,23 @@ def clip_of(take):
     )
     turns = np.zeros((len(places), len(order), 4))
     turns[..., 0] = 1.0
-    return Clip(joints, turns, local, take.rate)
+    return Clip(joints, turns, local, recording.rate)
 
 
-def write(path, take):
+def write(path, recording):
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(bvh_writer.dumps(clip_of(take), metres_per_unit=1.0))
+    path.write_bytes(bvh_writer.dumps(clip_of(recording), metres_per_unit=1.0))
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder of two takes, one of them in a subfolder, and a broken file."""
-    write(tmp_path / "takes/a.bvh", discover_takes.take("a", 6.0, **WALK))
-    write(tmp_path / "takes/day2/b.bvh", discover_takes.take("b", 4.0, heading=1.0, **WALK))
-    (tmp_path / "takes/broken.bvh").write_text("HIERARCHY\nROOT a {")
-    return tmp_path / "takes"
+    """A folder of two recordings, one of them in a subfolder, and a broken file."""
+    write(tmp_path / "recordings/a.bvh", discover_takes.recording("a", 6.0, **WALK))
+    write(
+        tmp_path / "recordings/day2/b.bvh", discover_takes.recording("b", 4.0, heading=1.0, **WALK)
+    )
+    (tmp_path / "recordings/broken.bvh").write_text("HIERARCHY\nROOT a {")
+    return tmp_path / "recordings"
 
 
 def rows(path):
@@ -87,7 +89,7 @@ def rows(path):
 
 def test_strides_of_a_folder_become_a_table(posefield, folder):
     code, out, err = posefield("discover", folder, "--strides", "-o", folder / "strides.csv")
-    assert code == 0 and "5 clips (strides) of 2 takes" in out
+    assert code == 0 and "5 clips (strides) of 2 recordings" in out
     assert "left out: broken.bvh: " in err
     found = rows(folder / "strides.csv")
     assert [(row["file"], row["first_frame"], row["last_frame"]) for row in found] == [
@@ -110,7 +112,7 @@ def test_the_example_comes_first_and_is_accepted(posefield, folder):
     words = ("--like", "a.bvh:1.2-2.4", "--name", "step", "--most", "3", "--json")
     code, out, _ = posefield("discover", folder, *words, "-o", folder / "step.csv")
     facts = json.loads(out)
-    assert code == 0 and (facts["clips"], facts["takes"]) == (4, 2)
+    assert code == 0 and (facts["clips"], facts["recordings"]) == (4, 2)
     assert list(facts["refused"]) == ["broken.bvh"]
     found = rows(folder / "step.csv")
     assert [row["accepted"] for row in found] == ["true", "false", "false", "false"]
@@ -148,7 +150,7 @@ def test_takes_are_compared_in_the_roles_of_all_and_the_others_are_told(posefiel
     path.write_text(path.read_text().replace("Hand", "Hook"))
     words = ("--like", "a.bvh:1.2-2.4", "-o", folder / "x.csv")
     _, _, err = posefield("discover", folder, *words)
-    assert "not compared, because some takes have none: leftHand, rightHand" in err
+    assert "not compared, because some recordings have none: leftHand, rightHand" in err
     assert json.loads(posefield("discover", folder, *words, "--json")[1])["not_compared"] == [
         "leftHand",
         "rightHand",
@@ -189,17 +191,20 @@ def test_a_table_without_examples_is_refused(posefield, folder, verdict, code, s
 
 
 def test_takes_without_motion_are_refused(posefield, tmp_path):
-    write(tmp_path / "a.bvh", discover_takes.take("a", 6.0))
+    write(tmp_path / "a.bvh", discover_takes.recording("a", 6.0))
     words = ("--like", "a.bvh:1.2-2.4", "-o", tmp_path / "x.csv")
     code, _, err = posefield("discover", tmp_path, *words)
-    assert code == 2 and "nothing moves in the takes" in err
+    assert code == 2 and "nothing moves in the recordings" in err
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--strides", "--like", "a.bvh:1-2"), "expected either --strides or --like"),
-        (("--like", "c.bvh:1-2"), "file 'c.bvh', expected a take of the folder, such as a.bvh"),
+        (
+            ("--like", "c.bvh:1-2"),
+            "file 'c.bvh', expected a recording of the folder, such as a.bvh",
+        ),
         (("--like", "a.bvh:5-7"), "5 to 7 s, expected 0.6 s or more between 0 and 6.00 s"),
     ],
 )
@@ -211,9 +216,9 @@ def test_searches_that_are_none_are_refused(posefield, folder, words, said):
 
 @pytest.fixture
 def odd(tmp_path):
-    """A folder with a take whose hips and feet have names that no tool gives."""
+    """A folder with a recording whose hips and feet have names that no tool gives."""
     path = tmp_path / "a.bvh"
-    write(path, discover_takes.take("a", 6.0, **WALK))
+    write(path, discover_takes.recording("a", 6.0, **WALK))
     text = path.read_text().replace("LeftFoot", "LeftHoof").replace("RightFoot", "RightHoof")
     path.write_text(text)
     return tmp_path
@@ -225,7 +230,7 @@ def test_roles_that_names_do_not_tell_are_asked_and_can_be_stated(posefield, odd
     assert code == 3 and "no joint for leftFoot, rightFoot" in err
     (odd / "roles.toml").write_text('[roles]\nleftFoot = "LeftHoof"\nrightFoot = "RightHoof"\n')
     code, out, _ = posefield("discover", odd, *words, "--roles", odd / "roles.toml")
-    assert code == 0 and "of 1 takes" in out and len(rows(odd / "x.csv")) >= 3
+    assert code == 0 and "of 1 recordings" in out and len(rows(odd / "x.csv")) >= 3
 
 
 @pytest.mark.parametrize(

@@ -74,11 +74,11 @@ def results(recipe, family):
 
 
 def test_every_clip_is_held_out_once_with_all_of_its_take(family):
-    files = [replace(e, take="") for e in family]
+    files = [replace(e, recording="") for e in family]
     same = [
         replace(e, row=replace(e.row, place=family[i // 3].row.place)) for i, e in enumerate(files)
     ]
-    stated = [replace(e, take=f"take {i // 3}") for i, e in enumerate(family)]
+    stated = [replace(e, recording=f"recording {i // 3}") for i, e in enumerate(family)]
     for examples, parts in ((family, CLIPS), (files, CLIPS), (same, CLIPS // 3)):
         listed = protocol.clip_folds(examples)
         assert sorted(i for fold in listed for i in fold.held) == list(range(CLIPS))
@@ -89,8 +89,10 @@ def test_every_clip_is_held_out_once_with_all_of_its_take(family):
     assert [fold.held for fold in protocol.clip_folds(stated)] == [
         fold.held for fold in protocol.clip_folds(same)
     ]
-    with pytest.raises(TrainingError, match=r"all \d+ clips are of one take, expected two or more"):
-        protocol.clip_folds([replace(e, take="one") for e in family])
+    with pytest.raises(
+        TrainingError, match=r"all \d+ clips are of one recording, expected two or more"
+    ):
+        protocol.clip_folds([replace(e, recording="one") for e in family])
 
 
 def test_performers_are_held_out_whole(family):
@@ -181,11 +183,11 @@ def test_facts_are_the_measured_errors(results):
 
 
 def test_clips_that_agree_within_takes_count_as_one(rng):
-    takes, values = np.repeat(np.arange(6), 5), rng.standard_normal(6)
-    error = summary.clustered_standard_error(values[takes], takes)
+    recordings, values = np.repeat(np.arange(6), 5), rng.standard_normal(6)
+    error = summary.clustered_standard_error(values[recordings], recordings)
     assert error == pytest.approx(values.std(ddof=1) / np.sqrt(6))
     # Negative control: over clips the same differences look more certain than they are.
-    assert error > 2 * summary.clustered_standard_error(values[takes], np.arange(30))
+    assert error > 2 * summary.clustered_standard_error(values[recordings], np.arange(30))
     assert summary.clustered_standard_error(values, np.zeros(6, dtype=int)) == 0.0
 
 

@@ -10,7 +10,7 @@ from posefield.motion import quat
 from posefield_train import outliers
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.source import clip_joints, take_groups
+from posefield_train.source import clip_joints, recording_groups
 
 HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)
 NAMES = ("Hips", "LeftHand", "RightHand", "lfoot", "rfoot", "Neck")
@@ -63,7 +63,7 @@ def body(rng):
 
 def test_a_disguise_is_seen_through(rng):
     expected, left = body(rng), np.array([1.0, 0.0, 0.0])
-    swap, flip = list(take_groups.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
+    swap, flip = list(recording_groups.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
     up = quat.rotate(quat.from_axis_angle(left, np.array(np.pi / 2)), expected)
     round_about = quat.rotate(
         quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi / 2)), expected

@@ -8,7 +8,7 @@ from posefield_train.discover import family_search, motion_features
 from posefield_train.discover.motion_features import Span
 
 PLANTED = ((0, 4.0, 2.0), (0, 12.0, 1.6), (1, 5.0, 2.4), (1, 15.0, 2.0), (2, 9.0, 1.8))
-"""Take, begin and duration, s, of a raised hand in takes of other movements."""
+"""Recording, begin and duration, s, of a raised hand in recordings of other movements."""
 
 
 def waving(seed, raises):
@@ -28,21 +28,23 @@ def waving(seed, raises):
 
 @pytest.fixture(scope="module")
 def corpus():
-    """Three takes that go to different places and face elsewhere, with planted motions."""
-    takes = []
+    """Three recordings that go to different places and face elsewhere, with planted motions."""
+    recordings = []
     for index in range(3):
-        raises = [(begin, duration) for take, begin, duration in PLANTED if take == index]
+        raises = [(begin, duration) for recording, begin, duration in PLANTED if recording == index]
         hands = waving(index, raises)
-        takes.append(
-            discover_takes.take(f"{index}.bvh", 20.0, hands=hands, heading=2.0 * index, speed=0.1)
+        recordings.append(
+            discover_takes.recording(
+                f"{index}.bvh", 20.0, hands=hands, heading=2.0 * index, speed=0.1
+            )
         )
-    return motion_features.build_corpus(takes)
+    return motion_features.build_corpus(recordings)
 
 
 @pytest.mark.parametrize("query", range(len(PLANTED)))
 def test_planted_motions_come_first(corpus, query):
-    take, begin, duration = PLANTED[query]
-    found = family_search.find_like(corpus, [Span(take, begin, begin + duration)], 8)
+    recording, begin, duration = PLANTED[query]
+    found = family_search.find_like(corpus, [Span(recording, begin, begin + duration)], 8)
     expected = {one for one in PLANTED if one != PLANTED[query]}
     best = [match.span for match in found[:4]]
     for other, start, seconds in expected:
@@ -53,7 +55,9 @@ def test_planted_motions_come_first(corpus, query):
 
 
 def test_further_examples_and_rejections_change_the_list(corpus):
-    first, second = (Span(take, begin, begin + length) for take, begin, length in PLANTED[:2])
+    first, second = (
+        Span(recording, begin, begin + length) for recording, begin, length in PLANTED[:2]
+    )
     alone = family_search.find_like(corpus, [first], 6)
     assert family_search.find_like(corpus, [first, first], 6) == [
         family_search.Match(match.span, pytest.approx(match.cost)) for match in alone
@@ -69,7 +73,7 @@ def test_further_examples_and_rejections_change_the_list(corpus):
 
 def shared(one, other):
     """Common time of two parts as a share of the time of either."""
-    if one.take != other.take:
+    if one.recording != other.recording:
         return 0.0
     common = min(one.end, other.end) - max(one.start, other.start)
     return common / (max(one.end, other.end) - min(one.start, other.start))

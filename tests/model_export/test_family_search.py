@@ -8,18 +8,18 @@ from posefield_train.discover import family_search, found_clips, motion_features
 
 SECONDS, TAKES = 24.0, 3
 ORDERS = ("RCCRRC", "CRRRCC", "CCRCRR")
-"""Planted motions of each take, raises and circles, in an order that does not repeat."""
+"""Planted motions of each recording, raises and circles, in an order that does not repeat."""
 
 
 def plan(kind):
-    """Take, begin and duration, s, of the planted motions of a kind; the hand rests between."""
+    """Recording, begin and duration, s, of the planted motions of a kind; the hand rests else."""
     rng = np.random.default_rng(8)
     found = []
-    for take, order in enumerate(ORDERS):
+    for recording, order in enumerate(ORDERS):
         at = 1.0
         for own in order:
             seconds, rest = rng.uniform(1.5, 2.0), rng.uniform(0.9, 2.2)
-            found += [(take, at, seconds)] if own == kind else []
+            found += [(recording, at, seconds)] if own == kind else []
             at += seconds + rest
     return tuple(found)
 
@@ -28,8 +28,8 @@ RAISES, CIRCLES = plan("R"), plan("C")
 
 
 def moving(planted, noise=0.0, seed=0):
-    """Takes whose right hand makes the planted motions: raises and circles to the side."""
-    takes = []
+    """Recordings whose right hand makes the planted motions: raises and circles to the side."""
+    recordings = []
     for index in range(TAKES):
         times = np.arange(round(SECONDS * discover_takes.RATE) + 1) / discover_takes.RATE
         hands = np.zeros((len(times), 3))
@@ -40,10 +40,12 @@ def moving(planted, noise=0.0, seed=0):
             hands += np.stack([0.5 * side, -0.1 * up, 0.8 * up], axis=1) * (kind == "circle")
         knots = np.random.default_rng(seed + index).normal(0.0, noise, (3, 49))
         wander = [np.interp(times, np.arange(49.0) / 2.0, own) for own in knots]
-        takes.append(
-            discover_takes.take(f"{index}.bvh", SECONDS, hands=hands + np.stack(wander, axis=1))
+        recordings.append(
+            discover_takes.recording(
+                f"{index}.bvh", SECONDS, hands=hands + np.stack(wander, axis=1)
+            )
         )
-    return motion_features.build_corpus(takes)
+    return motion_features.build_corpus(recordings)
 
 
 PLANTED = [("raise", one) for one in RAISES] + [("circle", one) for one in CIRCLES]
@@ -55,11 +57,11 @@ def corpus():
 
 
 def kinds(span):
-    """Kinds of the planted motions that lie in a part of a take, each but for a tenth."""
+    """Kinds of the planted motions that lie in a part of a recording, each but for a tenth."""
     found = []
-    for kind, (take, begin, seconds) in PLANTED:
+    for kind, (recording, begin, seconds) in PLANTED:
         both = min(span.end, begin + seconds) - max(span.start, begin)
-        found += [kind] if span.take == take and both >= 0.9 * seconds else []
+        found += [kind] if span.recording == recording and both >= 0.9 * seconds else []
     return found
 
 

@@ -93,7 +93,7 @@ def runtime(content):
 
 
 def test_a_level_fed_to_the_file_is_the_level_of_the_service(model_path, question):
-    """The service makes the level a constant; the file itself takes it as an input."""
+    """The service makes the level a constant; the file itself recordings it as an input."""
     opened, plain = session.load(model_path), runtime(model_path.read_bytes())
     feed = dict(zip(("controls", "time"), question, strict=True))
     for level in range(4):

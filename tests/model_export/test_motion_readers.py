@@ -79,7 +79,7 @@ def test_an_amc_file_needs_the_rate_of_the_recipe(tmp_path):
 
 def test_files_in_archives_are_read_alike(tmp_path):
     clip = small_clip()
-    folder = tmp_path / "takes"
+    folder = tmp_path / "recordings"
     folder.mkdir()
     write_arm(folder, "07.asf")
     for ending in ("usda", "usdz", "glb"):
@@ -136,7 +136,7 @@ def test_a_table_names_the_animations_of_a_file(tmp_path):
     (tmp_path / "a.glb").write_bytes(two_animations())
     (left, ahead), _ = table(tmp_path, "a.glb,1,left", "a.glb,2,ahead")
     assert (left.row.source, ahead.row.source) == ("a.glb[left]", "a.glb[ahead]")
-    assert (left.take, ahead.take) == (left.row.motion, ahead.row.motion)
+    assert (left.recording, ahead.recording) == (left.row.motion, ahead.row.motion)
     assert np.abs(left.clip.root_path[-1] - ahead.clip.root_path[-1]).max() > 1.0
     with pytest.raises(FileError, match="the same frames of the same file as line 2"):
         table(tmp_path, "a.glb,1,left", "a.glb,2,left")

@@ -8,7 +8,7 @@ import pytest
 from posefield.motion import quat
 from posefield_train import training
 from posefield_train.graph import onnx_export
-from posefield_train.source import take_groups
+from posefield_train.source import recording_groups
 from posefield_train.source.canonical import place
 
 # A clip from the middle of the family, and one of another performer far from it.
@@ -27,7 +27,7 @@ def reversed_axis(clip):
 
 
 def exchanged(clip):
-    other = list(take_groups.mirrored_joints(clip.skeleton.names))
+    other = list(recording_groups.mirrored_joints(clip.skeleton.names))
     return replace(
         clip, rotations=clip.rotations[:, other], translations=clip.translations[:, other]
     )

@@ -1,4 +1,4 @@
-"""Tests of the tuning of single values by the density of left-out takes."""
+"""Tests of the tuning of single values by the density of left-out recordings."""
 
 from dataclasses import replace
 
@@ -29,9 +29,9 @@ NAMES = (("offset", 0), ("trend", 0), ("nugget", 0))
 
 @pytest.fixture
 def laid(rng):
-    takes = np.arange(COUNT) % TAKES
-    points = np.hstack([rng.uniform(-1.0, 1.0, (COUNT, 2)), np.eye(PEOPLE)[takes % PEOPLE]])
-    return SamplePoints(points, 2, takes, (PEOPLE,))
+    recordings = np.arange(COUNT) % TAKES
+    points = np.hstack([rng.uniform(-1.0, 1.0, (COUNT, 2)), np.eye(PEOPLE)[recordings % PEOPLE]])
+    return SamplePoints(points, 2, recordings, (PEOPLE,))
 
 
 def loss_of(laid, values, kind=PredictiveDensityLoss):
@@ -42,9 +42,9 @@ def in_search_units(hyper):
     return np.log([hyper.labels[0].offset, hyper.trend, hyper.nugget])
 
 
-def take_density(laid, values, take):
+def take_density(laid, values, recording):
     """Squared residual in units of its covariance, and the logarithm of the determinant."""
-    own = laid.groups == take
+    own = laid.groups == recording
     known, asked = laid.points[~own], laid.points[own]
     inverse = np.linalg.inv(universal_kriging.noisy(HYPER, known))
     near = universal_kriging.covariances(HYPER, asked, known)

@@ -304,8 +304,12 @@ def test_the_example_of_landmarks_is_a_recipe_and_a_table(tmp_path, clip, writte
 def test_init_proposes_the_controls_of_clips_of_a_body(posefield, tmp_path):
     """Raises of the right arm to six heights: the draft trains once its licence is stated."""
     for seed in range(6):
-        take = rigid_takes.clip("F", seed)
-        raised = replace(take, rotations=take.rotations[:110], translations=take.translations[:110])
+        recording = rigid_takes.clip("F", seed)
+        raised = replace(
+            recording,
+            rotations=recording.rotations[:110],
+            translations=recording.translations[:110],
+        )
         (tmp_path / f"{seed}.bvh").write_bytes(bvh_writer.dumps(raised, metres_per_unit=0.01))
     code, out, err = posefield("init", tmp_path)
     assert code == 0 and "complete the licence (TODO)" in out and "discover" not in err
@@ -319,4 +323,4 @@ def test_init_proposes_the_controls_of_clips_of_a_body(posefield, tmp_path):
 def test_init_of_long_takes_names_the_search_for_clips(posefield, tmp_path):
     rigid_takes.write_takes(tmp_path)
     code, _, err = posefield("init", tmp_path)
-    assert code == 0 and f"posefield discover {tmp_path} finds clips in long takes" in err
+    assert code == 0 and f"posefield discover {tmp_path} finds clips in long recordings" in err

@@ -123,8 +123,8 @@ def test_a_file_that_is_no_decisions_is_refused(posefield, made, tmp_path, text,
     assert code == 3 and said in err
 
 
-def test_a_folder_of_other_files_is_refused(posefield, takes, made):
-    code, _, err = posefield("review", takes, "--accept", "1")
+def test_a_folder_of_other_files_is_refused(posefield, recordings, made):
+    code, _, err = posefield("review", recordings, "--accept", "1")
     assert code == 3 and "no discover.json, expected a folder that posefield discover wrote" in err
     (made / "discover.json").write_text('{"families": [{}]}')
     code, _, err = posefield("review", made, "--accept", "1")

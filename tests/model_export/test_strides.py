@@ -10,42 +10,42 @@ from posefield_train.discover import stride_detection
 from posefield_train.discover.stride_detection import alternating_extrema, find_strides, moving_mean
 
 WALK = {"speed": 1.0, "swing": 0.6, "period": 1.2}
-"""Feet 0.6 leg lengths apart; a stride takes 72 frames and begins at a multiple of 72."""
+"""Feet 0.6 leg lengths apart; a stride recordings 72 frames and begins at a multiple of 72."""
 
 
-def cuts(take):
-    return [(one.first, one.last) for one in find_strides(take) if one.travels]
+def cuts(recording):
+    return [(one.first, one.last) for one in find_strides(recording) if one.travels]
 
 
 @pytest.mark.parametrize("heading", [0.0, 3.1])
 def test_strides_lie_between_left_feet_most_forward(heading):
-    found = cuts(discover_takes.take("a.bvh", 5.0, heading=heading, **WALK))
+    found = cuts(discover_takes.recording("a.bvh", 5.0, heading=heading, **WALK))
     assert found == [(72, 144), (144, 216), (216, 288)]
 
 
 def test_mirrored_walking_begins_half_a_stride_later():
     """Negative control: the cuts follow the left foot, not any foot."""
-    take = discover_takes.take("a.bvh", 5.0, **(WALK | {"swing": -0.6}))
-    assert cuts(take) == [(36, 108), (108, 180), (180, 252)]
+    recording = discover_takes.recording("a.bvh", 5.0, **(WALK | {"swing": -0.6}))
+    assert cuts(recording) == [(36, 108), (108, 180), (180, 252)]
 
 
 def test_a_rate_changes_frames_and_not_times():
-    slow = discover_takes.take("a.bvh", 5.0, **WALK)
+    slow = discover_takes.recording("a.bvh", 5.0, **WALK)
     places = {role: own[::2] for role, own in slow.places.items()}
     half = replace(slow, rate=30.0, places=places)
     assert cuts(half) == [(first // 2, last // 2) for first, last in cuts(slow)]
 
 
 def test_swings_in_place_are_found_and_do_not_travel():
-    take = discover_takes.take("a.bvh", 5.0, **(WALK | {"speed": 0.0}))
-    found = find_strides(take)
+    recording = discover_takes.recording("a.bvh", 5.0, **(WALK | {"speed": 0.0}))
+    found = find_strides(recording)
     assert len(found) == 3 and not any(one.travels for one in found)
     assert max(one.travel for one in found) < 0.01
 
 
 @pytest.mark.parametrize("change", [{"swing": 0.1}, {"period": 0.4}, {"period": 3.0}])
 def test_small_fast_and_slow_swings_are_no_strides(change):
-    assert find_strides(discover_takes.take("a.bvh", 12.0, **(WALK | change))) == []
+    assert find_strides(discover_takes.recording("a.bvh", 12.0, **(WALK | change))) == []
 
 
 def test_extrema_alternate_and_small_swings_do_not_count():

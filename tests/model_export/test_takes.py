@@ -1,4 +1,4 @@
-"""Tests of takes: stated by the table, or found from files and motions."""
+"""Tests of recordings: stated by the table, or found from files and motions."""
 
 from dataclasses import replace
 
@@ -15,8 +15,8 @@ from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
 from posefield_train.adapt.adapted_file import NewPerformer
 from posefield_train.graph import onnx_export, trained_card
 from posefield_train.kriging import sample_points
-from posefield_train.source import ingest, take_groups
-from posefield_train.source.take_groups import ClipPair
+from posefield_train.source import ingest, recording_groups
+from posefield_train.source.recording_groups import ClipPair
 
 SWAPPED = (0, 1, 4, 5, 2, 3)
 
@@ -41,7 +41,7 @@ def mirrored(motion):
 
 
 def relations(*motions):
-    return take_groups.find_pairs(motions, SWAPPED)
+    return recording_groups.find_pairs(motions, SWAPPED)
 
 
 def test_performances_of_their_own_share_nothing(rng):
@@ -81,7 +81,7 @@ def test_clips_that_continue_each_other_are_found_where_they_were_captured(rng):
 
 
 def test_loops_and_held_poses_tell_nothing(rng):
-    """Animated clips begin and end alike; that makes no take of them."""
+    """Animated clips begin and end alike; that makes no recording of them."""
     t = np.linspace(0.0, 2 * np.pi, 41)[:, None, None]
     rest = rng.normal(size=(6, 3))
     loops = [rest + np.sin(t) * 0.2 * rng.normal(size=(6, 3)) for _ in range(3)]
@@ -105,62 +105,64 @@ def read(tmp_path):
 
     def of(*given, **sections):
         _, examples, notes = ingested(tmp_path, *given, **sections)
-        return examples, sample_points.take_numbers(examples).tolist(), notes
+        return examples, sample_points.recording_numbers(examples).tolist(), notes
 
     return of
 
 
-STATED = {"clips": {"take": "take"}}
+STATED = {"clips": {"recording": "recording"}}
 
 
 def test_takes_of_two_performers_may_have_the_same_name(read):
     rows = [
         f"{i}.bvh,{i},{'1' if i % 4 < 2 else '2'},{'ann' if i < 4 else 'bob'}" for i in range(8)
     ]
-    sections = {"clips": {"take": "take", "performer": "who"}}
-    assert read(EIGHT, rows, "file,v,take,who", **sections)[1] == [0, 0, 1, 1, 2, 2, 3, 3]
+    sections = {"clips": {"recording": "recording", "performer": "who"}}
+    assert read(EIGHT, rows, "file,v,recording,who", **sections)[1] == [0, 0, 1, 1, 2, 2, 3, 3]
 
 
 def test_a_take_column_that_splits_a_file_is_refused(read):
-    cuts = {"clips": {"take": "take", "first_frame": "a", "last_frame": "b"}}
+    cuts = {"clips": {"recording": "recording", "first_frame": "a", "last_frame": "b"}}
     rows = ["0.bvh,0,0,10,one", "1.bvh,1,0,20,one", "0.bvh,2,10,20,two"]
     with pytest.raises(RecipeError) as refused:
-        read(EIGHT, rows, "file,v,a,b,take", **cuts)
+        read(EIGHT, rows, "file,v,a,b,recording", **cuts)
     assert refused.value.line == 4
     assert refused.value.message == (
-        "0.bvh is of take 'two' here and of take 'one' in line 2, expected one take for a file: "
+        "0.bvh is of recording 'two' here and of 'one' in line 2, expected one for a file: "
         "its clips were recorded in one go"
     )
-    with pytest.raises(RecipeError, match=r"clips\.csv:3: column 'take': nothing, expected the na"):
-        read(EIGHT, ["0.bvh,0,a", "1.bvh,1,"], "file,v,take", **STATED)
+    with pytest.raises(
+        RecipeError, match=r"clips\.csv:3: column 'recording': nothing, expected the na"
+    ):
+        read(EIGHT, ["0.bvh,0,a", "1.bvh,1,"], "file,v,recording", **STATED)
 
 
 def test_clips_of_one_file_and_of_one_recording_are_grouped_with_a_note(read):
     long = small_clip(0.0, 61)
     motions = [part(long, 0, 30), *EIGHT[1:6], part(long, 30, 60), part(EIGHT[1], 4, 15)]
-    _, takes, notes = read(motions)
-    assert takes[0] == takes[6] and takes[1] == takes[7]
-    assert len(set(takes)) == 6
+    _, recordings, notes = read(motions)
+    assert recordings[0] == recordings[6] and recordings[1] == recordings[7]
+    assert len(set(recordings)) == 6
     assert notes == [
         "line 9, 7.bvh shares frames with line 3, 1.bvh: such clips are left out together as one "
-        "take (clips.take states takes)",
-        "line 8, 6.bvh continues line 2, 0.bvh: such clips are left out together as one take "
-        "(clips.take states takes)",
+        "recording (clips.recording states recordings)",
+        "line 8, 6.bvh continues line 2, 0.bvh: such clips are left out together as one recording "
+        "(clips.recording states recordings)",
     ]
     cuts = {"clips": {"first_frame": "a", "last_frame": "b"}}
     rows = [f"{i // 2}.bvh,{i},{10 * (i % 2)},{10 + 10 * (i % 2)}" for i in range(8)]
-    _, takes, notes = read(EIGHT, rows, "file,v,a,b", **cuts)
-    assert takes == [0, 0, 1, 1, 2, 2, 3, 3]
+    _, recordings, notes = read(EIGHT, rows, "file,v,a,b", **cuts)
+    assert recordings == [0, 0, 1, 1, 2, 2, 3, 3]
     assert notes == [
         "8 of 8 clips share their file with others: clips of one file are left out together as one "
-        "take (clips.take states takes)"
+        "recording (clips.recording states recordings)"
     ]
 
 
 def test_the_model_file_keeps_takes_that_are_no_files(read, tmp_path):
     rows = [f"{i}.bvh,{i},{i // 2}" for i in range(8)]
     for head, own, expected in (
-        ("file,v,take", STATED, (0, 0, 1, 1, 2, 2, 3, 3)),
+        ("file,v,recording", STATED, (0, 0, 1, 1, 2, 2, 3, 3)),
         ("file,v,other", {}, ()),
     ):
         examples, *_ = read(EIGHT, rows, head, **own)
@@ -174,18 +176,18 @@ def test_the_model_file_keeps_takes_that_are_no_files(read, tmp_path):
 def test_an_adapted_model_keeps_its_takes_and_adds_those_of_new_clips(tmp_path):
     folder, recipe = newcomers.write(tmp_path / "family"), newcomers.recipe()
     examples = [
-        replace(example, take=f"{example.row.performer} {i // 6}")
+        replace(example, recording=f"{example.row.performer} {i // 6}")
         for i, example in enumerate(ingest.ingest(recipe, folder)[0])
     ]
     trained = training.train_examples(recipe, examples)
     content = onnx_export.export_model(trained).content
     reopened = model_reconstruction.reconstruct(content, "a model")
-    before = reopened.card.making.takes
+    before = reopened.card.making.recordings
     assert len(before) == newcomers.CLIPS and len(set(before)) == 9
     table = newcomers.write_newcomer(tmp_path / "cy", (2.0, 7.0))
     found, _ = new_clips.examples_of_table(reopened, table, recipe.source, {"performer": "cy"})
     adapted = adapted_file.export_adapted(reopened, NewPerformer("cy", found, "CC0"))
-    assert adapted.card.making.takes == (*before, max(before) + 1, max(before) + 2)
+    assert adapted.card.making.recordings == (*before, max(before) + 1, max(before) + 2)
     # The new clips are not among those whose accelerations the card has.
     captured = adapted.card.captured_acceleration
     assert captured == reopened.card.captured_acceleration is not None

@@ -9,7 +9,7 @@ from expressed_skeletons import arms_first, random_turns, renamed, with_joint, w
 
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
-from posefield_train.sample import sample_family
+from posefield_train.sample import sample_files
 from posefield_train.source import common_topology, unified_clips
 from posefield_train.source.common_topology import TopologyError
 
@@ -18,7 +18,7 @@ FEW = 6
 
 @pytest.fixture(scope="module")
 def clips():
-    return [trial.clip for trial in islice(sample_family.samples(), FEW)]
+    return [trial.clip for trial in islice(sample_files.samples(), FEW)]
 
 
 def unify(clips, stated=None, stretches=False):

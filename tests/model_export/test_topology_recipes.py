@@ -8,7 +8,7 @@ import posefield_train
 from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer
 from posefield_train.graph import onnx_export
-from posefield_train.sample import sample_family
+from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 
 TEXT = """\
@@ -44,7 +44,7 @@ FILES = {"HAND": "RightHand", "SKELETON": ""}
 @pytest.fixture(scope="module")
 def trials():
     """Twelve clips of one performer, spread over the samples."""
-    found = list(sample_family.samples())
+    found = list(sample_files.samples())
     who = found[0].performer
     own = [trial.clip for trial in found if trial.performer == who]
     return own[::2][:12]

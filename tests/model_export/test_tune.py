@@ -52,14 +52,14 @@ PEOPLE, TAKES = 4, 20
 
 @pytest.fixture
 def people():
-    """Return the performer and take of each of fifty samples: a take has one performer."""
-    take = np.arange(50) % TAKES
-    return take % PEOPLE, take
+    """Return the performer and recording of each of fifty samples, one each."""
+    recording = np.arange(50) % TAKES
+    return recording % PEOPLE, recording
 
 
 def labelled(samples, people):
-    who, takes = people
-    return SamplePoints(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, takes, (PEOPLE,))
+    who, recordings = people
+    return SamplePoints(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, recordings, (PEOPLE,))
 
 
 def own_ways(samples, people, rng, apart):
@@ -105,8 +105,8 @@ def test_loss_is_that_of_leaving_takes_out_one_by_one(samples, people, rng, effe
     maps = 0.5 * rng.normal(size=(50, 3, 2)) if effector else None
     problem = TuningProblem(laid, values, effector=maps)
     squares = 0.0
-    for take in range(TAKES):
-        own = people[1] == take
+    for recording in range(TAKES):
+        own = people[1] == recording
         field = universal_kriging.solve(LABELLED, laid.points[~own], values[~own])
         missed = values[own] - field.predict(laid.points[own])
         squares += np.sum(missed**2)
@@ -189,8 +189,8 @@ def test_groups_are_left_out_together(samples, people, rng):
     residuals = universal_kriging.leave_out(LABELLED, laid.points, people[1]) @ values
     assert np.max(np.abs(found.residuals - residuals)) < 1e-9
     from_mean = np.empty((50, 2))
-    for take in range(TAKES):
-        own = people[1] == take
+    for recording in range(TAKES):
+        own = people[1] == recording
         from_mean[own] = values[own] - values[~own].mean(axis=0)
     assert abs(found.unexplained - np.sum(residuals**2) / np.sum(from_mean**2)) < 1e-9
     single = kriging_tuning.evaluate_fixed(

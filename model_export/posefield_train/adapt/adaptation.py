@@ -176,7 +176,8 @@ def extend_samples(
 ) -> ExtendedSamples:
     """Return the samples of a bank, with groups (n,), followed by examples of a new performer.
 
-    New examples are grouped by take for leave-one-out. Their other labels are those of their rows.
+    New examples are grouped by recording for leave-one-out. Their other labels are those of their
+    rows.
     """
     d = len(bank.low)
     old = (bank.pose.samples[:, :d] * (bank.high - bank.low) + bank.low + bank.high) / 2.0
@@ -188,7 +189,7 @@ def extend_samples(
     weights = sample_points.label_weights(given, names)
     points = np.hstack([half_ranges(np.vstack([old, new]), low, high), weights])
     groups = np.concatenate(
-        [old_groups, 1 + old_groups.max() + sample_points.take_numbers(examples)]
+        [old_groups, 1 + old_groups.max() + sample_points.recording_numbers(examples)]
     )
     growth = (high - low) / (bank.high - bank.low)
     samples = SamplePoints(points, d, groups, tuple(map(len, names.values())))

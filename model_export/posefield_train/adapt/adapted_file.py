@@ -193,7 +193,7 @@ def _card(
         kriging=trained_card.plain_parameters(bank.pose.hyper),
         # The statistics of takes are in the parent's bases, which the new clips change.
         making=replace(
-            reopened.making, fields=made, takes=_takes(old, clips), take_root=(), detail=b""
+            reopened.making, fields=made, takes=_recordings(old, clips), take_root=(), detail=b""
         ),
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
@@ -208,12 +208,12 @@ def _labels(adapted: AdaptedModel) -> tuple[LabelSet, ...]:
     return trained_card.card_labels(bank.labels, samples)
 
 
-def _takes(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
-    """Return the number (N,) of each clip's take, new ones last; empty where each file is one."""
+def _recordings(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
+    """Return the number (N,) of each clip's recording, new ones last; empty if each is a file."""
     if not old.making.takes:
         return ()
     before = reduced_motion.take_numbers(old)
-    after = 1 + before.max() + sample_points.take_numbers(clips)
+    after = 1 + before.max() + sample_points.recording_numbers(clips)
     return (*before.tolist(), *after.tolist())
 
 

@@ -1,4 +1,4 @@
-"""Commands `posefield discover`, clips found in long takes, and `review`, decisions on them."""
+"""Commands `posefield discover`, clips in long recordings, and `review`, decisions on them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from posefield_train.cli import output_files
 
 if TYPE_CHECKING:
     from posefield_train.discover.found_clips import FoundClip
-    from posefield_train.discover.take_reading import ReadTakes
+    from posefield_train.discover.recordings import ReadRecordings
     from posefield_train.families.recipe_folder import FoundFamilies
     from posefield_train.source.motion_readers import MotionFiles
 
@@ -25,9 +25,9 @@ KEPT_POSES = 8_000_000
 at 60 frames a second is 6.7 million. More files are read a second time."""
 
 EXAMPLES = [
-    "discover takes -o recipes --licence 'CC BY 4.0, by us'",
-    "discover takes --strides -o takes/strides.csv",
-    "discover takes --like day1/bd_0.bvh:12.1-14.6 --name grab -o takes/grab.csv",
+    "discover recordings -o recipes --licence 'CC BY 4.0, by us'",
+    "discover recordings --strides -o recordings/strides.csv",
+    "discover recordings --like day1/bd_0.bvh:12.1-14.6 --name grab -o recordings/grab.csv",
 ]
 
 
@@ -41,8 +41,8 @@ class SearchOptions:
     like: Annotated[
         str | None,
         typer.Option(
-            help="find motions like this part of a take, its file below the folder and seconds; or "
-            "like the accepted rows of a former table, TABLE.csv",
+            help="find motions like this part of a recording, its file below the folder and "
+            "seconds; or like the accepted rows of a former table, TABLE.csv",
             metavar="FILE:START-END",
         ),
     ] = None
@@ -88,7 +88,8 @@ class FamilyOptions:
         str, typer.Option(help="licence of the motions with its attribution, for the recipes")
     ] = ""
     candidates: Annotated[
-        int, typer.Option(help="number of parts of takes that are searched", min=1, max=100_000)
+        int,
+        typer.Option(help="number of parts of recordings that are searched", min=1, max=100_000),
     ] = 1_000
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="replace the recipes of an earlier search")
@@ -106,7 +107,7 @@ def discover(
             "--output",
             "-o",
             help="folder of recipes to write; with --strides or --like a table, CSV, best in the "
-            "folder of the takes",
+            "folder of the recordings",
         ),
     ],
     search: SearchOptions,
@@ -114,7 +115,7 @@ def discover(
     families: FamilyOptions,
     json: Json = False,
 ) -> None:
-    """Find families or clips in long takes, for recipes.
+    """Find families or clips in long recordings, for recipes.
 
     Without --strides and --like, each family gets a recipe, which posefield train refuses until
     posefield review or an editor accepts it. In a table, each row has `accepted` false until a
@@ -143,24 +144,24 @@ def _write_recipes(
     replaced = recipe_folder.expect_free(output, wanted.overwrite)
     files = MotionFiles(KEPT_POSES)
     read = _read(folder, stated, files)
-    names = [take.file for take in read.takes]
+    names = [recording.file for recording in read.recordings]
     statements = found_families.FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
     with ProgressBar("bodies", len(names)) as bar:
         kinds = found_families.find_kinds(folder, names, statements, bar.update, read.figures)
     with ProgressBar("candidates", wanted.candidates) as bar:
-        listed = found_families.find_families(read.takes, kinds, wanted.candidates, bar.update)
+        listed = found_families.find_families(read.recordings, kinds, wanted.candidates, bar.update)
     found = recipe_folder.offer(listed, folder, wanted.licence, files)
     facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
-    page = contact_sheet.render(found, read.takes, output.as_posix(), read.refused)
+    page = contact_sheet.render(found, read.recordings, output.as_posix(), read.refused)
     written = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}
     recipe_folder.write(written, output, replaced)
     if json:
         typer.echo(as_json(facts))
     else:
-        _tell_families(found, output, len(read.takes))
+        _tell_families(found, output, len(read.recordings))
 
 
-def _tell_families(found: "FoundFamilies", output: Path, takes: int) -> None:
+def _tell_families(found: "FoundFamilies", output: Path, recordings: int) -> None:
     """Print each family that is offered, and how to accept it."""
     from posefield_train.families import recipe_folder
 
@@ -171,7 +172,7 @@ def _tell_families(found: "FoundFamilies", output: Path, takes: int) -> None:
             f"{one.family.seconds:.1f} s; controls {controls}"
         )
     typer.echo(
-        f"{output}: {len(found.offered)} families of {takes} takes, "
+        f"{output}: {len(found.offered)} families of {recordings} recordings, "
         f"{len(found.refused)} not offered; look at {output / recipe_folder.PAGE}, then accept "
         f"with: posefield review {output} --accept NUMBER"
     )
@@ -188,47 +189,47 @@ def _write_table(
     found, facts = _search(read, search)
     atomic_files.write(found_clips.table(found), output)
     if json:
-        own = {"table": str(output), "clips": len(found), "takes": len(read.takes)}
+        own = {"table": str(output), "clips": len(found), "recordings": len(read.recordings)}
         typer.echo(as_json({**own, **facts, "refused": read.refused, "notes": read.notes}))
         return
     kind = "strides" if search.like is None else f"{search.name}, examples first"
     typer.echo(
-        f"{output}: {len(found)} clips ({kind}) of {len(read.takes)} takes; set accepted to true "
-        "in the rows to train from"
+        f"{output}: {len(found)} clips ({kind}) of {len(read.recordings)} recordings; set "
+        "accepted to true in the rows to train from"
     )
 
 
 def _search(
-    read: "ReadTakes", search: SearchOptions
+    read: "ReadRecordings", search: SearchOptions
 ) -> "tuple[list[FoundClip], dict[str, int | list[str]]]":
     """Return the clips that are found, and what was left out, which standard error tells too."""
     from posefield_train.discover import found_clips, motion_features
 
     if search.like is None:
-        found, in_place = found_clips.strides(read.takes)
+        found, in_place = found_clips.strides(read.recordings)
         if in_place:
             typer.echo(f"left out: {in_place} swings of the legs that do not travel", err=True)
         return found, {"in_place": in_place}
-    examples = found_clips.parse_examples(read.takes, search.like)
-    found = found_clips.like(read.takes, examples, search.name, search.most)
-    lacking = motion_features.lacking_roles(read.takes)
+    examples = found_clips.parse_examples(read.recordings, search.like)
+    found = found_clips.like(read.recordings, examples, search.name, search.most)
+    lacking = motion_features.lacking_roles(read.recordings)
     if lacking:
-        said = f"not compared, because some takes have none: {', '.join(lacking)}"
+        said = f"not compared, because some recordings have none: {', '.join(lacking)}"
         typer.echo(said, err=True)
     return found, {"not_compared": lacking}
 
 
 def _read(
     folder: Path, stated: StatementOptions, files: "MotionFiles | None" = None
-) -> "ReadTakes":
-    """Return the takes of a folder; standard error names files that were refused, and faults."""
+) -> "ReadRecordings":
+    """Return the recordings of a folder; standard error names refused files and faults."""
     from posefield.console.progress import ProgressBar
-    from posefield_train.discover import take_reading
+    from posefield_train.discover import recordings
     from posefield_train.source import motion_readers
 
     with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
-        known = take_reading.Stated(stated.up, _roles(stated), stated.rate)
-        read = take_reading.read_takes(folder, known, bar.update, files)
+        known = recordings.Stated(stated.up, _roles(stated), stated.rate)
+        read = recordings.read_recordings(folder, known, bar.update, files)
     output_files.tell_files("left out", list(read.refused.items()))
     output_files.tell_files(
         "note", [(file, said) for file, own in read.notes.items() for said in own]
@@ -284,7 +285,7 @@ def review(
         ),
     ] = None,
     data: Annotated[
-        Path | None, typer.Option(help="folder of the takes; default: that of the search")
+        Path | None, typer.Option(help="folder of the recordings; default: that of the search")
     ] = None,
     json: Json = False,
 ) -> None:

@@ -82,7 +82,7 @@ def init(
 
 
 LONG = 12.0
-"""Median seconds of files from which on they are rather takes than clips."""
+"""Median seconds of files from which on they are rather recordings than clips."""
 
 
 def _proposed(report: "ProbeReport", folder: Path) -> list[str]:
@@ -94,7 +94,7 @@ def _proposed(report: "ProbeReport", folder: Path) -> list[str]:
     if seconds > LONG:
         typer.echo(
             f"the files are {seconds:.0f} s long in the median: posefield discover {folder} finds "
-            "clips in long takes, and strides with --strides",
+            "clips in long recordings, and strides with --strides",
             err=True,
         )
     # Any family can be read by its hips, before there is another control.

@@ -15,7 +15,7 @@ from posefield.console.output import as_json, written_message
 from posefield.question.results import ClipAnswer, Trust
 
 if TYPE_CHECKING:
-    from posefield_train.sample.sample_family import SampleTrial
+    from posefield_train.sample.sample_files import SampleTrial
 
 
 CONVERT_EXAMPLES = [
@@ -189,14 +189,14 @@ def sample(
 def _write_reaching(output: Path, size: FamilySize) -> Path:
     """Write the procedural family with a progress bar, and return the path of its recipe."""
     from posefield.console.progress import ProgressBar
-    from posefield_train.sample import sample_family, sample_files
+    from posefield_train.sample import sample_files
 
-    count = sample_family.COUNT if size.clips is None else size.clips
-    seed = sample_family.SEED if size.seed is None else size.seed
+    count = sample_files.COUNT if size.clips is None else size.clips
+    seed = sample_files.SEED if size.seed is None else size.seed
     with ProgressBar("motions", count) as bar:
 
         def watched() -> "Iterator[SampleTrial]":
-            for trial in sample_family.samples(count, seed):
+            for trial in sample_files.samples(count, seed):
                 bar.advance(1)
                 yield trial
 

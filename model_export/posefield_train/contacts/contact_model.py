@@ -101,10 +101,10 @@ PREDICTED = 0.8
 
 @dataclass(frozen=True)
 class ContactAccuracy:
-    """Leave-one-take-out errors of contacts, over clips, canonical frames and joints.
+    """Leave-one-recording-out errors of contacts, over clips, canonical frames and joints.
 
     agreement: share of frames where P > 0.5 agrees with the label. brier: mean squared difference.
-    climatology: the same of the mean over the other takes.
+    climatology: the same of the mean over the other recordings.
     """
 
     agreement: float
@@ -115,7 +115,7 @@ class ContactAccuracy:
     def measure(cls, predicted: Floats, labels: Floats, from_mean: Floats) -> "ContactAccuracy":
         """Return the errors of probabilities (...) against labels (...), 0 or 1.
 
-        from_mean: labels less their mean over the other takes (...).
+        from_mean: labels less their mean over the other recordings (...).
         """
         return cls(
             float(np.mean((predicted > 0.5) == (labels > 0.5))),
@@ -173,7 +173,7 @@ def fit_contacts(
 def left_out_accuracy(
     labels: Labels, reduced: Labels, pose: Hyper, samples: SamplePoints
 ) -> ContactAccuracy:
-    """Return the errors of labels (N, T, K) predicted from the reduced ones of the other takes."""
+    """Return the errors of labels (N, T, K) predicted from reduced ones of other recordings."""
     rows, known = labels.reshape(len(labels), -1), reduced.reshape(len(labels), -1)
     left_out = universal_kriging.leave_out_samples(pose, samples)
     predicted = np.clip(known - left_out @ known, 0.0, 1.0)

@@ -1,1 +1,1 @@
-"""Clips found in long takes: strides, and motions like an example."""
+"""Clips found in long recordings: strides, and motions like an example."""

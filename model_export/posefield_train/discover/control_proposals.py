@@ -1,4 +1,4 @@
-"""Controls and events of a family of clips, proposed by what predicts takes that were left out.
+"""Controls and events of a family of clips, those that predict recordings that were left out.
 
 Candidates are the measures that recipes know: places of hands, feet, head and hips at moments of
 the motion, and quantities of locomotion.
@@ -21,17 +21,19 @@ LINEAR, CURVED, CONSTANT, SAME_PERFORMER, NUGGET = 0.5, 0.5, 1.0, 0.3, 0.15
 SCALE = 2.0
 
 
-class TakePrediction:
-    """Prediction of motions from measures, with one take left out after the other.
+class RecordingPrediction:
+    """Prediction of motions from measures, with one recording left out after the other.
 
-    values (N, k): of the motions. performers, takes: of each of them.
+    values (N, k): of the motions. performers, recordings: of each of them.
     """
 
-    def __init__(self, values: Floats, performers: Sequence[str], takes: Sequence[str]) -> None:
-        who, named = np.array(performers), np.array(takes)
+    def __init__(
+        self, values: Floats, performers: Sequence[str], recordings: Sequence[str]
+    ) -> None:
+        who, named = np.array(performers), np.array(recordings)
         self._values = values
         self._same = who[:, None] == who
-        self._groups = [np.flatnonzero(named == take) for take in sorted(set(takes))]
+        self._groups = [np.flatnonzero(named == recording) for recording in sorted(set(recordings))]
         self._alone = self._square([np.zeros(len(values))])
 
     def remaining(self, chosen: Sequence[Floats]) -> float:
@@ -39,7 +41,7 @@ class TakePrediction:
         return self._square(chosen) / self._alone
 
     def residuals(self, chosen: Sequence[Floats]) -> Floats:
-        """Return the values (N, k) less those that the clips of other takes predict."""
+        """Return the values (N, k) less those that the clips of other recordings predict."""
         inverse = np.linalg.inv(self.covariance(chosen))
         weighted = inverse @ self._values
         found = np.zeros_like(self._values)
@@ -93,14 +95,14 @@ FEWEST_VALUES = 3
 class FamilyClips:
     """Clips of a family as measures see them.
 
-    motions: of the clips. joints: index by role. performers, takes: of the clips. cyclic: whether
-    the last pose leads into the first.
+    motions: of the clips. joints: index by role. performers, recordings: of the clips. cyclic:
+    whether the last pose leads into the first.
     """
 
     motions: tuple[MeasuredMotion, ...]
     joints: Mapping[str, int]
     performers: tuple[str, ...]
-    takes: tuple[str, ...]
+    recordings: tuple[str, ...]
     cyclic: bool
 
 
@@ -118,8 +120,8 @@ class ControlProposal:
     """Proposed controls and event.
 
     event: role of its joint, and the moment; None for a family without one. remaining: share of the
-    variance of left-out takes that is left, with the first control, the first two and so on, by the
-    variance without any; the controls of an event come together.
+    variance of left-out recordings that is left, with the first control, the first two and so on,
+    by the variance without any; the controls of an event come together.
     """
 
     controls: tuple[ProposedControl, ...]
@@ -128,13 +130,15 @@ class ControlProposal:
 
 
 def propose_controls(clips: FamilyClips) -> ControlProposal:
-    """Return the controls that predict clips of left-out takes best, at most MOST_CONTROLS.
+    """Return the controls that predict clips of left-out recordings best, at most MOST_CONTROLS.
 
-    Raises ValueError for clips of one take, which cannot be left out.
+    Raises ValueError for clips of one recording, which cannot be left out.
     """
-    if len(set(clips.takes)) < 2:
-        raise ValueError("clips of one take, expected two takes or more")
-    prediction = TakePrediction(motion_coefficients(clips.motions), clips.performers, clips.takes)
+    if len(set(clips.recordings)) < 2:
+        raise ValueError("clips of one recording, expected two recordings or more")
+    prediction = RecordingPrediction(
+        motion_coefficients(clips.motions), clips.performers, clips.recordings
+    )
     known = _candidates(clips)
     values = {
         control: (measured - measured.mean()) / measured.std()
@@ -188,7 +192,7 @@ def _measured(clips: FamilyClips, measure: Measure) -> Floats:
 
 
 def _event(
-    clips: FamilyClips, prediction: TakePrediction, values: Mapping[ProposedControl, Floats]
+    clips: FamilyClips, prediction: RecordingPrediction, values: Mapping[ProposedControl, Floats]
 ) -> tuple[str, MeasureMoment] | None:
     """Return the limb's end that moves most among those that predict well, and its best moment."""
     found: dict[str, tuple[float, MeasureMoment]] = {}
@@ -218,7 +222,7 @@ def _event(
 
 
 def _next(
-    prediction: TakePrediction,
+    prediction: RecordingPrediction,
     values: Mapping[ProposedControl, Floats],
     chosen: Sequence[ProposedControl],
 ) -> tuple[float, ProposedControl] | None:

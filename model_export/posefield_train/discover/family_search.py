@@ -1,8 +1,8 @@
-"""Families of similar motions in takes, found without an example.
+"""Families of similar motions in recordings, found without an example.
 
-Takes are not segmented: each pair of minima of the pose's speed that is 0.7 to 5 s apart may be a
-clip. A sample of these candidates is searched in all takes, and families are taken greedily, that
-first which explains most of what is not yet explained.
+Recordings are not segmented: each pair of minima of the pose's speed that is 0.7 to 5 s apart may
+be a clip. A sample of these candidates is searched in all recordings, and families are taken
+greedily, that first which explains most of what is not yet explained.
 """
 
 import heapq
@@ -14,7 +14,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices
 from posefield_train.discover import motion_features
 from posefield_train.discover.motion_features import RATE, Corpus, Ends, JoinedFeatures, Match, Span
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 
 LARGEST_OVERLAP = 0.2
 """Largest share of the shorter of two clips that they may have in common."""
@@ -41,7 +41,7 @@ def find_like(
         if len(found) == most or not np.isfinite(ends.costs[end]):
             break
         span = joined.span(int(ends.starts[end]), end)
-        if not corpus.is_whole(span.take, span.start, span.end):
+        if not corpus.is_whole(span.recording, span.start, span.end):
             continue
         if any(span.overlap(other) > REJECTED_OVERLAP for other in rejected):
             continue
@@ -75,14 +75,14 @@ MINIMUM_SPAN = 5
 SMOOTHED = 5
 """Frames at RATE over which the speed is averaged."""
 LEAST_MOTION = 0.02
-"""Variance of the pose within a candidate as a share of that of all takes, below which it is a rest
-and no motion."""
+"""Variance of the pose within a candidate as a share of that of all recordings, below which it is a
+rest and no motion."""
 CANDIDATES = 1_000
 """Number of candidates that are searched."""
 LARGEST_COST = 0.55
 """Cost of a match relative to any clip, above which it does not belong to the family.
 
-Precision and recall on takes with known cuts hardly change between 0.5 and 0.6."""
+Precision and recall on recordings with known cuts hardly change between 0.5 and 0.6."""
 FREE = 0.8
 """Share of a clip's frames that no earlier family has."""
 FEWEST = 5
@@ -122,27 +122,28 @@ def find_families(
     )
     found = []
     for searched, span in enumerate(picked, 1):
-        # Left out after they were picked, so that a leap of one take changes no other's candidates.
-        if corpus.is_whole(span.take, span.start, span.end):
+        # Left out after they were picked, so that a leap of one recording changes no other's
+        # candidates.
+        if corpus.is_whole(span.recording, span.start, span.end):
             found.append(_matches(joined, span))
         report(searched)
     return _cover(joined, found)
 
 
 def candidates(corpus: Corpus) -> list[Span]:
-    """Return all parts of takes of a clip's duration between minima of the pose's speed."""
+    """Return all parts of recordings of a clip's duration between minima of the pose's speed."""
     found = []
-    for index, take in enumerate(corpus.takes):
-        times = speed_minima(take, corpus.roles)
+    for index, recording in enumerate(corpus.recordings):
+        times = speed_minima(recording, corpus.roles)
         for start in times:
             within = times[(times >= start + SHORTEST) & (times <= start + LONGEST)]
             found += [Span(index, float(start), float(end)) for end in within]
     return found
 
 
-def speed_minima(take: Take, roles: Sequence[str]) -> Floats:
-    """Return the times (M,), s, at which the pose of a take is slowest, with its begin and end."""
-    places = motion_features.take_features(take, roles)[:, : 3 * len(roles)]
+def speed_minima(recording: Recording, roles: Sequence[str]) -> Floats:
+    """Return the times (M,), s, at which the pose of a recording is slowest, and of its ends."""
+    places = motion_features.recording_features(recording, roles)[:, : 3 * len(roles)]
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=1)
     half = SMOOTHED // 2
     smooth = np.convolve(np.pad(speed, half, "edge"), np.full(SMOOTHED, 1 / SMOOTHED), "valid")

@@ -15,8 +15,8 @@ from posefield.common.errors import FileError, InvalidField, RecipeError
 from posefield.motion.joint_roles import ROLES
 from posefield_train.discover import family_search, motion_features, stride_detection
 from posefield_train.discover.family_search import SHORTEST, Family
-from posefield_train.discover.motion_features import JoinedFeatures, Span, StillTakes
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.motion_features import JoinedFeatures, Span, StillRecordings
+from posefield_train.discover.recordings import Recording
 from posefield_train.source import clip_table, data_folder
 
 EXAMPLE = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
@@ -31,7 +31,7 @@ Verdict = Literal["true", "false", "rejected"]
 
 @dataclass(frozen=True)
 class Examples:
-    """Parts of takes that a person accepted, one or more, and rejected."""
+    """Parts of recordings that a person accepted, one or more, and rejected."""
 
     accepted: tuple[Span, ...]
     rejected: tuple[Span, ...] = ()
@@ -42,8 +42,8 @@ class FoundClip:
     """A row of the table.
 
     file: below the folder. first_frame, last_frame: inclusive. seconds: duration. cost: of a match,
-    None for a stride. accepted: by a person; "false" until then. take: without the ending, that
-    of the recording of which the file may be a copy.
+    None for a stride. accepted: by a person; "false" until then. recording: without the ending,
+    that of the original of which the file may be a copy.
     """
 
     file: str
@@ -53,27 +53,35 @@ class FoundClip:
     seconds: float
     cost: float | None = None
     accepted: Verdict = "false"
-    take: str = ""
+    recording: str = ""
 
 
-COLUMNS = ("file", "name", "take", "first_frame", "last_frame", "seconds", "cost", "accepted")
+COLUMNS = ("file", "name", "recording", "first_frame", "last_frame", "seconds", "cost", "accepted")
 
 
-def strides(takes: Sequence[Take]) -> tuple[list[FoundClip], int]:
-    """Return the strides of all takes, in the takes' order, and how many more do not travel."""
-    every = [(take, one) for take in takes for one in stride_detection.find_strides(take)]
-    found = [_clip(take, "stride", one.first, one.last) for take, one in every if one.travels]
+def strides(recordings: Sequence[Recording]) -> tuple[list[FoundClip], int]:
+    """Return the strides of all recordings, in their order, and how many more do not travel."""
+    every = [
+        (recording, one)
+        for recording in recordings
+        for one in stride_detection.find_strides(recording)
+    ]
+    found = [
+        _clip(recording, "stride", one.first, one.last) for recording, one in every if one.travels
+    ]
     return found, len(every) - len(found)
 
 
-def like(takes: Sequence[Take], examples: "Examples", name: str, most: int) -> list[FoundClip]:
+def like(
+    recordings: Sequence[Recording], examples: "Examples", name: str, most: int
+) -> list[FoundClip]:
     """Return the examples, the clips that are like them, the best first, and the rejected ones.
 
-    Raises InvalidField for takes in which nothing moves.
+    Raises InvalidField for recordings in which nothing moves.
     """
     try:
-        corpus = motion_features.build_corpus(takes)
-    except StillTakes as fault:
+        corpus = motion_features.build_corpus(recordings)
+    except StillRecordings as fault:
         raise InvalidField("like", str(fault)) from fault
     matches = family_search.find_like(corpus, examples.accepted, most, examples.rejected)
     rows: list[tuple[Span, float | None, Verdict]] = [
@@ -83,8 +91,11 @@ def like(takes: Sequence[Take], examples: "Examples", name: str, most: int) -> l
     ]
     found = []
     for span, cost, accepted in rows:
-        first, last = corpus.frame(span.take, span.start), corpus.frame(span.take, span.end)
-        found.append(_clip(takes[span.take], name, first, last, cost, accepted))
+        first, last = (
+            corpus.frame(span.recording, span.start),
+            corpus.frame(span.recording, span.end),
+        )
+        found.append(_clip(recordings[span.recording], name, first, last, cost, accepted))
     return found
 
 
@@ -96,42 +107,46 @@ def table(clips: Sequence[FoundClip]) -> bytes:
     for one in clips:
         cost = "" if one.cost is None else f"{one.cost:.4f}"
         frames = (one.first_frame, one.last_frame, f"{one.seconds:.3f}")
-        writer.writerow([one.file, one.name, one.take, *frames, cost, one.accepted])
+        writer.writerow([one.file, one.name, one.recording, *frames, cost, one.accepted])
     return lines.getvalue().encode()
 
 
 def _clip(
-    take: Take,
+    recording: Recording,
     name: str,
     first: int,
     last: int,
     cost: float | None = None,
     accepted: Verdict = "false",
 ) -> FoundClip:
-    seconds = (last - first) / take.rate
-    return FoundClip(take.file, name, first, last, seconds, cost, accepted, take.recording_name)
+    seconds = (last - first) / recording.rate
+    return FoundClip(
+        recording.file, name, first, last, seconds, cost, accepted, recording.original_name
+    )
 
 
-def parse_examples(takes: Sequence[Take], text: str) -> Examples:
+def parse_examples(recordings: Sequence[Recording], text: str) -> Examples:
     """Return the example "FILE:START-END", or those of a table "TABLE.csv" of a former search.
 
     Of a table, rows count whose cell `accepted` is true or rejected. Raises InvalidField for an
     example that is none, RecipeError for a table that cannot be read.
     """
     if text.endswith(".csv"):
-        return _reviewed(takes, Path(text))
+        return _reviewed(recordings, Path(text))
     parts = EXAMPLE.fullmatch(text)
     if parts is None:
         raise InvalidField("like", f"{text!r}, expected FILE:START-END in seconds, or TABLE.csv")
-    return Examples((_span(takes, parts[1], (float(parts[2]), float(parts[3])), SHORTEST_EXAMPLE),))
+    return Examples(
+        (_span(recordings, parts[1], (float(parts[2]), float(parts[3])), SHORTEST_EXAMPLE),)
+    )
 
 
-def _reviewed(takes: Sequence[Take], path: Path) -> Examples:
+def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
     """Return the rows of a table that a person accepted or rejected."""
     cells = clip_table.open_table(path)
     cells.require(dict.fromkeys(("file", "first_frame", "last_frame", "accepted"), "discover"))
     spans: dict[str, list[Span]] = {"true": [], "rejected": [], "false": []}
-    rates = {take.file: take.rate for take in takes}
+    rates = {recording.file: recording.rate for recording in recordings}
     for line, record in cells.records:
         if record["accepted"] not in spans:
             known = ", ".join(spans)
@@ -143,27 +158,33 @@ def _reviewed(takes: Sequence[Take], path: Path) -> Examples:
         rate = rates.get(record["file"], 1.0)
         first = cells.frame(line, record, "first_frame") / rate
         last = cells.frame(line, record, "last_frame") / rate
-        spans[record["accepted"]].append(_span(takes, record["file"], (first, last), SHORTEST_ROW))
+        spans[record["accepted"]].append(
+            _span(recordings, record["file"], (first, last), SHORTEST_ROW)
+        )
     if not spans["true"]:
         raise InvalidField("like", f"{path}: no row is accepted, expected one or more")
     return Examples(tuple(spans["true"]), tuple(spans["rejected"]))
 
 
-def _span(takes: Sequence[Take], file: str, part: tuple[float, float], shortest: float) -> Span:
-    """Return a part of a take, s; InvalidField if the take is unknown or lacks it."""
+def _span(
+    recordings: Sequence[Recording], file: str, part: tuple[float, float], shortest: float
+) -> Span:
+    """Return a part of a recording, s; InvalidField if the recording is unknown or lacks it."""
     start, end = part
-    for index, take in enumerate(takes):
-        if take.file == file:
-            seconds = (len(take) - 1) / take.rate
+    for index, recording in enumerate(recordings):
+        if recording.file == file:
+            seconds = (len(recording) - 1) / recording.rate
             if end > seconds or end - start < shortest:
                 raise InvalidField(
                     "like",
                     f"{start:g} to {end:g} s, expected {shortest:g} s or more between 0 "
-                    f"and {seconds:.2f} s of {take.file}",
+                    f"and {seconds:.2f} s of {recording.file}",
                 )
             return Span(index, start, end)
-    known = ", ".join(take.file for take in takes[:5])
-    raise InvalidField("like", f"file {file!r}, expected a take of the folder, such as {known}")
+    known = ", ".join(recording.file for recording in recordings[:5])
+    raise InvalidField(
+        "like", f"file {file!r}, expected a recording of the folder, such as {known}"
+    )
 
 
 def read_roles(path: Path) -> dict[str, str]:
@@ -188,8 +209,8 @@ def read_roles(path: Path) -> dict[str, str]:
 
 
 MOST_WITHIN = 0.2
-"""Variance between the clips of a family as a share of that of all takes, from which on they are
-too different."""
+"""Variance between the clips of a family as a share of that of all recordings, from which on they
+are too different."""
 LEAST_SHARED = 0.5
 """Share of the variance of a family that its mean motion has, below which there is no motion that
 the clips have in common."""
@@ -200,7 +221,8 @@ class FamilyQuality:
     """Likeness of the clips of a family, and their common motion.
 
     within: mean variance between the clips at the same part of the motion. motion: variance of
-    their mean over time; both as shares of the variance of all takes. seconds: median duration.
+    their mean over time; both as shares of the variance of all recordings. seconds: median
+    duration.
     """
 
     within: float

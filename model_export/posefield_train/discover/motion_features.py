@@ -1,4 +1,4 @@
-"""Features of the frames of takes, in which equal motions are near wherever they happen."""
+"""Features of the frames of recordings, in which equal motions are near wherever they happen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from posefield.common.units import Booleans, Floats, Indices
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 
 STEPS = ((1, 1), (1, 2), (2, 1))
 """Frames of query and corpus by which a match advances."""
@@ -29,8 +29,8 @@ class Ends:
 class SearchedFrames:
     """Features of a corpus as every search needs them.
 
-    values (F, k): zero where frames stand between two takes. squares (F,): of their lengths.
-    between (F,): whether a frame stands between two takes.
+    values (F, k): zero where frames stand between two recordings. squares (F,): of their lengths.
+    between (F,): whether a frame stands between two recordings.
     """
 
     values: Floats
@@ -41,7 +41,7 @@ class SearchedFrames:
 def distances(query: Floats, corpus: SearchedFrames) -> Floats:
     """Return the distances (L, F) of features (L, k) of a query from those of a corpus.
 
-    The distance of a frame between two takes is inf.
+    The distance of a frame between two recordings is inf.
     """
     found = np.sum(np.square(query), axis=1)[:, None] + corpus.squares
     found -= 2.0 * query @ corpus.values.T
@@ -53,7 +53,7 @@ def distances(query: Floats, corpus: SearchedFrames) -> Floats:
 def match_ends(apart: Floats) -> Ends:
     """Return the best match that ends at each frame of the corpus.
 
-    apart (L, F): distances of the query's frames from the corpus's; inf between two takes.
+    apart (L, F): distances of the query's frames from the corpus's; inf between two recordings.
     """
     length, frames = apart.shape
     starts = np.arange(frames)
@@ -140,7 +140,7 @@ WEIGHTS = {
         )
     },
 }
-"""Weight of the place of each role's joint; roles that a take lacks do not count."""
+"""Weight of the place of each role's joint; roles that a recording lacks do not count."""
 TRAVEL_WEIGHT, TURN_WEIGHT = 0.25, 0.15
 """Weights of the planar velocity of the root, leg lengths a second, and of its turn, rad/s."""
 VELOCITY_SPAN = 0.1
@@ -148,62 +148,66 @@ VELOCITY_SPAN = 0.1
 EXPLAINED = 0.9
 """Share of the variance that the principal components keep."""
 STILL = 1e-6
-"""Largest range of a feature of takes in which nothing moves, leg lengths."""
+"""Largest range of a feature of recordings in which nothing moves, leg lengths."""
 
 
-class StillTakes(ValueError):
-    """Takes in which nothing moves."""
+class StillRecordings(ValueError):
+    """Recordings in which nothing moves."""
 
 
 @dataclass(frozen=True)
 class Corpus:
-    """Features of takes in one basis.
+    """Features of recordings in one basis.
 
-    roles: joints whose places are compared. features: (F, k) of each take, at SEARCH_RATE.
+    roles: joints whose places are compared. features: (F, k) of each recording, at SEARCH_RATE.
     """
 
-    takes: tuple[Take, ...]
+    recordings: tuple[Recording, ...]
     roles: tuple[str, ...]
     features: tuple[Floats, ...]
 
-    def frame(self, take: int, at: float) -> int:
-        """Return the recorded frame of a take at a time, s."""
-        own = self.takes[take]
+    def frame(self, recording: int, at: float) -> int:
+        """Return the recorded frame of a recording at a time, s."""
+        own = self.recordings[recording]
         return max(min(round(at * own.rate), len(own) - 1), own.first)
 
-    def is_whole(self, take: int, start: float, end: float) -> bool:
-        """Return whether no joint leaps between two times of a take, s."""
-        return self.takes[take].is_whole(self.frame(take, start), self.frame(take, end))
+    def is_whole(self, recording: int, start: float, end: float) -> bool:
+        """Return whether no joint leaps between two times of a recording, s."""
+        return self.recordings[recording].is_whole(
+            self.frame(recording, start), self.frame(recording, end)
+        )
 
 
-def build_corpus(takes: Sequence[Take]) -> Corpus:
-    """Return the features of takes, which may have different skeletons.
+def build_corpus(recordings: Sequence[Recording]) -> Corpus:
+    """Return the features of recordings, which may have different skeletons.
 
-    Raises StillTakes for takes in which nothing moves.
+    Raises StillRecordings for recordings in which nothing moves.
     """
-    lacking = lacking_roles(takes)
+    lacking = lacking_roles(recordings)
     roles = tuple(role for role in WEIGHTS if role not in lacking)
-    raw = [take_features(take, roles) for take in takes]
+    raw = [recording_features(recording, roles) for recording in recordings]
     mean, basis = principal_components(np.concatenate(raw))
     step = round(RATE / SEARCH_RATE)
-    return Corpus(tuple(takes), roles, tuple((own[::step] - mean) @ basis for own in raw))
+    return Corpus(tuple(recordings), roles, tuple((own[::step] - mean) @ basis for own in raw))
 
 
-def lacking_roles(takes: Sequence[Take]) -> list[str]:
-    """Return the roles that a take lacks, so that the takes are not compared in them."""
-    return [role for role in WEIGHTS if any(role not in take.places for take in takes)]
+def lacking_roles(recordings: Sequence[Recording]) -> list[str]:
+    """Return the roles that a recording lacks, so that the recordings are not compared in them."""
+    return [
+        role for role in WEIGHTS if any(role not in recording.places for recording in recordings)
+    ]
 
 
-def take_features(take: Take, roles: Sequence[str]) -> Floats:
-    """Return the features (F, 3 R + 3) of a take at RATE: places of R roles, travel and turn.
+def recording_features(recording: Recording, roles: Sequence[str]) -> Floats:
+    """Return the features (F, 3 R + 3) of a recording at RATE: places of R roles, travel and turn.
 
-    Places are relative to the hips on the floor of the take, in the heading of the hips.
+    Places are relative to the hips on the floor of the recording, in the heading of the hips.
     """
-    times = np.arange(0.0, (len(take) - 1) / take.rate + 1e-9, 1.0 / RATE)
-    own = np.arange(len(take)) / take.rate
-    angles = np.interp(times, own, take.headings())
+    times = np.arange(0.0, (len(recording) - 1) / recording.rate + 1e-9, 1.0 / RATE)
+    own = np.arange(len(recording)) / recording.rate
+    angles = np.interp(times, own, recording.headings())
     places = {
-        role: np.stack([np.interp(times, own, axis) for axis in take.places[role].T], axis=1)
+        role: np.stack([np.interp(times, own, axis) for axis in recording.places[role].T], axis=1)
         for role in {*roles, "hips"}
     }
     floor = np.percentile(np.concatenate([places[role][:, 1] for role in roles]), 1.0)
@@ -217,11 +221,11 @@ def take_features(take: Take, roles: Sequence[str]) -> Floats:
 def principal_components(values: Floats) -> tuple[Floats, Floats]:
     """Return the mean (d,) and the directions (d, k) that keep EXPLAINED of the variance.
 
-    Raises StillTakes without variance.
+    Raises StillRecordings without variance.
     """
     mean = values.mean(axis=0)
     if np.ptp(values, axis=0).max() < STILL:
-        raise StillTakes("nothing moves in the takes, expected motions to compare")
+        raise StillRecordings("nothing moves in the recordings, expected motions to compare")
     variances, directions = np.linalg.eigh(np.cov(values - mean, rowvar=False))
     share = np.cumsum(variances[::-1]) / variances.sum()
     count = int(np.searchsorted(share, EXPLAINED)) + 1
@@ -243,14 +247,14 @@ def _velocity(values: Floats) -> Floats:
 
 
 GAP = 2
-"""Frames between two takes, so that no match leads from one to the next."""
+"""Frames between two recordings, so that no match leads from one to the next."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Part of a take. take: index. start, end: s."""
+    """Part of a recording. recording: index. start, end: s."""
 
-    take: int
+    recording: int
     start: float
     end: float
 
@@ -261,7 +265,7 @@ class Span:
 
     def overlap(self, other: "Span") -> float:
         """Return the common time as a share of the shorter one."""
-        if self.take != other.take:
+        if self.recording != other.recording:
             return 0.0
         common = min(self.end, other.end) - max(self.start, other.start)
         return max(common, 0.0) / min(self.seconds, other.seconds)
@@ -277,10 +281,10 @@ class Match:
 
 @dataclass(frozen=True)
 class JoinedFeatures:
-    """Features of takes in a row.
+    """Features of recordings in a row.
 
-    values (F, k): NaN in the gaps between takes. owners (F,): take of each frame, -1 in gaps.
-    offsets: first frame of each take.
+    values (F, k): NaN in the gaps between recordings. owners (F,): recording of each frame, -1 in
+    gaps. offsets: first frame of each recording.
     """
 
     values: Floats
@@ -294,29 +298,31 @@ class JoinedFeatures:
 
     @cached_property
     def _searched(self) -> SearchedFrames:
-        # NaN stands between two takes.
+        # NaN stands between two recordings.
         known = np.nan_to_num(self.values)
         missing = np.isnan(self.values[:, 0])
         return SearchedFrames(known, np.sum(np.square(known), axis=1), missing)
 
     def frames(self, span: Span) -> slice:
-        """Return the frames of a part of a take; its end may lie beyond the last one."""
-        offset = self.offsets[span.take]
+        """Return the frames of a part of a recording; its end may lie beyond the last one."""
+        offset = self.offsets[span.recording]
         first, last = (offset + round(time * SEARCH_RATE) for time in (span.start, span.end))
         ends = (
-            len(self.owners) if span.take + 1 == len(self.offsets) else self.offsets[span.take + 1]
+            len(self.owners)
+            if span.recording + 1 == len(self.offsets)
+            else self.offsets[span.recording + 1]
         )
         return slice(first, min(last + 1, ends - GAP))
 
     def clip(self, span: Span) -> Floats:
-        """Return the features (L, k) of a part of a take."""
+        """Return the features (L, k) of a part of a recording."""
         return self.values[self.frames(span)]
 
     def span(self, first: int, last: int) -> Span:
-        """Return the part of a take between two frames, both included."""
-        take = int(self.owners[last])
-        start, end = ((frame - self.offsets[take]) / SEARCH_RATE for frame in (first, last))
-        return Span(take, float(start), float(end))
+        """Return the part of a recording between two frames, both included."""
+        recording = int(self.owners[last])
+        start, end = ((frame - self.offsets[recording]) / SEARCH_RATE for frame in (first, last))
+        return Span(recording, float(start), float(end))
 
     def ends(self, span: Span) -> Ends:
         """Return the best match of a clip for each last frame, with relative costs.
@@ -330,11 +336,11 @@ class JoinedFeatures:
 
 
 def join_features(corpus: Corpus) -> JoinedFeatures:
-    """Return the features of all takes with gaps between them."""
+    """Return the features of all recordings with gaps between them."""
     pieces, owners, offsets, count = [], [], [], 0
-    for take, own in enumerate(corpus.features):
+    for recording, own in enumerate(corpus.features):
         offsets.append(count)
         pieces += [own, np.full((GAP, own.shape[1]), np.nan)]
-        owners += [np.full(len(own), take), np.full(GAP, -1)]
+        owners += [np.full(len(own), recording), np.full(GAP, -1)]
         count += len(own) + GAP
     return JoinedFeatures(np.concatenate(pieces), np.concatenate(owners), tuple(offsets))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 
 SMOOTHING = 0.1
 """Duration of the moving mean, s."""
@@ -43,15 +43,15 @@ class Stride:
         return self.travel >= LEAST_TRAVEL
 
 
-def find_strides(take: Take) -> list[Stride]:
-    """Return the strides of a take, in order, those in place too; two in a row share a frame.
+def find_strides(recording: Recording) -> list[Stride]:
+    """Return the strides of a recording, in order, those in place too; two in a row share a frame.
 
     Within them no joint leaps.
     """
     # Distance (F,) by which the left foot is before the right, leg lengths, smooth.
-    angles, across = take.headings(), take.across("Foot")
+    angles, across = recording.headings(), recording.across("Foot")
     ahead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
-    signal = moving_mean(ahead, round(SMOOTHING * take.rate))
+    signal = moving_mean(ahead, round(SMOOTHING * recording.rate))
     extrema = alternating_extrema(signal)
     found = []
     for (first, kind), (middle, _), (last, _) in zip(
@@ -59,13 +59,13 @@ def find_strides(take: Take) -> list[Stride]:
     ):
         share = (middle - first) / (last - first)
         is_far = min(signal[first], -signal[middle], signal[last]) > LEAST
-        lasts = SHORTEST <= (last - first) / take.rate <= LONGEST
-        is_one = lasts and EARLIEST <= share <= LATEST and take.is_whole(first, last)
+        lasts = SHORTEST <= (last - first) / recording.rate <= LONGEST
+        is_one = lasts and EARLIEST <= share <= LATEST and recording.is_whole(first, last)
         if kind > 0 and is_far and is_one:
             swing = signal[first] + signal[last] - 2.0 * signal[middle]
             # Horizontal way of the hips, leg lengths.
-            step = max(1, round(WAY_STEP * take.rate))
-            hips = take.places["hips"][first : last + 1 : step, [0, 2]]
+            step = max(1, round(WAY_STEP * recording.rate))
+            hips = recording.places["hips"][first : last + 1 : step, [0, 2]]
             way = float(np.linalg.norm(np.diff(hips, axis=0), axis=1).sum())
             found.append(Stride(first, last, way / swing))
     return found

@@ -22,7 +22,7 @@ from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.training import train_examples
 
-# Families of more than MANY takes are held out in PARTS parts of whole takes.
+# Families of more than MANY recordings are held out in PARTS parts of whole ones.
 MANY, PARTS = 40, 12
 
 
@@ -40,21 +40,21 @@ class Fold:
 
 
 def clip_folds(examples: Sequence[Example]) -> list[Fold]:
-    """Return folds that hold out every take once, with all of its clips.
+    """Return folds that hold out every recording once, with all of its clips.
 
-    Strides of one take are nearly equal; held out one by one, they would predict each other. Raises
-    TrainingError if all clips are of one take.
+    Strides of one recording are nearly equal; held out one by one, they would predict each other.
+    Raises TrainingError if all clips are of one recording.
     """
-    numbers = sample_points.take_numbers(examples)
-    takes = [tuple(np.flatnonzero(numbers == take).tolist()) for take in np.unique(numbers)]
-    if len(takes) == 1:
+    numbers = sample_points.recording_numbers(examples)
+    recordings = [tuple(np.flatnonzero(numbers == one).tolist()) for one in np.unique(numbers)]
+    if len(recordings) == 1:
         raise TrainingError(
-            f"all {len(examples)} clips are of one take, expected two or more takes: none can be "
-            "held out (clips.take states takes)"
+            f"all {len(examples)} clips are of one recording, expected two or more: none can be "
+            "held out (clips.recording states recordings)"
         )
-    if len(takes) > MANY:
-        takes = [sum(takes[part::PARTS], ()) for part in range(PARTS)]
-    return [Fold(take) for take in takes]
+    if len(recordings) > MANY:
+        recordings = [sum(recordings[part::PARTS], ()) for part in range(PARTS)]
+    return [Fold(clips) for clips in recordings]
 
 
 def performer_folds(examples: Sequence[Example]) -> list[Fold]:
@@ -129,10 +129,10 @@ class EvaluationResult:
 
     clips: names. errors: of each method by clip; None for clips that a method did not predict.
     sigma: standard deviation (C,) that posefield predicts, m. joint_sigma: of each joint (C, J), m.
-    joints: their names. takes: number (C,) of the take of each clip. flags: accuracy of the support
-    flag; None if no clips are held out. contacts: accuracy of posefield's (C,); empty without
-    contacts. curves: names. has_positions: False for clips of curves without a skeleton, of which
-    measures of positions say nothing. definitions: of the methods by name. references: row of
+    joints: their names. recordings: number (C,) of the recording of each clip. flags: accuracy of
+    the support flag; None if no clips are held out. contacts: accuracy of posefield's (C,); empty
+    without contacts. curves: names. has_positions: False for clips of curves without a skeleton, of
+    which measures of positions say nothing. definitions: of the methods by name. references: row of
     posefield that a method is compared with, where it is another than OURS.
     """
 
@@ -143,7 +143,7 @@ class EvaluationResult:
     sigma: Floats
     joint_sigma: Floats
     joints: tuple[str, ...]
-    takes: tuple[int, ...]
+    recordings: tuple[int, ...]
     flags: SupportFlags | None = None
     contacts: tuple[ContactAccuracy, ...] = ()
     curves: tuple[str, ...] = ()
@@ -284,7 +284,7 @@ def held_out_result(
         f"leave_one_{protocol}_out",
         [f"{example.row.place.name} (line {example.row.line})" for example in examples],
         clip.skeleton.names,
-        sample_points.take_numbers(examples).tolist(),
+        sample_points.recording_numbers(examples).tolist(),
         results,
     )
     curves = tuple(clip.curves.names) if clip.curves else ()
@@ -296,7 +296,7 @@ def merge(
     protocol: str,
     clips: Sequence[str],
     joints: tuple[str, ...],
-    takes: Sequence[int],
+    recordings: Sequence[int],
     results: Iterator[PartialResult],
 ) -> EvaluationResult:
     """Merge results for some of the clips, in any order, into one."""
@@ -315,7 +315,7 @@ def merge(
         np.array(in_order(parts, lambda part: part.sigma)),
         np.array(in_order(parts, lambda part: part.joint_sigma)),
         joints,
-        tuple(takes),
+        tuple(recordings),
         contacts=tuple(in_order(parts, lambda part: part.contacts)),
         has_positions=recipe.curves is None or not recipe.curves.alone,
     )

@@ -19,9 +19,9 @@ DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell"
 COLUMNS = (
     ("method", "defined below"),
     ("relative", "distance without the root's position, after time warping"),
-    ("±", "standard error of the column before, over takes"),
+    ("±", "standard error of the column before, over recordings"),
     ("difference", "relative distance less that of posefield with equal information"),
-    ("±", "standard error of the column before, over takes"),
+    ("±", "standard error of the column before, over recordings"),
     ("global", "distance with the root's position, after time warping"),
     ("effector", "distance of the event's joint at its event"),
     ("rel. unwarped", "relative distance at equal shares of the duration, without time warping"),
@@ -89,13 +89,13 @@ def clip_distances(result: EvaluationResult, errors: Sequence[MotionErrors]) -> 
     return np.array([np.sqrt(np.mean(error.counted)) for error in errors])
 
 
-def clustered_standard_error(values: Floats, takes: Indices) -> float:
-    """Return the standard error of the mean of values (C,) that agree within takes (C,).
+def clustered_standard_error(values: Floats, recordings: Indices) -> float:
+    """Return the standard error of the mean of values (C,) that agree within recordings (C,).
 
-    Sums of residuals over takes take the place of residuals (Liang & Zeger 1986); with one clip per
-    take it is the usual standard error. Zero for a single take.
+    Sums of residuals over recordings take the place of residuals (Liang & Zeger 1986); with one
+    clip per recording it is the usual standard error. Zero for a single recording.
     """
-    groups = np.unique(takes, return_inverse=True)[1]
+    groups = np.unique(recordings, return_inverse=True)[1]
     count = int(groups.max()) + 1
     if count < 2:
         return 0.0
@@ -114,15 +114,15 @@ def _summary(result: EvaluationResult, name: str) -> MethodSummary:
     distances, ours = (
         clip_distances(result, listed) for listed in (errors, result.of(reference, clips))
     )
-    takes = np.array(result.takes)[clips]
+    recordings = np.array(result.recordings)[clips]
     return MethodSummary(
         name,
         len(clips),
         len(result.clips) - len(clips),
         motion_errors.mean(errors),
-        clustered_standard_error(distances, takes),
+        clustered_standard_error(distances, recordings),
         float((distances - ours).mean()),
-        clustered_standard_error(distances - ours, takes),
+        clustered_standard_error(distances - ours, recordings),
     )
 
 
@@ -286,5 +286,5 @@ def legend(results: Sequence[EvaluationResult]) -> str:
         f"  {name}: {result.definitions[name]}" for result in results for name in result.errors
     )
     return "\n".join(
-        [*units, *meanings, "  ±: standard error over takes", "Methods:", *definitions]
+        [*units, *meanings, "  ±: standard error over recordings", "Methods:", *definitions]
     )

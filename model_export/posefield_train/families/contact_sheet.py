@@ -8,7 +8,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from posefield.common.units import UP, Floats
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 from posefield_train.families import recipe_folder
 from posefield_train.families.found_families import FamilyRow
 from posefield_train.families.recipe_folder import FoundFamilies, OfferedFamily
@@ -53,12 +53,12 @@ class StickStrip:
     height: float
 
 
-def draw(take: Take, first: int, last: int) -> StickStrip:
-    """Return the figures of a part of a take at INSTANTS times, seen from where most moves."""
+def draw(recording: Recording, first: int, last: int) -> StickStrip:
+    """Return the figures of a part of a recording at INSTANTS times, seen from where most moves."""
     frames = np.linspace(first, last, INSTANTS).round().astype(int)
-    bones = [bone for bone in BONES if set(bone) <= take.places.keys()]
-    hips = take.places["hips"][frames] * (1.0 - UP)
-    ends = [[take.places[role][frames] - hips for role in bone] for bone in bones]
+    bones = [bone for bone in BONES if set(bone) <= recording.places.keys()]
+    hips = recording.places["hips"][frames] * (1.0 - UP)
+    ends = [[recording.places[role][frames] - hips for role in bone] for bone in bones]
     points = np.array(ends).transpose(2, 0, 1, 3)
     across = points @ _direction(points)
     floor, top = points[..., 1].min(), points[..., 1].max()
@@ -130,7 +130,7 @@ class ShownFamily:
 
 
 def render(
-    found: FoundFamilies, takes: Sequence[Take], folder: str, refused: Mapping[str, str]
+    found: FoundFamilies, recordings: Sequence[Recording], folder: str, refused: Mapping[str, str]
 ) -> bytes:
     """Return the page as one file of HTML; all text is escaped.
 
@@ -144,7 +144,7 @@ def render(
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    by_file = {take.file: take for take in takes}
+    by_file = {recording.file: recording for recording in recordings}
     left = [
         (f"{len(one.rows)} clips of {one.seconds:.1f} s", "; ".join(one.reasons))
         for one in found.refused
@@ -153,42 +153,42 @@ def render(
         families=[_shown(one, by_file) for one in found.offered],
         left=left,
         folder=folder,
-        takes=len(takes),
+        recordings=len(recordings),
         refused=refused,
     )
     return page.encode()
 
 
-def _shown(one: OfferedFamily, takes: Mapping[str, Take]) -> ShownFamily:
+def _shown(one: OfferedFamily, recordings: Mapping[str, Recording]) -> ShownFamily:
     rows = one.family.rows
     best, worst = rows[:BEST], rows[max(BEST, len(rows) - WORST) :]
     example = one.family.example or rows[0]
     return ShownFamily(
         one.number,
         f"{len(rows)} {one.family.kind}",
-        draw(takes[example.file], example.first_frame, example.last_frame),
-        tuple(_clip(one.number, row, takes) for row in best),
-        tuple(_clip(one.number, row, takes) for row in worst),
+        draw(recordings[example.file], example.first_frame, example.last_frame),
+        tuple(_clip(one.number, row, recordings) for row in best),
+        tuple(_clip(one.number, row, recordings) for row in worst),
         HEADINGS[one.family.kind],
         _facts(one),
     )
 
 
-def _clip(number: int, row: FamilyRow, takes: Mapping[str, Take]) -> ShownClip:
-    take = takes[row.file]
-    start, end = row.first_frame / take.rate, row.last_frame / take.rate
+def _clip(number: int, row: FamilyRow, recordings: Mapping[str, Recording]) -> ShownClip:
+    recording = recordings[row.file]
+    start, end = row.first_frame / recording.rate, row.last_frame / recording.rate
     return ShownClip(
         f"{number}:{row.file}@{0.5 * (start + end):.2f}",
         f"{row.file}, {start:.1f} to {end:.1f}{NO_BREAK}s",
         row.cost,
-        draw(take, row.first_frame, row.last_frame),
+        draw(recording, row.first_frame, row.last_frame),
     )
 
 
 def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:
     family, proposal = one.family, one.proposal
     names = ", ".join(recipe_folder.control_name(own) for own in proposal.controls)
-    said = f"explain {1.0 - proposal.remaining[-1]:.0%} of the variance of takes left out"
+    said = f"explain {1.0 - proposal.remaining[-1]:.0%} of the variance of recordings left out"
     facts = [
         ("Performers", ", ".join(sorted({row.performer for row in family.rows}))),
         ("Duration", f"{family.seconds:.1f} s in the median"),

@@ -1,4 +1,4 @@
-"""Families of a folder's takes: similar motions and strides, as rows of tables."""
+"""Families of a folder's recordings: similar motions and strides, as rows of tables."""
 
 import csv
 import io
@@ -18,7 +18,7 @@ from posefield_train.discover import family_search, found_clips, motion_features
 from posefield_train.discover.family_search import FEWEST
 from posefield_train.discover.found_clips import FamilyQuality
 from posefield_train.discover.motion_features import Corpus
-from posefield_train.discover.take_reading import Take
+from posefield_train.discover.recordings import Recording
 from posefield_train.probe import probe_report, proposals, recipe_draft
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Figure, Proposal
@@ -47,7 +47,7 @@ class FileStatements:
 
 @dataclass(frozen=True)
 class BodyKind:
-    """Takes with the same joints in the same order.
+    """Recordings with the same joints in the same order.
 
     report: proposals, with statements in place of guesses. performers: by file. skeleton: of the
     first file. stated: joints by role that were stated.
@@ -226,23 +226,23 @@ def skeleton_lines(kinds: Sequence[BodyKind]) -> list[str]:
     return [*lines, ""]
 
 
-COLUMNS = ("file", "first_frame", "last_frame", "performer", "take", "cost", "accepted")
+COLUMNS = ("file", "first_frame", "last_frame", "performer", "recording", "cost", "accepted")
 
 
 @dataclass(frozen=True)
 class FamilyRow:
     """A clip of a family.
 
-    file: below the folder of the takes. first_frame, last_frame: inclusive. take: clips of one are
-    left out together. cost: of the match with the example, None for a stride. accepted: whether it
-    is trained from.
+    file: below the folder of the recordings. first_frame, last_frame: inclusive. recording: clips
+    of one are left out together. cost: of the match with the example, None for a stride. accepted:
+    whether it is trained from.
     """
 
     file: str
     first_frame: int
     last_frame: int
     performer: str
-    take: str
+    recording: str
     cost: float | None = None
     accepted: bool = True
 
@@ -259,7 +259,7 @@ def table(rows: Sequence[FamilyRow]) -> bytes:
     writer.writerow(COLUMNS)
     for row in rows:
         cost = "" if row.cost is None else f"{row.cost:.4f}"
-        told = (row.performer, row.take, cost, str(row.accepted).lower())
+        told = (row.performer, row.recording, cost, str(row.accepted).lower())
         writer.writerow([*row.frames, *told])
     return lines.getvalue().encode()
 
@@ -267,7 +267,10 @@ def table(rows: Sequence[FamilyRow]) -> bytes:
 def read(path: Path) -> list[FamilyRow]:
     """Return the rows of a table; RecipeError names a cell that cannot be read."""
     cells = clip_table.open_table(path)
-    cells.require(dict.fromkeys(COLUMNS, "the table of a family"))
+    # A folder that an earlier version wrote has recordings in the column `take`.
+    column = "take" if "take" in cells.columns else "recording"
+    expected = [column if name == "recording" else name for name in COLUMNS]
+    cells.require(dict.fromkeys(expected, "the table of a family"))
     rows = []
     for line, record in cells.records:
         if record["accepted"] not in ("true", "false"):
@@ -276,7 +279,7 @@ def read(path: Path) -> list[FamilyRow]:
         first, last = (cells.frame(line, record, key) for key in ("first_frame", "last_frame"))
         cost = cells.number(line, record, "cost") if record["cost"] else None
         accepted = record["accepted"] == "true"
-        told = (record["file"], first, last, record["performer"], record["take"])
+        told = (record["file"], first, last, record["performer"], record[column])
         rows.append(FamilyRow(*told, cost, accepted))
     return rows
 
@@ -306,16 +309,16 @@ class FoundFamily:
 
 
 def find_families(
-    takes: Sequence[Take],
+    recordings: Sequence[Recording],
     kinds: Sequence[BodyKind],
     count: int,
     report: Callable[[int], None] = lambda _: None,
 ) -> list[FoundFamily]:
-    """Return the families of takes, those that are not offered too, and that of strides last.
+    """Return the families of recordings, those that are not offered too, and that of strides last.
 
     count, report: as in `family_search.find_families`.
     """
-    corpus = motion_features.build_corpus(takes)
+    corpus = motion_features.build_corpus(recordings)
     joined = motion_features.join_features(corpus)
     found = []
     for family in family_search.find_families(corpus, count, report):
@@ -325,49 +328,52 @@ def find_families(
         own = FoundFamily(
             "motions", tuple(rows), example, (), family.seconds, quality, {}, quality.reasons
         )
-        found.append(_of_one_topology(own, kinds, takes))
-    strides = _strides(takes, kinds)
+        found.append(_of_one_topology(own, kinds, recordings))
+    strides = _strides(recordings, kinds)
     return found if strides is None else [*found, strides]
 
 
 def _row(
     corpus: Corpus, span: motion_features.Span, cost: float, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
-    first, last = corpus.frame(span.take, span.start), corpus.frame(span.take, span.end)
-    return _clip(corpus.takes[span.take], first, last, cost, kinds)
+    first, last = corpus.frame(span.recording, span.start), corpus.frame(span.recording, span.end)
+    return _clip(corpus.recordings[span.recording], first, last, cost, kinds)
 
 
 def _clip(
-    take: Take, first: int, last: int, cost: float | None, kinds: Sequence[BodyKind]
+    recording: Recording, first: int, last: int, cost: float | None, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
     # A mirrored copy swaps the bones of both sides, but its performer is that of the recording.
-    who = take.recording
+    who = recording.original
     performer = next(kind.performers[who] for kind in kinds if who in kind.performers)
-    return FamilyRow(take.file, first, last, performer, take.recording_name, cost)
+    return FamilyRow(recording.file, first, last, performer, recording.original_name, cost)
 
 
-def _strides(takes: Sequence[Take], kinds: Sequence[BodyKind]) -> FoundFamily | None:
+def _strides(recordings: Sequence[Recording], kinds: Sequence[BodyKind]) -> FoundFamily | None:
     """Return the strides that travel as a family; None if there are few."""
     found = [
-        (take, one) for take in takes for one in stride_detection.find_strides(take) if one.travels
+        (recording, one)
+        for recording in recordings
+        for one in stride_detection.find_strides(recording)
+        if one.travels
     ]
     if len(found) < STRIDE_CLIPS:
         return None
-    rows = [_clip(take, one.first, one.last, None, kinds) for take, one in found]
-    seconds = sorted((one.last - one.first) / take.rate for take, one in found)
+    rows = [_clip(recording, one.first, one.last, None, kinds) for recording, one in found]
+    seconds = sorted((one.last - one.first) / recording.rate for recording, one in found)
     own = FoundFamily("strides", tuple(rows), None, (), seconds[len(seconds) // 2], None, {}, ())
-    return _of_one_topology(own, kinds, takes)
+    return _of_one_topology(own, kinds, recordings)
 
 
 def _of_one_topology(
-    family: FoundFamily, kinds: Sequence[BodyKind], takes: Sequence[Take]
+    family: FoundFamily, kinds: Sequence[BodyKind], recordings: Sequence[Recording]
 ) -> FoundFamily:
     """Return the family with the clips whose bodies share a topology, the others named.
 
     Without one, the clips of the most common joints remain.
     """
     numbers = {file: at for at, kind in enumerate(kinds) for file in kind.performers}
-    by_file = {take.file: take for take in takes}
+    by_file = {recording.file: recording for recording in recordings}
     counts = Counter(numbers[row.file] for row in family.rows)
     common = [at for at, _ in counts.most_common()]
     if len(common) > 1 and not can_share([kinds[at] for at in common]):
@@ -383,8 +389,8 @@ def _of_one_topology(
     reasons = family.reasons
     if len(kept) < FEWEST:
         reasons = (*reasons, f"{len(kept)} clips of one skeleton, expected {FEWEST} or more")
-    if len({row.take for row in kept}) < 2:
-        reasons = (*reasons, "clips of one take, expected two takes or more")
+    if len({row.recording for row in kept}) < 2:
+        reasons = (*reasons, "clips of one recording, expected two recordings or more")
     # Clips in which a joint leaps may have been all of a kind.
     left = {numbers[row.file] for row in kept} or {common[0]}
     own = tuple(kinds[at] for at in common if at in left)

@@ -1,4 +1,4 @@
-"""Folder of recipes: the families of a folder of takes, each with its recipe and its table."""
+"""Folder of recipes: the families of a folder of recordings, each with its recipe and its table."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from posefield.common import atomic_files
 from posefield.common.errors import FileError, MotionError
 from posefield_train.discover import control_proposals, family_search, found_clips
 from posefield_train.discover.control_proposals import ControlProposal, FamilyClips, ProposedControl
-from posefield_train.discover.take_reading import ReadTakes
+from posefield_train.discover.recordings import ReadRecordings
 from posefield_train.families import found_families
 from posefield_train.families.found_families import BodyKind, FamilyRow, FoundFamily
 from posefield_train.probe import recipe_draft
@@ -34,7 +34,7 @@ def propose(
     """Return the proposed controls of a family.
 
     text: of a recipe with any control. name: of its table without the ending. data: folder of the
-    takes. roles: joints by role. known: files that were read before. Raises MotionError for
+    recordings. roles: joints by role. known: files that were read before. Raises MotionError for
     clips that cannot be read as one family, and ValueError for those that no control can be
     proposed for.
     """
@@ -46,7 +46,9 @@ def propose(
         examples, _ = ingest.ingest(own, data, known)
         found = control_proposals.propose_controls(_family_clips(own, examples))
         if not found.controls:
-            raise ValueError("no measure of the clips predicts those of takes that are left out")
+            raise ValueError(
+                "no measure of the clips predicts those of recordings that are left out"
+            )
         if found.event is None:
             return found
         # A moment at the start or the end of a clip is refused as an event.
@@ -71,7 +73,7 @@ def _family_clips(own: Recipe, examples: Sequence[ingest.Example]) -> FamilyClip
         tuple(measured_controls.measured_quantities(one.clip) for one in examples),
         joints,
         tuple(one.row.performer for one in examples),
-        tuple(one.take for one in examples),
+        tuple(one.recording for one in examples),
         own.motion.cyclic,
     )
 
@@ -140,7 +142,7 @@ def recipe_text(facts: RecipeFacts, proposal: ControlProposal, accepted: bool = 
             f'table = "{facts.name}.csv"',
             'file = "file"',
             'performer = "performer"',
-            'take = "take"',
+            'recording = "recording"',
             'first_frame = "first_frame"',
             'last_frame = "last_frame"',
             'where = { accepted = { among = ["true"] } }',
@@ -215,12 +217,12 @@ def control_name(control: ProposedControl) -> str:
 
 
 def _evidence(proposal: ControlProposal) -> list[str]:
-    """Return how much of the variance of left-out takes remains with the controls."""
+    """Return how much of the variance of left-out recordings remains with the controls."""
     single = len(proposal.controls) - len(proposal.remaining) + 1
     lines = []
     for at, left in enumerate(proposal.remaining):
         named = ", ".join(control_name(one) for one in proposal.controls[: single + at])
-        lines.append(f"# {left:.0%} of the variance of takes left out remains with {named}")
+        lines.append(f"# {left:.0%} of the variance of recordings left out remains with {named}")
     return lines
 
 
@@ -258,8 +260,8 @@ def offer(
 ) -> FoundFamilies:
     """Return the families with recipes, in the order found, numbered from 1.
 
-    data: folder of the takes. known: files that were read before. A family whose clips cannot be
-    read together, or that no control predicts, is refused with the reason.
+    data: folder of the recordings. known: files that were read before. A family whose clips cannot
+    be read together, or that no control predicts, is refused with the reason.
     """
     offered: list[OfferedFamily] = []
     refused = []
@@ -293,7 +295,7 @@ def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
         )
     return RecipeFacts(
         family_name(number),
-        f"{what} found in long takes, family {number}",
+        f"{what} found in long recordings, family {number}",
         licence,
         found_families.shared_report(kind.report, own) if is_mixed else kind.report,
         family.kind == "strides",
@@ -304,7 +306,7 @@ def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
 
 
 def summary(
-    found: FoundFamilies, folder: Path, read: ReadTakes, kinds: Sequence[BodyKind], count: int
+    found: FoundFamilies, folder: Path, read: ReadRecordings, kinds: Sequence[BodyKind], count: int
 ) -> dict[str, Any]:
     """Return all that was found as JSON values. count: of candidates that were searched."""
     performers = {file: who for kind in kinds for file, who in kind.performers.items()}
@@ -318,9 +320,13 @@ def summary(
             "most_within": found_clips.MOST_WITHIN,
             "least_shared": found_clips.LEAST_SHARED,
         },
-        "takes": {
-            take.file: {"rate": take.rate, "frames": len(take), "performer": performers[take.file]}
-            for take in read.takes
+        "recordings": {
+            recording.file: {
+                "rate": recording.rate,
+                "frames": len(recording),
+                "performer": performers[recording.file],
+            }
+            for recording in read.recordings
         },
         "refused": read.refused,
         "notes": read.notes,

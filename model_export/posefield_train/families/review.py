@@ -107,13 +107,16 @@ def _numbers(field: str, text: str) -> tuple[int, ...]:
 
 
 MAX_FAMILIES_BYTES = 16_000_000
+FORMER_KEY = ('\ntake = "take"\n', '\nrecording = "recording"\n')
+"""Line of the recipes that an earlier version wrote, and the line in its place."""
 
 
 @dataclass(frozen=True)
 class ReviewedFolder:
     """Files of a folder of recipes while they are reviewed.
 
-    data: folder of the takes. facts: of the summary. texts: recipes by number. rows: by number.
+    data: folder of the recordings. facts: of the summary. texts: recipes by number. rows: by
+    number.
     """
 
     data: Path
@@ -129,9 +132,9 @@ class ReviewedFolder:
 def apply(folder: Path, decisions: Decisions, data: Path | None = None) -> dict[str, Any]:
     """Write decisions into the files of a folder of recipes and return its summary.
 
-    data: folder of the takes; None for that of the search. The same decisions again change nothing.
-    Raises InvalidField for a family or a clip that the folder does not have, and FileError for a
-    folder that posefield discover did not write; no file is changed then.
+    data: folder of the recordings; None for that of the search. The same decisions again change
+    nothing. Raises InvalidField for a family or a clip that the folder does not have, and FileError
+    for a folder that posefield discover did not write; no file is changed then.
     """
     own = _read(folder, data)
     _check_numbers(own, decisions)
@@ -154,6 +157,8 @@ def _read(folder: Path, data: Path | None) -> ReviewedFolder:
         raise FileError(folder, f"no {path.name}, expected a folder that posefield discover wrote")
     try:
         facts = json.loads(data_folder.read(path, MAX_FAMILIES_BYTES, "a summary of families"))
+        if "takes" in facts:
+            facts["recordings"] = facts.pop("takes")
         numbers = [one["number"] for one in facts["families"] if one["status"] != "merged"]
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise FileError(path, f"not a summary of posefield discover: {fault}") from fault
@@ -161,7 +166,7 @@ def _read(folder: Path, data: Path | None) -> ReviewedFolder:
     for number in numbers:
         name = recipe_folder.family_name(number)
         found = data_folder.read(folder / f"{name}.toml", MAX_FAMILIES_BYTES, "a recipe")
-        texts[number] = found.decode(errors="strict")
+        texts[number] = found.decode(errors="strict").replace(*FORMER_KEY)
         rows[number] = found_families.read(folder / f"{name}.csv")
     return ReviewedFolder(data or Path(facts["folder"]), facts, texts, rows)
 
@@ -182,15 +187,17 @@ def _drop(own: ReviewedFolder, clip: DroppedClip) -> None:
     """Mark the clip of a family that a file and a time name as not accepted."""
     # A family that the same decisions merged before has its clips in the other one.
     number = own.family(clip.family).get("into", clip.family)
-    takes, rows = own.facts["takes"], own.rows[number]
+    recordings, rows = own.facts["recordings"], own.rows[number]
     found = [
         at
         for at, row in enumerate(rows)
         if (row.file == clip.file or row.file.endswith(f"/{clip.file}"))
-        and row.first_frame <= clip.at * takes[row.file]["rate"] <= row.last_frame
+        and row.first_frame <= clip.at * recordings[row.file]["rate"] <= row.last_frame
     ]
     if len(found) != 1:
-        starts = [f"{row.file}@{row.first_frame / takes[row.file]['rate']:.1f}" for row in rows]
+        starts = [
+            f"{row.file}@{row.first_frame / recordings[row.file]['rate']:.1f}" for row in rows
+        ]
         known = ", ".join(starts[:8]) + (" and others" if len(starts) > 8 else "")
         what = f"{len(found)} clips at {clip}" if found else f"no clip at {clip}"
         raise InvalidField("drop", f"{what}, expected one of {known}")
@@ -208,7 +215,7 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     own.rows[first] += moved
     own.texts.pop(second)
     into["performers"] = sorted({row.performer for row in own.rows[first]})
-    rates = {file: float(take["rate"]) for file, take in own.facts["takes"].items()}
+    rates = {file: float(recording["rate"]) for file, recording in own.facts["recordings"].items()}
     spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in own.rows[first]]
     into["seconds"] = round(statistics.median(spans), 3)
     into["left_out"] |= gone["left_out"]

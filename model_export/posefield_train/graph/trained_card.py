@@ -253,7 +253,7 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
         dict(zip(recipe.landmark_names, map(float, times), strict=True)),
         {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
-        _takes([trained.examples[clip] for clip in trained.listed]),
+        _recordings([trained.examples[clip] for clip in trained.listed]),
         trained.examples[0].facing,
         chart=trained.tensor.chart.chart,
     )
@@ -265,13 +265,13 @@ def card_labels(known: LabelNames, samples: SamplePoints) -> tuple[LabelSet, ...
     return tuple(LabelSet(name, names, tuple(own.tolist())) for (name, names), own in pairs)
 
 
-def _takes(examples: Sequence[Example]) -> tuple[int, ...]:
-    """Return the number (N,) of each example's take; empty where each file is a take."""
-    takes = sample_points.take_numbers(examples)
+def _recordings(examples: Sequence[Example]) -> tuple[int, ...]:
+    """Return the number (N,) of each example's recording; empty where each file is one."""
+    recordings = sample_points.recording_numbers(examples)
     files = np.unique([example.row.place.name for example in examples], return_inverse=True)[1]
-    pairs = len({*zip(takes.tolist(), files.tolist(), strict=True)})
-    one_each = pairs == len(np.unique(takes)) == len(np.unique(files))
-    return () if one_each else tuple(takes.tolist())
+    pairs = len({*zip(recordings.tolist(), files.tolist(), strict=True)})
+    one_each = pairs == len(np.unique(recordings)) == len(np.unique(files))
+    return () if one_each else tuple(recordings.tolist())
 
 
 def kriging_settings(hyper: Hyper) -> tuple[float, ...]:

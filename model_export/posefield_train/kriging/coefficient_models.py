@@ -146,7 +146,7 @@ def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues)
     """Return the model of the longest ranges that predicts left-out takes as well as a tuned one.
 
     As well: its mean squared residual is at most one standard error of the tuned model's above it
-    (Breiman et al. 1984, section 3.4.3). Takes of a large family have near neighbours, and so
+    (Breiman et al. 1984, section 3.4.3). Recordings of a large family have near neighbours, and so
     hardly tell how far a clip says something about motions between them (decision 0025).
     """
     squares = _take_squares(samples, tuned.residuals)
@@ -164,11 +164,13 @@ def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues)
     return replace(evaluated, disagreement=tuned.disagreement)
 
 
-def _take_squares(samples: SamplePoints, residuals: SampleValues) -> Annotated[Floats, "takes"]:
-    """Return the squared residuals (g,) of each take, summed over its clips."""
-    _, takes = np.unique(samples.groups, return_inverse=True)
+def _take_squares(
+    samples: SamplePoints, residuals: SampleValues
+) -> Annotated[Floats, "recordings"]:
+    """Return the squared residuals (g,) of each recording, summed over its clips."""
+    _, recordings = np.unique(samples.groups, return_inverse=True)
     squares = np.einsum("nm,nm->n", residuals, residuals)
-    return np.asarray(np.bincount(takes, squares), dtype=np.float64)
+    return np.asarray(np.bincount(recordings, squares), dtype=np.float64)
 
 
 def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleValues) -> FittedModel:
@@ -177,7 +179,7 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     Leave-one-out predictions tell by how much: their differences from the mean are multiplied by
     the share that fits the values best. A choice between model and mean does worse than either: a
     sample that is left out pulls the choice away from itself. A single value, as the duration is,
-    is tuned by the density of its left-out takes.
+    is tuned by the density of its left-out recordings.
     """
     if np.ptp(values, axis=0).max() <= ROUNDING * np.abs(values).max():
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))

@@ -205,10 +205,10 @@ def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
         if label_set not in known
     ]
     said += _repeated_sets(laid, tuple(known))
-    if len(np.unique(laid.groups)) > len(np.unique(take_numbers(examples))):
+    if len(np.unique(laid.groups)) > len(np.unique(recording_numbers(examples))):
         said.append(
-            "clips of one take are not left out together: those of the other takes alone could "
-            "not carry the drift"
+            "clips of one recording are not left out together: those of the other recordings "
+            "alone could not carry the drift"
         )
     return said
 
@@ -231,23 +231,23 @@ def _points(examples: Sequence[Example]) -> SampleControls:
     return half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
 
 
-def take_numbers(examples: Sequence[Example]) -> Annotated[Indices, "{len(examples)}"]:
-    """Return the number (N,) of the take of each example; its file without a take."""
-    takes = [example.take or str(example.row.place) for example in examples]
-    return np.unique(takes, return_inverse=True)[1]
+def recording_numbers(examples: Sequence[Example]) -> Annotated[Indices, "{len(examples)}"]:
+    """Return the number (N,) of each example's recording; of its file without one."""
+    recordings = [example.recording or str(example.row.place) for example in examples]
+    return np.unique(recordings, return_inverse=True)[1]
 
 
 def _groups(
     recipe: Recipe, examples: Sequence[Example], points: SampleControls
 ) -> Annotated[Indices, "samples"]:
-    """Return groups (N,) by take, or singletons if the drift is undetermined without a take.
+    """Return groups (N,) by recording, or singletons if the drift is undetermined without one.
 
     Raises TrainingError if the drift is undetermined without a single example.
     """
     degree = recipe.kriging.degree
-    by_take, alone = take_numbers(examples), np.arange(len(examples))
-    if _indispensable_group(by_take, points, degree) is None:
-        return by_take
+    by_recording, alone = recording_numbers(examples), np.arange(len(examples))
+    if _indispensable_group(by_recording, points, degree) is None:
+        return by_recording
     needed = _indispensable_group(alone, points, degree)
     if needed is not None:
         raise TrainingError(

@@ -191,9 +191,9 @@ class LeaveOneOutLoss:
         """
         block = self.inverse(hyper)
         product = block @ self.values
-        residuals = kriging_model.divide_groups(block, product, self.takes)
+        residuals = kriging_model.divide_groups(block, product, self.recordings)
         weighted = self._weighted(residuals)
-        backward = kriging_model.divide_groups(block, weighted, self.takes)
+        backward = kriging_model.divide_groups(block, weighted, self.recordings)
         paired = np.where(self.together, backward @ residuals.T, 0.0)
         slope = block @ (paired @ block - backward @ product.T)
         return max(float(np.sum(weighted * residuals)), TINY), slope + slope.T
@@ -225,7 +225,7 @@ class LeaveOneOutLoss:
         return values if self.problem.effector is not None else _compact(values)
 
     @cached_property
-    def takes(self) -> list[Annotated[Indices, "_ _"]]:
+    def recordings(self) -> list[Annotated[Indices, "_ _"]]:
         """Sample indices (groups, size) of the groups of each size above one."""
         return kriging_model.equal_sized_groups(self.problem.samples.groups)
 
@@ -299,7 +299,7 @@ def _product(shares: Sequence[Floats]) -> Floats | float:
 
 @dataclass(frozen=True)
 class PredictiveDensityLoss(LeaveOneOutLoss):
-    """Negative logarithm of the density that left-out takes have by the prediction from all others.
+    """Negative logarithm of the density that left-out recordings have by the others' predictions.
 
     The squared residuals of a single value say little about the nugget: a model that follows every
     sample and one that smooths them may miss alike. The density also asks whether the variances
@@ -310,12 +310,12 @@ class PredictiveDensityLoss(LeaveOneOutLoss):
     def of_samples(self, hyper: Hyper) -> tuple[float, SampleMatrix]:
         """Return the loss without the prior, and its derivative (n, n) by the covariances.
 
-        With B and U as in `LeaveOneOutLoss` a take's residuals B_gg⁻¹ U_g have the covariance
+        With B and U as in `LeaveOneOutLoss` a recording's residuals B_gg⁻¹ U_g have the covariance
         B_gg⁻¹, in units of the sill. Of several values the loss is that of their mean density.
         """
         block = self.inverse(hyper)
         product = block @ self.values
-        residuals = kriging_model.divide_groups(block, product, self.takes)
+        residuals = kriging_model.divide_groups(block, product, self.recordings)
         own = np.where(self.together, block, 0.0)
         squares, count = max(float(np.sum(residuals * product)), TINY), len(block)
         loss = 0.5 * count * float(np.log(squares)) - 0.5 * float(np.linalg.slogdet(own)[1])

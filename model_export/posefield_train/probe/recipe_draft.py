@@ -20,7 +20,7 @@ FRAME_NAME = re.compile(r"frame(?!s\b)|_frame$|^frame_")
 OWN_COLUMNS = ("file", "first_frame", "last_frame")
 FILE_COLUMNS = ("file", "path", "bvh", "filename")
 PERFORMER_COLUMNS = ("performer", "subject", "actor", "who")
-TAKE_COLUMNS = ("take", "recording", "session")
+RECORDING_COLUMNS = ("recording", "recording", "session")
 
 
 def table_text(report: ProbeReport, folder: Path) -> str:
@@ -140,7 +140,7 @@ def _clips(table: ClipTable | None) -> list[str]:
             "# A column with the performer's name, so that they can be told apart:",
             '# performer = "performer"',
             "# A column with the recording of each clip; clips of one are left out together:",
-            '# take = "take"',
+            '# recording = "recording"',
             "# Columns with the frame of an event, counted from 0 as in the file, in their order:",
             '# landmarks = ["contact_frame"]',
             "",
@@ -150,8 +150,10 @@ def _clips(table: ClipTable | None) -> list[str]:
     lines.append(f"file = {quote(_first_of(table, FILE_COLUMNS))}")
     if performer:
         lines.append(f"performer = {quote(performer)}")
-    if take := _first_of(table, TAKE_COLUMNS):
-        lines.append(f"take = {quote(take)}  # clips of one take are left out together")
+    if recording := _first_of(table, RECORDING_COLUMNS):
+        lines.append(
+            f"recording = {quote(recording)}  # clips of one recording are left out together"
+        )
     marks = frame_columns(table)
     lines.append("# Columns that may hold the frame of an event; those that do become landmarks:")
     lines.append(f"# landmarks = {names(marks or ['contact_frame'])}")

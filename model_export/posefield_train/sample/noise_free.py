@@ -6,9 +6,8 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion.clip import Clip, assemble
-from posefield_train.sample import reach_timing, reaching, sample_controls
-from posefield_train.sample.reach_timing import TimingWarp
-from posefield_train.sample.sample_controls import SampleControls
+from posefield_train.sample import reaching, sample_controls
+from posefield_train.sample.sample_controls import SampleControls, TimingWarp
 
 ControlPoint = Mapping[str, float] | Sequence[float]
 """Controls by name, or four values in the order of controls.RANGES; turn in degrees."""
@@ -25,7 +24,7 @@ def poses(point: ControlPoint, phases: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def target(point: ControlPoint) -> Floats:
-    """Return the final `sample_arms.palm_position` (3,), m, of the right hand."""
+    """Return the final `sample_limbs.palm_position` (3,), m, of the right hand."""
     return reaching.target(sample_controls.parse_controls(point))
 
 
@@ -49,7 +48,7 @@ def truth_clip(point: ControlPoint, rate: float) -> Clip:
 
 
 def _duration(where: SampleControls) -> float:
-    return reach_timing.fitts_duration(reaching.hand_travel(where))
+    return sample_controls.fitts_duration(reaching.hand_travel(where))
 
 
 def warp(where: SampleControls) -> TimingWarp:

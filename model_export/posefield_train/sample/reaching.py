@@ -12,7 +12,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
-from posefield_train.sample import sample_arms, sample_body, sample_legs, sample_trunk
+from posefield_train.sample import sample_body, sample_limbs, sample_trunk
 from posefield_train.sample.sample_controls import SampleControls
 from posefield_train.sample.sample_trunk import TrunkDisplacement
 
@@ -43,7 +43,7 @@ def _trunk_motion(controls: SampleControls, goal: TrunkDisplacement, u: Floats) 
     still = np.tile(quat.IDENTITY, (len(u), len(sample_body.NAMES), 1))
     path = sample_trunk.root_path(controls, goal, u)
     turns = sample_trunk.rotations(controls, goal, u)
-    turns["RightShoulder"] = sample_arms.blade(controls, goal, u)
+    turns["RightShoulder"] = sample_limbs.blade(controls, goal, u)
     return ReachingMotion(sample_body.skeleton(controls.stature), still, path).with_rotations(turns)
 
 
@@ -62,7 +62,7 @@ def _target_position(controls: SampleControls, figure: Skeleton, shoulder: Float
     arm is extended to sqrt(0.68² + w² / 2) of its length, where w of its length are not ahead.
     """
     ahead = np.array([np.sin(controls.azimuth), 0.0, np.cos(controls.azimuth)])
-    length = sample_arms.arm_reach(figure)
+    length = sample_limbs.arm_reach(figure)
     above = controls.target_height - shoulder[1]
     beside = shoulder[2] * ahead[0] - shoulder[0] * ahead[2]
     distance = shoulder @ ahead + np.sqrt((0.68 * length) ** 2 - 0.5 * (above**2 + beside**2))
@@ -89,15 +89,15 @@ def reaching_motion(controls: SampleControls, u: Floats) -> ReachingMotion:
     to_look = quat.rotate(chest, aim - positions[:, sample_body.INDEX["Neck"]])
     return carriage.with_rotations(
         sample_trunk.neck_rotations(to_look, u)
-        | sample_legs.rotations(controls, carriage.figure, goal, pelvis, u)
-        | sample_arms.right_arm(controls, goal, carriage.figure, to_target, u)
-        | sample_arms.left_arm(controls, goal, u)
-        | sample_arms.fingers(goal, u)
+        | sample_limbs.legs(controls, carriage.figure, goal, pelvis, u)
+        | sample_limbs.right_arm(controls, goal, carriage.figure, to_target, u)
+        | sample_limbs.left_arm(controls, goal, u)
+        | sample_limbs.fingers(goal, u)
     )
 
 
 def hand_travel(controls: SampleControls) -> float:
     """Return the distance, m, from the hand at rest to the target."""
     ends = reaching_motion(controls, np.array([0.0, 1.0]))
-    first, last = sample_arms.palm_position(ends.forward()[0])
+    first, last = sample_limbs.palm_position(ends.forward()[0])
     return float(np.linalg.norm(last - first))

@@ -6,7 +6,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield_train.sample import reach_timing, sample_body
+from posefield_train.sample import sample_body, sample_controls
 from posefield_train.sample.sample_controls import SampleControls
 
 _RESTING_SLOUCH = {"Hips": -0.12, "LowerBack": 0.08, "Spine": 0.06, "Spine1": 0.03}
@@ -70,7 +70,7 @@ def root_path(controls: SampleControls, goal: TrunkDisplacement, u: Floats) -> F
     heading = 0.5 * controls.azimuth
     way = np.array([goal.shift * np.sin(heading), -goal.drop, goal.shift * np.cos(heading)])
     start = np.array([0.0, controls.hip_height, 0.0])
-    path: Floats = start + reach_timing.trunk(u)[:, None] * way
+    path: Floats = start + sample_controls.trunk(u)[:, None] * way
     return path
 
 
@@ -84,7 +84,7 @@ def rotations(controls: SampleControls, goal: TrunkDisplacement, u: Floats) -> d
         name: (1.0 - pelvis) * np.array([_YAW[name], _LEAN[name], _ROLL[name]])
         for name in sample_body.SPINE
     }
-    progress = reach_timing.trunk(u)[:, None]
+    progress = sample_controls.trunk(u)[:, None]
     sitting = np.array([0.0, 1.0 - controls.uprightness, 0.0])
     return {
         name: quat.from_euler(_RESTING_SLOUCH[name] * sitting + progress * share * total, "YXZ")
@@ -99,7 +99,7 @@ def neck_rotations(to_target: Floats, u: Floats) -> dict[str, Floats]:
     """
     x, y, z = np.moveaxis(to_target, -1, 0)
     yaw, pitch = np.arctan2(x, z), -np.arctan2(y, np.hypot(x, z))
-    progress = reach_timing.gaze(u)
+    progress = sample_controls.gaze(u)
     tilt = -0.12 * yaw
     look = progress[:, None] * np.stack([yaw, pitch, tilt], axis=-1)
     return {name: quat.from_euler(share * look, "YXZ") for name, share in _GAZE.items()}

@@ -131,7 +131,7 @@ class _JointDraft:
     has_children: bool = False
 
 
-# All takes of one performer have the same hierarchy.
+# All recordings of one performer have the same hierarchy.
 @lru_cache(maxsize=16)
 def parse_hierarchy(
     head: str, end: str

@@ -203,11 +203,11 @@ class ClipRow:
 
     line: in the table, for messages; None without table. first_frame, last_frame: indices in the
     file from 0, last_frame inclusive; None is the end of the file. controls: those of the table.
-    landmarks: frames of the file. other_labels: name of the clip in each further label set. take:
-    name of the take, unique among the performer's; None if the table has no such column.
-    curve_place: file of the clip's curves; None without them, and where the clip has curves alone.
-    contacts: first and last frame in the file of each contact, by column. animation: name of one
-    of several in the file; None for the only one.
+    landmarks: frames of the file. other_labels: name of the clip in each further label set.
+    recording: name of the recording, unique among the performer's; None if the table has no such
+    column. curve_place: file of the clip's curves; None without them, and where the clip has curves
+    alone. contacts: first and last frame in the file of each contact, by column. animation: name of
+    one of several in the file; None for the only one.
     """
 
     place: FileLocation
@@ -218,7 +218,7 @@ class ClipRow:
     last_frame: int | None
     controls: Floats
     landmarks: tuple[int, ...]
-    take: str | None = None
+    recording: str | None = None
     other_labels: Mapping[str, str] = field(default_factory=dict)
 
     curve_place: FileLocation | None = None
@@ -295,6 +295,7 @@ def read(recipe: Recipe, folder: Path, notes: list[str] | None = None) -> list[C
                 1,
             )
     if notes is not None:
+        notes += recipe.notes
         notes += data_folder.table_notes(cells.name)
         if cells.decimal_commas:
             notes.append(f"{place.name}: {cells.decimal_commas} decimal commas were read as points")
@@ -311,7 +312,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
     named |= {column: f"contacts.columns.{j}" for j, column in recipe.contacts.columns.items()}
-    for key in ("animation", "performer", "take", "first_frame", "last_frame"):
+    for key in ("animation", "performer", "recording", "first_frame", "last_frame"):
         column = getattr(clips, key)
         if column is not None:
             named[column] = f"clips.{key}"
@@ -346,9 +347,9 @@ def _row(
     controls = np.array([cells.number(line, record, c.column) for c in recipe.column_controls])
     landmarks = tuple(cells.frame(line, record, column) for column in clips.landmarks)
     labels = {name: cells.name_of(line, record, column) for name, column in clips.labels.items()}
-    take = record[clips.take].strip() if clips.take else None
-    if take == "":
-        message = f"column {clips.take!r}: nothing, expected the name of a take"
+    recording = record[clips.recording].strip() if clips.recording else None
+    if recording == "":
+        message = f"column {clips.recording!r}: nothing, expected the name of a recording"
         raise RecipeError(cells.name, message, line)
     curves = recipe.curves
     curve_place = None
@@ -369,7 +370,7 @@ def _row(
         controls=controls,
         landmarks=landmarks,
         other_labels=labels,
-        take=take,
+        recording=recording,
         curve_place=curve_place,
         contacts={
             column: cells.spans(line, record, column) for column in recipe.contacts.columns.values()
@@ -390,23 +391,24 @@ def refuse_repeats(rows: Sequence[ClipRow]) -> None:
         seen[key] = row
 
 
-def stated_takes(rows: Sequence[ClipRow]) -> list[str] | None:
-    """Return the takes that the table states, by performer and name; None if it states none.
+def stated_recordings(rows: Sequence[ClipRow]) -> list[str] | None:
+    """Return the recordings that the table states, by performer and name; None if it states none.
 
-    Raises RecipeError for a file whose clips are of two takes.
+    Raises RecipeError for a file whose clips are of two recordings.
     """
-    if any(row.take is None for row in rows):
+    if any(row.recording is None for row in rows):
         return None
     seen: dict[str, ClipRow] = {}
     for row in rows:
         other = seen.setdefault(row.motion, row)
-        if _named_take(other) != _named_take(row):
+        if _named_recording(other) != _named_recording(row):
             raise row.error(
-                f"{row.place.name} is of take {row.take!r} here and of take {other.take!r} in line "
-                f"{other.line}, expected one take for a file: its clips were recorded in one go"
+                f"{row.place.name} is of recording {row.recording!r} here and of "
+                f"{other.recording!r} in line {other.line}, expected one for a file: its clips were "
+                "recorded in one go"
             )
-    return [_named_take(row) for row in rows]
+    return [_named_recording(row) for row in rows]
 
 
-def _named_take(row: ClipRow) -> str:
-    return f"{row.performer}/{row.take}"
+def _named_recording(row: ClipRow) -> str:
+    return f"{row.performer}/{row.recording}"

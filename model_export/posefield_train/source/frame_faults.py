@@ -1,4 +1,4 @@
-"""Faults of the frames of a take: a rest pose before the motion, frames twice, joints that leap."""
+"""Faults of the frames of a recording: a rest pose at first, frames twice, joints that leap."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Leap:
 
 @dataclass(frozen=True)
 class FrameFaults:
-    """Faults of the frames of a take.
+    """Faults of the frames of a recording.
 
     from_rest: difference of the first frame, a rest pose that the motion does not begin with, from
     the next, m; 0 where the motion begins with the first frame. repeated: frames that repeat the

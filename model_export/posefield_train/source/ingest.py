@@ -18,8 +18,8 @@ from posefield_train.source import (
     curve_files,
     measured_controls,
     motion_file,
+    recording_groups,
     skeleton_checks,
-    take_groups,
     unified_clips,
 )
 from posefield_train.source.canonical import Finding
@@ -47,11 +47,11 @@ class Example:
 
     controls: (d,), from the table and measured, in the recipe's order. landmarks: fractions of the
     clip, in order. jumps: removed jumps of small joints between two frames. shift: share of a cycle
-    by which the clip was shifted to begin later. take: name of the take; examples of one take are
-    left out together. facing: degrees from the root's +z to the body's facing in the file, to the
-    left; None for a motion without a facing. captured: the clip of a cycle before its seam
-    was closed; None where nothing was closed. contacts: first and last share of the clip as it was
-    cut of each contact in the table, by joint.
+    by which the clip was shifted to begin later. recording: name of the recording; examples of one
+    recording are left out together. facing: degrees from the root's +z to the body's facing in the
+    file, to the left; None for a motion without a facing. captured: the clip of a cycle before its
+    seam was closed; None where nothing was closed. contacts: first and last share of the clip as it
+    was cut of each contact in the table, by joint.
     """
 
     row: ClipRow
@@ -60,7 +60,7 @@ class Example:
     landmarks: tuple[float, ...]
     jumps: tuple[Finding, ...]
     shift: float = 0.0
-    take: str = ""
+    recording: str = ""
     facing: float | None = 0.0
     captured: Clip | None = None
     contacts: Mapping[str, Spans] = field(default_factory=dict)
@@ -142,16 +142,19 @@ def ingest(
     )
     notes += [*rig_notes, *stretch_notes(rows, [own.stretch for own in found])]
     canonical.return_freed_memory()
-    takes, take_notes = clip_table.stated_takes(rows), list[str]()
-    if takes is None:
-        takes, take_notes = take_groups.find_takes(
+    recordings, recording_notes = clip_table.stated_recordings(rows), list[str]()
+    if recordings is None:
+        recordings, recording_notes = recording_groups.find_recordings(
             [row.motion for row in rows],
             [row.named for row in rows],
             [own.positions for own in found],
             examples[0].clip.skeleton.names,
         )
-    examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
-    return examples, [*take_notes, *notes]
+    examples = [
+        replace(own, recording=recording)
+        for own, recording in zip(examples, recordings, strict=True)
+    ]
+    return examples, [*recording_notes, *notes]
 
 
 def read_files(
@@ -201,7 +204,7 @@ def _bone_length(file: MotionFile) -> float:
 
 @dataclass(frozen=True)
 class _FoundExample:
-    """An example before its take is known.
+    """An example before its recording is known.
 
     stretch: largest change of a bone's length in it, m. positions: of its joints as captured
     (F, J, 3), m.

@@ -1,9 +1,17 @@
 """Sections of a recipe on its data and on the training."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from posefield.common.units import UpAxis
 from posefield.motion.joint_roles import Role
@@ -68,11 +76,11 @@ class Clips(RecipePart):
         description="columns: names of further label sets, such as { style = 'style' }, for "
         "kriging.label",
     )
-    take: Text | None = Field(
+    recording: Text | None = Field(
         default=None,
-        description="column: take, unique among the performer's; clips of one take are left out "
+        description="column: recording, unique among the performer's; clips of one are left out "
         "together; default: clips of one file are, and clips that share frames, mirror or continue "
-        "each other",
+        "each other. It was called take, a name that is accepted for one version, with a note",
     )
     first_frame: Text | None = Field(default=None, description="column: first frame, from 0")
     last_frame: Text | None = Field(default=None, description="column: last frame, inclusive")
@@ -82,6 +90,16 @@ class Clips(RecipePart):
         "that alignment moves to the same time in all clips; such as ['contact_frame']",
     )
     where: dict[str, Condition] = Field(default={}, description="conditions on rows, by column")
+
+    @model_serializer(mode="wrap")
+    def _write_former_key(
+        self, write: SerializerFunctionWrapHandler, info: SerializationInfo
+    ) -> dict[str, Any]:
+        fields = write(self)
+        if info.by_alias:
+            return fields
+        # The digest of a recipe on its model's card is that of the keys' first names.
+        return {("take" if key == "recording" else key): fields[key] for key in fields}
 
 
 class SkeletonSettings(RecipePart):

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import FileError
-from posefield_train.sample import sample_body, sample_controls, sample_family, sample_files
+from posefield_train.sample import sample_body, sample_controls, sample_files
 
 
 @pytest.fixture(scope="module")
 def samples():
-    return list(sample_family.samples())
+    return list(sample_files.samples())
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_files_are_the_same_in_every_process(folder, tmp_path):
 
 
 def test_there_are_92_clips_of_94_channels_at_120_hz(folder, rows):
-    assert len(rows) == sample_family.COUNT == 92
+    assert len(rows) == sample_files.COUNT == 92
     assert sorted(row["file"] for row in rows) == sorted(
         path.relative_to(folder).as_posix() for path in folder.rglob("*.bvh")
     )
@@ -78,7 +78,7 @@ def test_there_are_92_clips_of_94_channels_at_120_hz(folder, rows):
 @pytest.mark.parametrize("count", [92, 10_000])
 def test_samples_of_any_number_can_be_reached(count):
     """Rounding to the table's decimals leaves no control point outside the body's limits."""
-    found = [where for _, where in sample_family.design(count)]
+    found = [where for _, where in sample_files.design(count)]
     assert len(found) == count
     for where in found:
         values = [where.stature, where.hip_height, where.turn, where.target_height]
@@ -87,8 +87,8 @@ def test_samples_of_any_number_can_be_reached(count):
 
 def test_noise_has_the_size_it_claims_and_keeps_hinges_and_feet(samples):
     rng = np.random.Generator(np.random.PCG64(0))
-    noise = sample_family.smooth_noise(rng, 200, (40, 3))
-    assert np.sqrt(np.mean(noise**2)) == pytest.approx(sample_family.NOISE, rel=0.2)
+    noise = sample_files.smooth_noise(rng, 200, (40, 3))
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(sample_files.NOISE, rel=0.2)
     for sample in samples[::9]:
         hinges = sample.clip.rotations[:, [sample_body.INDEX[name] for name in sample_body.HINGES]]
         assert np.abs(hinges[..., 2:]).max() == 0.0

@@ -7,7 +7,7 @@ from numpy.random import PCG64, Generator
 from posefield.common.errors import InvalidField
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import assemble
-from posefield_train.sample import noise_free, sample_arms, sample_body, sample_controls
+from posefield_train.sample import noise_free, sample_body, sample_controls, sample_limbs
 
 PHASES = np.linspace(0.0, 1.0, 201)
 SITTING = {"stature": 1.70, "hip_height": 0.50, "turn": 40.0, "target_height": 1.2}
@@ -40,7 +40,7 @@ def joint(array, name):
 
 
 def miss(point, phase):
-    found = sample_arms.palm_position(positions(point, np.array([phase]))[0])[0]
+    found = sample_limbs.palm_position(positions(point, np.array([phase]))[0])[0]
     return np.linalg.norm(found - noise_free.target(point))
 
 

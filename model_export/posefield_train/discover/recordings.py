@@ -1,4 +1,4 @@
-"""Long takes of a folder: joints with a role, in leg lengths, with Y up."""
+"""Long recordings of a folder: joints with a role, in leg lengths, with Y up."""
 
 from bisect import bisect_left
 from collections import Counter
@@ -15,7 +15,7 @@ from posefield.motion import skeleton
 from posefield.roles.joint_recognition import NEEDED, RoleGuess
 from posefield_train.probe import proposals
 from posefield_train.probe.proposals import MOST_WHOLE, Proposal
-from posefield_train.source import frame_faults, motion_file, motion_readers, take_groups
+from posefield_train.source import frame_faults, motion_file, motion_readers, recording_groups
 from posefield_train.source.frame_faults import NO_FAULTS, FrameFaults
 from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
@@ -33,23 +33,23 @@ COMPARED = (
     "leftHand",
     "rightHand",
 )
-"""Roles whose places are compared, as far as all takes have them."""
+"""Roles whose places are compared, as far as all recordings have them."""
 
 
 @dataclass(frozen=True)
-class TakeCopy:
-    """A take of a recording that another file begins. recording: the first file. note: why."""
+class RecordingCopy:
+    """A copy of another recording. original: its file. note: why."""
 
-    recording: str
+    original: str
     note: str
 
 
 def find_copies(
     files: Sequence[str], places: Sequence[Mapping[str, Floats]]
-) -> dict[str, TakeCopy]:
-    """Return the takes that are copies, by file.
+) -> dict[str, RecordingCopy]:
+    """Return the recordings that are copies, by file.
 
-    files: of the takes. places: positions (F, 3) by role of each, leg lengths, Y up.
+    files: of the recordings. places: positions (F, 3) by role of each, leg lengths, Y up.
     """
     if len(files) < 2:
         return {}
@@ -57,18 +57,18 @@ def find_copies(
     roles = [role for role in known if _counterpart(role) in known]
     motions = [_motion(own, roles) for own in places]
     swapped = tuple(roles.index(_counterpart(role)) for role in roles)
-    pairs = take_groups.find_pairs(motions, swapped)
-    recordings = take_groups.connected(files, pairs)
+    pairs = recording_groups.find_pairs(motions, swapped)
+    originals = recording_groups.connected(files, pairs)
     notes: dict[str, str] = {}
-    # Relations to the recording itself come first.
-    named = {files.index(file) for file in recordings}
+    # Relations to the original itself come first.
+    named = {files.index(file) for file in originals}
     for pair in sorted(pairs, key=lambda own: not {own.first, own.second} & named):
         said = f"{files[pair.second]} {pair.relation} {files[pair.first]}"
         for at in (pair.first, pair.second):
-            if files[at] != recordings[at]:
-                notes.setdefault(files[at], f"{said}: both are one take")
-    copies = dict(zip(files, recordings, strict=True))
-    return {file: TakeCopy(copies[file], note) for file, note in notes.items()}
+            if files[at] != originals[at]:
+                notes.setdefault(files[at], f"{said}: both are one recording")
+    copies = dict(zip(files, originals, strict=True))
+    return {file: RecordingCopy(copies[file], note) for file, note in notes.items()}
 
 
 def _motion(places: Mapping[str, Floats], roles: Sequence[str]) -> Positions:
@@ -95,17 +95,17 @@ SEARCHED = frozenset(
 )
 """Roles whose places are kept."""
 MOST_FRAMES = 5_000_000
-"""Frames of all takes together, which take 2 GB: eleven hours at 120 frames a second."""
+"""Frames of all recordings together, which take 2 GB: eleven hours at 120 frames a second."""
 FEWEST_FRAMES = 2
 
 
 @dataclass(frozen=True)
-class Take:
+class Recording:
     """A motion file as recorded.
 
     file: its path below the folder. rate: frames a second. places: positions (F, 3) by role, in
     leg lengths, Y up; a rest pose before the motion is replaced by the frame after it. faults: of
-    the frames. copy_of: file of the first take of the same recording; None for the take itself.
+    the frames. copy_of: file of the first recording of the same motion; None for an original.
     """
 
     file: str
@@ -118,14 +118,14 @@ class Take:
         return len(self.places["hips"])
 
     @property
-    def recording(self) -> str:
-        """Return the file of the recording, which copies of a take share."""
+    def original(self) -> str:
+        """Return the file of which this one is a copy, or itself."""
         return self.copy_of or self.file
 
     @property
-    def recording_name(self) -> str:
-        """Return the name of the recording, its file without the ending."""
-        return PurePosixPath(self.recording).with_suffix("").as_posix()
+    def original_name(self) -> str:
+        """Return the name of the original, its file without the ending."""
+        return PurePosixPath(self.original).with_suffix("").as_posix()
 
     @property
     def first(self) -> int:
@@ -148,14 +148,14 @@ class Take:
 
 
 @dataclass(frozen=True)
-class ReadTakes:
-    """Takes of a folder in the order of their names, and the files that were left out.
+class ReadRecordings:
+    """Recordings of a folder in the order of their names, and the files that were left out.
 
     refused: reason by file. notes: by file, on frames that were left out, and on copies. figures:
-    of the takes' bodies, by file.
+    of the recordings' bodies, by file.
     """
 
-    takes: tuple[Take, ...]
+    recordings: tuple[Recording, ...]
     refused: dict[str, str]
     notes: dict[str, list[str]]
     figures: dict[str, proposals.Figure]
@@ -174,13 +174,13 @@ class Stated:
     rate: float | None = None
 
 
-def read_takes(
+def read_recordings(
     folder: Path,
     stated: Stated | None = None,
     report: Callable[[int], None] = lambda _: None,
     files: MotionFiles | None = None,
-) -> ReadTakes:
-    """Return the takes of all motion files below a folder.
+) -> ReadRecordings:
+    """Return the recordings of all motion files below a folder.
 
     report: called with the number of files that are read. files: keep what is read. A file that
     cannot be read or searched is refused with its reason; FileError if none is left.
@@ -197,12 +197,12 @@ def read_takes(
         name = path.relative_to(folder).as_posix()
         try:
             body = _body(name, read(path, ReadOptions(rate=known.rate)), known)
-            frames += len(body.take)
+            frames += len(body.recording)
             measured[body.joints] += 1
             bodies.append(body if measured[body.joints] <= MOST_WHOLE else body.light())
         except FileError as fault:
             refused[name] = motion_readers.reason(fault, path)
-        except UnusableTake as fault:
+        except UnusableRecording as fault:
             refused[name] = str(fault)
         if frames > MOST_FRAMES:
             raise FileError(
@@ -211,31 +211,31 @@ def read_takes(
             )
         report(count)
     kept = _of_one_unit(bodies, refused)
-    takes, notes = _recordings(_turned(kept, known.up, refused))
-    if not takes:
+    recordings, notes = _with_originals(_turned(kept, known.up, refused))
+    if not recordings:
         first = next(iter(refused.items()), None)
         said = f"such as {first[0]}: {first[1]}" if first else "it has no motion files"
-        raise FileError(folder, f"no take that can be searched; {said}")
-    figures = {body.take.file: body.figure for body in kept}
+        raise FileError(folder, f"no recording that can be searched; {said}")
+    figures = {body.recording.file: body.figure for body in kept}
     for file, figure in figures.items():
         if figure.file.notes:
             notes[file] = [*figure.file.notes, *notes.get(file, [])]
-    return ReadTakes(tuple(takes), refused, notes, figures)
+    return ReadRecordings(tuple(recordings), refused, notes, figures)
 
 
-class UnusableTake(ValueError):
-    """A take that is read, but cannot be searched."""
+class UnusableRecording(ValueError):
+    """A recording that is read, but cannot be searched."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A take before its up axis is known.
+    """A recording before its up axis is known.
 
     joints: names of all, which bodies of one kind share. figure: its measurements, without the
     frames of the file. leg: length in the file's unit. up: axis that the file or the body tells.
     """
 
-    take: Take
+    recording: Recording
     joints: tuple[str, ...]
     figure: proposals.Figure
     leg: float
@@ -248,13 +248,13 @@ class Body:
 
 def _body(name: str, file: MotionFile, stated: Stated) -> Body:
     if len(file) < FEWEST_FRAMES:
-        raise UnusableTake(f"found {len(file)} frame, expected a motion")
+        raise UnusableRecording(f"found {len(file)} frame, expected a motion")
     if file.rate is None:
-        raise UnusableTake(f"{file.format} states no frame rate: say it with --rate")
+        raise UnusableRecording(f"{file.format} states no frame rate: say it with --rate")
     measured, roles = proposals.measure(file), stated.roles
     unknown = sorted(set(roles.values()) - set(measured.names))
     if unknown:
-        raise UnusableTake(f"no joint {', '.join(map(repr, unknown))}, which the roles name")
+        raise UnusableRecording(f"no joint {', '.join(map(repr, unknown))}, which the roles name")
     # Stated roles in place of those that were recognised.
     certain = {role: RoleGuess(joint, 1.0) for role, joint in roles.items()}
     others = {r: g for r, g in measured.guesses.items() if g.joint not in roles.values()}
@@ -267,12 +267,12 @@ def _body(name: str, file: MotionFile, stated: Stated) -> Body:
         elif not guess.is_sure:
             lacking.append(f"{role} ({guess.joint}? {'; '.join(guess.reasons)})")
     if lacking:
-        raise UnusableTake(
+        raise UnusableRecording(
             f"no joint for {', '.join(lacking)}, expected a body with two legs; roles can be stated"
         )
     leg = measured.leg_length()
     if not leg:
-        raise UnusableTake("the legs have no length, expected bones from hip to foot")
+        raise UnusableRecording("the legs have no length, expected bones from hip to foot")
     joints = file.skeleton
     positions = skeleton.positions(joints.parents, file.rotations, file.translations)
     index = {joint: at for at, joint in enumerate(joints.names)}
@@ -283,9 +283,9 @@ def _body(name: str, file: MotionFile, stated: Stated) -> Body:
     if faults.rests_first:
         moved[0] = moved[1]
     places = {role: np.ascontiguousarray(moved[:, at]) for at, role in enumerate(searched)}
-    take = Take(name, file.rate, places, faults)
+    recording = Recording(name, file.rate, places, faults)
     up = proposals.propose_up([measured])
-    return Body(take, tuple(measured.names), measured.without_frames(), leg, up)
+    return Body(recording, tuple(measured.names), measured.without_frames(), leg, up)
 
 
 def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
@@ -305,36 +305,38 @@ def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
         for body in alike:
             groups.setdefault(bisect_left(tops, body.leg), []).append(body)
         usual = max(groups.values(), key=len)
-        kept.update(body.take.file for body in usual)
+        kept.update(body.recording.file for body in usual)
         for body in (own for group in groups.values() if group is not usual for own in group):
-            refused[body.take.file] = (
-                f"its legs are {body.leg:.4g} units long, those of {usual[0].take.file} and most "
-                f"files with its joints {usual[0].leg:.4g}: search files of one unit together"
+            refused[body.recording.file] = (
+                f"its legs are {body.leg:.4g} units long, those of {usual[0].recording.file} and "
+                f"most files with its joints {usual[0].leg:.4g}: search files of one unit together"
             )
-    return [body for body in bodies if body.take.file in kept]
+    return [body for body in bodies if body.recording.file in kept]
 
 
-def _recordings(takes: Sequence[Take]) -> tuple[list[Take], dict[str, list[str]]]:
-    """Return the takes with the recordings of which they are copies, and notes by file."""
-    files = [take.file for take in takes]
-    copies = find_copies(files, [take.places for take in takes])
+def _with_originals(
+    recordings: Sequence[Recording],
+) -> tuple[list[Recording], dict[str, list[str]]]:
+    """Return the recordings with the originals of which they are copies, and notes by file."""
+    files = [recording.file for recording in recordings]
+    copies = find_copies(files, [recording.places for recording in recordings])
     found, notes = [], {}
-    for take in takes:
-        joints = list(take.places)
-        said = frame_faults.describe(take.faults, joints, take.rate, left_out=True)
-        if take.file in copies:
-            said += [copies[take.file].note]
+    for recording in recordings:
+        joints = list(recording.places)
+        said = frame_faults.describe(recording.faults, joints, recording.rate, left_out=True)
+        if recording.file in copies:
+            said += [copies[recording.file].note]
         if said:
-            notes[take.file] = said
-        first = copies[take.file].recording if take.file in copies else None
-        found.append(replace(take, copy_of=first))
+            notes[recording.file] = said
+        first = copies[recording.file].original if recording.file in copies else None
+        found.append(replace(recording, copy_of=first))
     return found, notes
 
 
-def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> list[Take]:
-    """Return the takes with Y up, which those of one kind of body have in common.
+def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> list[Recording]:
+    """Return the recordings with Y up, which those of one kind of body have in common.
 
-    Takes whose up axis is unclear are added to those that were refused.
+    Recordings whose up axis is unclear are added to those that were refused.
     """
     axes: dict[tuple[str, ...], UpAxis | None] = {}
     reasons: dict[tuple[str, ...], str] = {}
@@ -349,15 +351,15 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
         axis = axes[body.joints]
         if axis is None:
             said = f"its up axis is unclear ({reasons[body.joints]}): say it with --up"
-            refused[body.take.file] = said
+            refused[body.recording.file] = said
             continue
         own_axis = body.up.value if body.up.confidence in ("certain", "high") else axis
         if up is None and own_axis != axis:
-            refused[body.take.file] = (
+            refused[body.recording.file] = (
                 f"its up axis is {own_axis}, that of most files with its joints {axis}: search "
                 "files of one up axis together"
             )
             continue
-        places = {r: motion_file.to_y_up(own, axis) for r, own in body.take.places.items()}
-        found.append(replace(body.take, places=places))
+        places = {r: motion_file.to_y_up(own, axis) for r, own in body.recording.places.items()}
+        found.append(replace(body.recording, places=places))
     return found

@@ -1,4 +1,4 @@
-"""Takes of clips, found from files and motions that share frames, mirror or continue others."""
+"""Recordings of clips, found by files and motions that share frames, mirror or continue others."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -239,19 +239,19 @@ def _rms(moves: Annotated[Floats, "*clips joints 3"]) -> Annotated[Floats, "*cli
     return np.asarray(np.sqrt(np.mean(np.sum(np.square(moves), axis=-1), axis=-1)))
 
 
-def find_takes(
+def find_recordings(
     files: Sequence[str], named: Sequence[str], motions: Motions, joints: tuple[str, ...]
 ) -> tuple[list[str], list[str]]:
-    """Return the take of each clip, as the place of a file, and notes on clips that were grouped.
+    """Return the recording of each clip, as the place of a file, and notes on groups of clips.
 
-    Clips of one file are of one take, and so are clips that share frames, mirror or continue each
-    other. files: of each clip. named: names of clips in notes. motions: joint positions (F, J, 3),
-    m, of each clip as captured. joints: their names.
+    Clips of one file are of one recording, and so are clips that share frames, mirror or continue
+    each other. files: of each clip. named: names of clips in notes. motions: joint positions (F, J,
+    3), m, of each clip as captured. joints: their names.
     """
     pairs = find_pairs(motions, mirrored_joints(joints))
     apart = [pair for pair in pairs if files[pair.first] != files[pair.second]]
-    takes = connected(files, apart)
-    return takes, [*_pair_notes(named, apart), *_file_notes(files)]
+    recordings = connected(files, apart)
+    return recordings, [*_pair_notes(named, apart), *_file_notes(files)]
 
 
 def connected(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
@@ -272,7 +272,7 @@ def connected(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
     return [top(file) for file in files]
 
 
-STATE_TAKES = "clips.take states takes"
+STATE_RECORDINGS = "clips.recording states recordings"
 
 
 def _pair_notes(named: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
@@ -286,8 +286,8 @@ def _pair_notes(named: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
         second, first = named[own[0].second], named[own[0].first]
         more = f"; {clips} clips have such a counterpart" if clips > 2 else ""
         notes.append(
-            f"{second} {relation} {first}{more}: such clips are left out together as one take "
-            f"({STATE_TAKES})"
+            f"{second} {relation} {first}{more}: such clips are left out together as one recording "
+            f"({STATE_RECORDINGS})"
         )
     return notes
 
@@ -299,5 +299,5 @@ def _file_notes(files: Sequence[str]) -> list[str]:
         return []
     return [
         f"{counts[counts > 1].sum()} of {len(files)} clips share their file with others: clips of "
-        f"one file are left out together as one take ({STATE_TAKES})"
+        f"one file are left out together as one recording ({STATE_RECORDINGS})"
     ]
