@@ -112,6 +112,15 @@ LABELLED = MINIMAL.replace(
 )
 
 
+def test_the_former_key_of_recordings_is_read_with_a_note(read):
+    text = TOML.replace("[clips]\n", '[clips]\ntake = "session"\n')
+    found = read(text)
+    assert found.clips.recording == "session" and "clips.take is called" in found.notes[0]
+    assert found.model_dump_json() == read(text.replace("take =", "recording =")).model_dump_json()
+    with pytest.raises(RecipeError, match=r"clips\.take: found it beside clips\.recording"):
+        read(text.replace("[clips]\n", '[clips]\nrecording = "session"\n'))
+
+
 def test_label_sets_are_a_text_or_a_list(read):
     one = read(MINIMAL.replace('file = "file"', 'file = "file"\nperformer = "who"') + ONE_LABEL)
     assert one.kriging.label == ["performer"]

@@ -182,12 +182,12 @@ def test_an_adapted_model_keeps_its_takes_and_adds_those_of_new_clips(tmp_path):
     trained = training.train_examples(recipe, examples)
     content = onnx_export.export_model(trained).content
     reopened = model_reconstruction.reconstruct(content, "a model")
-    before = reopened.card.making.recordings
+    before = reopened.card.making.takes
     assert len(before) == newcomers.CLIPS and len(set(before)) == 9
     table = newcomers.write_newcomer(tmp_path / "cy", (2.0, 7.0))
     found, _ = new_clips.examples_of_table(reopened, table, recipe.source, {"performer": "cy"})
     adapted = adapted_file.export_adapted(reopened, NewPerformer("cy", found, "CC0"))
-    assert adapted.card.making.recordings == (*before, max(before) + 1, max(before) + 2)
+    assert adapted.card.making.takes == (*before, max(before) + 1, max(before) + 2)
     # The new clips are not among those whose accelerations the card has.
     captured = adapted.card.captured_acceleration
     assert captured == reopened.card.captured_acceleration is not None

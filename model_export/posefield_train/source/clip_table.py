@@ -404,8 +404,8 @@ def stated_recordings(rows: Sequence[ClipRow]) -> list[str] | None:
         if _named_recording(other) != _named_recording(row):
             raise row.error(
                 f"{row.place.name} is of recording {row.recording!r} here and of "
-                f"{other.recording!r} in line {other.line}, expected one for a file: its clips were "
-                "recorded in one go"
+                f"{other.recording!r} in line {other.line}, expected one for a file: its clips "
+                "were recorded in one go"
             )
     return [_named_recording(row) for row in rows]
 
