@@ -90,13 +90,13 @@ def _central_entry(common: tuple[int, ...], at: int, name: bytes) -> bytes:
 
 def _end_of_directory(count: int, size: int, at: int) -> bytes:
     """Return the end of central directory, with its count of entries, size and offset."""
-    shown = min(count, MEMBERS + 1), min(size, BYTES + 1), min(at, BYTES + 1)
-    end = END_RECORD.pack(b"PK\5\6", 0, 0, shown[0], *shown, 0)
+    limited = min(count, MEMBERS + 1), min(size, BYTES + 1), min(at, BYTES + 1)
+    end = END_RECORD.pack(b"PK\5\6", 0, 0, limited[0], *limited, 0)
     if count <= MEMBERS and max(size, at) <= BYTES:
         return end
     versions = VERSION_64, VERSION_64
-    whole = END_64.pack(b"PK\6\6", END_64.size - 12, *versions, 0, 0, count, count, size, at)
-    return whole + LOCATOR.pack(b"PK\6\7", 0, at + size, 1) + end
+    end_64 = END_64.pack(b"PK\6\6", END_64.size - 12, *versions, 0, 0, count, count, size, at)
+    return end_64 + LOCATOR.pack(b"PK\6\7", 0, at + size, 1) + end
 
 
 Members = Iterable[tuple[str, bytes]]

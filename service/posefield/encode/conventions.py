@@ -34,7 +34,7 @@ F = TypeVar("F", bound=Format)
 
 def by_extension(*formats: F) -> dict[str, F]:
     """Return formats by their extensions, in the given order."""
-    return {each.extension: each for each in formats}
+    return {kind.extension: kind for kind in formats}
 
 
 METRES_PER_UNIT: dict[LengthUnit, float] = {"m": 1.0, "cm": 0.01}

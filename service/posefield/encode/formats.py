@@ -37,10 +37,10 @@ from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, Sigm
 
 def bvh(answer: SampledClip, convention: Convention) -> bytes:
     """Return a BVH file; the format cannot store provenance, unit or up axis."""
-    own = answer.clip
-    if own.root_bone:
-        own = root_bone.add_root(own, root_bone.with_root(own.skeleton))
-    clip = conventions.convert_clip(Convention(1.0, convention.up), own)
+    converted = answer.clip
+    if converted.root_bone:
+        converted = root_bone.add_root(converted, root_bone.with_root(converted.skeleton))
+    clip = conventions.convert_clip(Convention(1.0, convention.up), converted)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
 
 
@@ -86,14 +86,14 @@ class ClipEncoder(Format):
                 "usda, usdc, usdz and glb do",
             )
         length = self.usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
-        found = Convention(length, up or self.usual.up, body or self.usual.body)
+        convention = Convention(length, up or self.usual.up, body or self.usual.body)
         law = f"the law of {self.extension}"
         if self.convention_fixed and length != self.usual.metres_per_unit:
             expected = f"expected {self.usual.metres_per_unit:g} m"
             raise InvalidField("unit", f"{length:g} m, {expected}: {law}")
-        if self.convention_fixed and found.up != self.usual.up:
-            raise InvalidField("up", f"{found.up!r}, expected {self.usual.up!r}: {law}")
-        return found
+        if self.convention_fixed and convention.up != self.usual.up:
+            raise InvalidField("up", f"{convention.up!r}, expected {self.usual.up!r}: {law}")
+        return convention
 
     def noted(self, answer: ClipAnswer) -> ClipAnswer:
         """Return a result with warnings of its curves and root bone if the format has none."""
@@ -116,10 +116,10 @@ CURVES_PER_JOINT = 4
 
 def left_out(curves: Sequence[str], extension: str) -> str:
     """Return the sentence on curves that files of a format do not have."""
-    others = [name for name, encoder in CLIP_ENCODERS.items() if encoder.has_curves]
+    with_curves = [name for name, encoder in CLIP_ENCODERS.items() if encoder.has_curves]
     return (
         f"{extension} files carry no curves: {len(curves)} are left out ({', '.join(curves)}); "
-        f"{', '.join(others)} have them"
+        f"{', '.join(with_curves)} have them"
     )
 
 
@@ -134,8 +134,8 @@ def max_poses(
 
     The root position counts as a joint.
     """
-    parts = joints + 1 + math.ceil(curves / CURVES_PER_JOINT)
-    return min(size // encoder.bytes_per_joint, ANSWER_MEMORY // encoder.working) // parts
+    joint_count = joints + 1 + math.ceil(curves / CURVES_PER_JOINT)
+    return min(size // encoder.bytes_per_joint, ANSWER_MEMORY // encoder.working) // joint_count
 
 
 def sequential_writer(
@@ -211,8 +211,8 @@ def encoder_for(path: Path) -> ClipEncoder:
     """Return the encoder for a path's suffix; UnknownFormat if there is none."""
     extension = path.suffix.removeprefix(".")
     if extension not in CLIP_ENCODERS:
-        known, hint = ", ".join(CLIP_ENCODERS), did_you_mean(extension, CLIP_ENCODERS)
-        raise UnknownFormat("output", f"{path.name!r} ends in none of {known}{hint}")
+        extensions, hint = ", ".join(CLIP_ENCODERS), did_you_mean(extension, CLIP_ENCODERS)
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {extensions}{hint}")
     return CLIP_ENCODERS[extension]
 
 

@@ -47,7 +47,7 @@ class GlbBuffer:
     accessors: list[dict[str, Any]] = field(default_factory=list)
     parts: list[bytes] = field(default_factory=list)
 
-    def view(self, content: bytes, **said: Any) -> int:
+    def view(self, content: bytes, **properties: Any) -> int:
         """Return the index of a new view of bytes, padded to a multiple of four.
 
         said: further properties of the view.
@@ -55,39 +55,44 @@ class GlbBuffer:
         last = self.views[-1] if self.views else {"byteOffset": 0, "byteLength": 0}
         start = last["byteOffset"] + _padded_length(last["byteLength"])
         length = len(content)
-        self.views.append({"buffer": 0, "byteOffset": start, "byteLength": length, **said})
+        self.views.append({"buffer": 0, "byteOffset": start, "byteLength": length, **properties})
         self.parts.append(content.ljust(_padded_length(length), b"\0"))
         return len(self.views) - 1
 
-    def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **said: Any) -> int:
+    def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **properties: Any) -> int:
         """Return the index of a new accessor with one element per row of the array.
 
         kind: glTF type such as "VEC3". said: further properties of the accessor.
         """
         component = COMPONENTS[array.dtype.str[1:]]
-        found = {"bufferView": view, "componentType": component, "count": len(array), "type": kind}
-        self.accessors.append(found | said)
+        accessor = {
+            "bufferView": view,
+            "componentType": component,
+            "count": len(array),
+            "type": kind,
+        }
+        self.accessors.append(accessor | properties)
         return len(self.accessors) - 1
 
     def zeros(self, count: int) -> int:
         """Return the index of an accessor of vectors (count, 3) that are zero, without numbers."""
-        ends = {"min": [0.0, 0.0, 0.0], "max": [0.0, 0.0, 0.0]}
+        bounds = {"min": [0.0, 0.0, 0.0], "max": [0.0, 0.0, 0.0]}
         component = COMPONENTS["f4"]
-        self.accessors.append({"componentType": component, "count": count, "type": "VEC3"} | ends)
+        self.accessors.append({"componentType": component, "count": count, "type": "VEC3"} | bounds)
         return len(self.accessors) - 1
 
-    def add(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
+    def add(self, array: npt.NDArray[Any], kind: str, **properties: Any) -> int:
         """Return the index of an accessor of a whole array; said: properties of its view."""
-        return self.accessor(array, kind, self.view(array.tobytes(), **said))
+        return self.accessor(array, kind, self.view(array.tobytes(), **properties))
 
-    def add_bounded(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
+    def add_bounded(self, array: npt.NDArray[Any], kind: str, **properties: Any) -> int:
         """Return the index of an accessor of a whole array, with minimum and maximum.
 
         glTF requires them for positions and times. said: properties of its view.
         """
         flat = array.reshape(len(array), -1)
-        ends = {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}
-        return self.accessor(array, kind, self.view(array.tobytes(), **said), **ends)
+        bounds = {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}
+        return self.accessor(array, kind, self.view(array.tobytes(), **properties), **bounds)
 
 
 def smallest_index_type(count: int) -> type[np.unsignedinteger[Any]]:
@@ -104,12 +109,12 @@ def asset(facts: dict[str, Any]) -> dict[str, Any]:
 def container(document: dict[str, Any], store: GlbBuffer) -> bytes:
     """Return the file of a document and its buffer."""
     binary = b"".join(store.parts)
-    held = {
+    content = {
         "bufferViews": store.views,
         "accessors": store.accessors,
         "buffers": [{"byteLength": len(binary)}],
     }
-    text = orjson.dumps(document | held)
+    text = orjson.dumps(document | content)
     text = text.ljust(_padded_length(len(text)))
     total = 12 + 8 + len(text) + 8 + len(binary)
     return b"".join(
@@ -137,13 +142,13 @@ def character_parts(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
     """
     offsets = resting.offsets[0]
     nodes = _joints(resting.rig.skeleton, offsets)
-    drawn = [0]
+    scene_nodes = [0]
     if resting.rig.body is not None:
-        drawn.append(len(nodes))
+        scene_nodes.append(len(nodes))
         nodes.append({"name": "Body", "mesh": 0, "skin": 0})
     return {
         "scene": 0,
-        "scenes": [{"nodes": drawn}],
+        "scenes": [{"nodes": scene_nodes}],
         "nodes": nodes,
         **_body(store, resting),
     }
@@ -175,8 +180,8 @@ def _body(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
 
 def _material(plain: bool) -> dict[str, Any]:
     """Return the material; plain: whether it has a colour of its own, instead of the points'."""
-    own = {"baseColorFactor": [*skinned_mesh.SKIN, 1.0]} if plain else {}
-    surface = {**own, "metallicFactor": 0.0, "roughnessFactor": skinned_mesh.ROUGHNESS}
+    properties = {"baseColorFactor": [*skinned_mesh.SKIN, 1.0]} if plain else {}
+    surface = {**properties, "metallicFactor": 0.0, "roughnessFactor": skinned_mesh.ROUGHNESS}
     return {"name": "Body", "pbrMetallicRoughness": surface}
 
 
@@ -218,10 +223,10 @@ def _mesh_arrays(rig: CharacterRig) -> MeshArrays:
     missing = ((0, 0), (0, 4 - mesh.joints.shape[1]))
     joints = np.pad(mesh.joints, missing).astype(smallest_index_type(len(rig.skeleton)))
     cut = skinned_mesh.triangles(mesh.counts, mesh.corners).reshape(-1)
-    colors, shown = None, skinned_mesh.colours(mesh)
-    if len(shown) > 1:
+    colors, tints = None, skinned_mesh.colours(mesh)
+    if len(tints) > 1:
         colors = np.full((len(mesh.tints), 4), 255, np.uint8)
-        colors[:, :3] = np.round(255 * shown[mesh.tints])
+        colors[:, :3] = np.round(255 * tints[mesh.tints])
     return MeshArrays(
         joints,
         np.pad(mesh.weights, missing),
@@ -243,20 +248,20 @@ def _skin(store: GlbBuffer, rest: Floats) -> dict[str, Any]:
     return {"inverseBindMatrices": bound, "joints": list(range(len(rest))), "skeleton": 0}
 
 
-def with_curves(parts: dict[str, Any], store: GlbBuffer, curves: CurveValues) -> dict[str, Any]:
+def with_curves(document: dict[str, Any], store: GlbBuffer, curves: CurveValues) -> dict[str, Any]:
     """Return the parts of a character with a morph target for each curve.
 
     The node of the mesh with the targets follows those of the joints.
     """
-    if "meshes" in parts:
-        return {**parts, "meshes": [_with_targets(store, parts["meshes"][0], curves)]}
+    if "meshes" in document:
+        return {**document, "meshes": [_with_targets(store, document["meshes"][0], curves)]}
     # A mesh for the curves of a file without a body: one triangle without area.
     points = store.add_bounded(np.zeros((3, 3), np.float32), "VEC3", target=VERTICES)
     mesh = {"name": "Curves", "primitives": [{"attributes": {"POSITION": points}}]}
     carrier = _with_targets(store, mesh, curves)
-    nodes = [*parts["nodes"], {"name": carrier["name"], "mesh": 0}]
+    nodes = [*document["nodes"], {"name": carrier["name"], "mesh": 0}]
     scene = {"nodes": [0, len(nodes) - 1]}
-    return {**parts, "scenes": [scene], "nodes": nodes, "meshes": [carrier]}
+    return {**document, "scenes": [scene], "nodes": nodes, "meshes": [carrier]}
 
 
 def _with_targets(store: GlbBuffer, mesh: dict[str, Any], curves: CurveValues) -> dict[str, Any]:
@@ -282,15 +287,15 @@ MOST_NAME = 80
 """Most characters of an animation's name before its checksum."""
 
 
-def glb(answer: SampledClip, said: Convention) -> bytes:
+def glb(answer: SampledClip, convention: Convention) -> bytes:
     """Return the glTF file of one clip, with the provenance in `asset.extras.posefield`."""
     store = GlbBuffer()
-    rig, clip = character.rig_and_clip(answer.clip, said.body)
+    rig, clip = character.rig_and_clip(answer.clip, convention.body)
     resting = character.rest_pose(rig, clip.translations[:1])
-    parts = character_parts(store, resting)
+    document = character_parts(store, resting)
     if clip.curves is not None:
-        parts = with_curves(parts, store, clip.curves)
-    return container(parts | animation(store, answer, clip, resting.offsets[0]), store)
+        document = with_curves(document, store, clip.curves)
+    return container(document | animation(store, answer, clip, resting.offsets[0]), store)
 
 
 def animation(store: GlbBuffer, answer: SampledClip, clip: Clip, rest: Floats) -> dict[str, Any]:
@@ -301,19 +306,19 @@ def animation(store: GlbBuffer, answer: SampledClip, clip: Clip, rest: Floats) -
     when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
     # Readers interpolate between neighbours, which must lie in one hemisphere.
     turns = _as_float32(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
-    apart = np.abs(clip.translations - rest).max(axis=(0, 2))
-    moved = [0, *(np.flatnonzero(apart[1:] > CONSTANT_TOLERANCE) + 1).tolist()]
-    paths = _as_float32(np.moveaxis(clip.translations[:, moved], 1, 0))
+    travel = np.abs(clip.translations - rest).max(axis=(0, 2))
+    moving = [0, *(np.flatnonzero(travel[1:] > CONSTANT_TOLERANCE) + 1).tolist()]
+    paths = _as_float32(np.moveaxis(clip.translations[:, moving], 1, 0))
     outputs = [
         *((joint, "rotation", o) for joint, o in enumerate(_tracks(store, turns, "VEC4"))),
-        *zip(moved, ["translation"] * len(moved), _tracks(store, paths, "VEC3"), strict=True),
+        *zip(moving, ["translation"] * len(moving), _tracks(store, paths, "VEC3"), strict=True),
     ]
     if clip.curves is not None:
         # The node of the mesh follows those of the joints.
         weights = store.add(_as_float32(clip.curves.values).reshape(-1), "SCALAR")
         outputs.append((len(clip.skeleton), "weights", weights))
     facts = answer.trust.facts()
-    made = {
+    document = {
         "name": _animation_name(facts, store),
         "samplers": [{"input": when, "output": output} for _, _, output in outputs],
         "channels": [
@@ -321,7 +326,7 @@ def animation(store: GlbBuffer, answer: SampledClip, clip: Clip, rest: Floats) -
             for index, (joint, path, _) in enumerate(outputs)
         ],
     }
-    return {"asset": asset(facts), "animations": [made]}
+    return {"asset": asset(facts), "animations": [document]}
 
 
 def _animation_name(facts: Mapping[str, Any], store: GlbBuffer) -> str:
@@ -337,7 +342,8 @@ def _tracks(store: GlbBuffer, tracks: Singles, kind: str) -> list[int]:
     """Return one accessor for the frames of each joint, (J, F, ...), all in one view."""
     view, size = store.view(tracks.tobytes()), tracks[0].nbytes
     return [
-        store.accessor(own, kind, view, byteOffset=joint * size) for joint, own in enumerate(tracks)
+        store.accessor(track, kind, view, byteOffset=joint * size)
+        for joint, track in enumerate(tracks)
     ]
 
 
@@ -355,14 +361,14 @@ def _character_glb(rig: CharacterRig, identity: str) -> bytes:
     mesh, store = rig.body, GlbBuffer()
     assert mesh is not None
     resting = character.rest_pose(rig, rig.skeleton.offsets[None])
-    parts = character_parts(store, resting)
-    (body,) = parts["meshes"]
+    document = character_parts(store, resting)
+    (body,) = document["meshes"]
     (primitive,) = body["primitives"]
     primitive["attributes"] |= _anchors(store, rig.skeleton, mesh)
     corners = mesh.coarse.reshape(-1).astype(smallest_index_type(len(mesh.points)))
     coarse = primitive | {"indices": store.add(corners, "SCALAR", target=CORNERS)}
-    parts["meshes"].append({"name": "BodyCoarse", "primitives": [coarse]})
-    return container({"asset": asset({"model": identity}), **parts}, store)
+    document["meshes"].append({"name": "BodyCoarse", "primitives": [coarse]})
+    return container({"asset": asset({"model": identity}), **document}, store)
 
 
 def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[str, int]:

@@ -80,25 +80,27 @@ def mannequin(skeleton: Skeleton) -> SkinnedMesh | None:
     if not {"hips", "head", *(side + n for side in SIDES for n in NEEDED)} <= set(roles):
         return None
     index = {name: joint for joint, name in enumerate(skeleton.names)}
-    places = skeleton.at_rest(skeleton.offsets)
-    places = np.concatenate([places, places[list(skeleton.tip_joints)] + skeleton.tip_offsets])
+    positions = skeleton.at_rest(skeleton.offsets)
+    positions = np.concatenate(
+        [positions, positions[list(skeleton.tip_joints)] + skeleton.tip_offsets]
+    )
     joints = {role: index[name] for role, name in roles.items()}
     if not all(joints["hips"] in _path(skeleton.parents, joint) for joint in joints.values()):
         return None
-    hips = places[[joints["leftUpperLeg"], joints["rightUpperLeg"]]]
+    hips = positions[[joints["leftUpperLeg"], joints["rightUpperLeg"]]]
     side = (hips[0] - hips[1]) * (1.0, 0.0, 1.0)
     if not side.any():
         return None
     side /= np.linalg.norm(side)
     axes = np.stack([side, [0.0, 1.0, 0.0], np.cross(side, [0.0, 1.0, 0.0])])
     middle = hips.mean(axis=0)
-    fit = _fit(skeleton, joints, (places - middle) @ axes.T)
+    fit = _fit(skeleton, joints, (positions - middle) @ axes.T)
     if not _upright(fit.ends):
         return None
     stored = stored_mesh()
     fitted = _fitted_points(stored, fit)
     points = fitted @ axes + middle
-    marks = np.array([(places[joint] - middle) @ axes[1] for joint in fit.spine])
+    marks = np.array([(positions[joint] - middle) @ axes[1] for joint in fit.spine])
     chosen, weights = _weights(stored, fit, len(skeleton), fitted[:, 1], marks)
     counts, corners = stored["counts"].astype(np.int32), stored["corners"].astype(np.int32)
     return SkinnedMesh(
@@ -114,7 +116,7 @@ def mannequin(skeleton: Skeleton) -> SkinnedMesh | None:
     )
 
 
-def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
+def _fit(skeleton: Skeleton, roles: Mapping[str, int], positions: Floats) -> _Fit:
     """Return the parts of a rig with joints and tips at places (J + E, 3)."""
     above = (*skeleton.parents, *skeleton.tip_joints)
 
@@ -123,11 +125,13 @@ def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
         below = [[joint]]
         for path in below:
             below += [[*path, point] for point, parent in enumerate(above) if parent == path[-1]]
-        return max(below, key=lambda path: float(np.linalg.norm(places[path[-1]] - places[joint])))
+        return max(
+            below, key=lambda path: float(np.linalg.norm(positions[path[-1]] - positions[joint]))
+        )
 
     spine = _path(above, roles["head"])[::-1]
     spine = spine[spine.index(roles["hips"]) :]
-    parts = {"trunk": (roles["hips"], roles["hips"], furthest(roles["head"])[-1])}
+    joints_of_parts = {"trunk": (roles["hips"], roles["hips"], furthest(roles["head"])[-1])}
     for side in SIDES:
         upper, lower, hand = (roles[side + name] for name in NEEDED[:3])
         thigh, shin, foot = (roles[side + name] for name in NEEDED[3:])
@@ -136,9 +140,9 @@ def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
         bent = [
             joint
             for joint in fingers[1:]
-            if joint < len(skeleton) and any(abs(places[joint] - places[hand]) > 1e-3)
+            if joint < len(skeleton) and any(abs(positions[joint] - positions[hand]) > 1e-3)
         ]
-        parts |= {
+        joints_of_parts |= {
             f"{side}Shoulder": (above[upper], above[upper], upper),
             f"{side}UpperArm": (upper, upper, lower),
             f"{side}LowerArm": (lower, lower, hand),
@@ -149,13 +153,13 @@ def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
             f"{side}Foot": (foot, foot, toes),
             f"{side}Toes": (roles.get(f"{side}Toes", foot), toes, tip),
         }
-    found = np.array([parts[part] for part in PARTS])
-    ends = places[found[:, 1:]]
-    holder = max(at for at, joint in enumerate(spine) if joint in _path(above, found[2, 0]))
-    scale = _leg_length(ends) / _leg_length(stored_mesh()["ends"])
-    crown = float(ends[0, 1, 1])
-    ends[0, 1] = places[roles["head"]]
-    return _Fit(found[:, 0], found[:, 1:], ends, scale, spine, holder, crown)
+    rows = np.array([joints_of_parts[part] for part in PARTS])
+    bone_ends = positions[rows[:, 1:]]
+    holder = max(at for at, joint in enumerate(spine) if joint in _path(above, rows[2, 0]))
+    scale = _leg_length(bone_ends) / _leg_length(stored_mesh()["ends"])
+    crown = float(bone_ends[0, 1, 1])
+    bone_ends[0, 1] = positions[roles["head"]]
+    return _Fit(rows[:, 0], rows[:, 1:], bone_ends, scale, spine, holder, crown)
 
 
 def _path(above: Sequence[int], point: int) -> list[int]:
@@ -166,33 +170,33 @@ def _path(above: Sequence[int], point: int) -> list[int]:
     return path
 
 
-def _limb(ends: Floats, side: str, *parts: str) -> Floats:
+def _limb(bone_ends: Floats, side: str, *segments: str) -> Floats:
     """Return the ends (K, 2, 3) of some parts of a side."""
-    found: Floats = ends[[PARTS.index(side + part) for part in parts]]
-    return found
+    limb: Floats = bone_ends[[PARTS.index(side + part) for part in segments]]
+    return limb
 
 
-def _leg_length(ends: Floats) -> float:
-    legs = np.stack([_limb(ends, side, "UpperLeg", "LowerLeg") for side in SIDES])
+def _leg_length(bone_ends: Floats) -> float:
+    legs = np.stack([_limb(bone_ends, side, "UpperLeg", "LowerLeg") for side in SIDES])
     return float(np.linalg.norm(legs[:, :, 1] - legs[:, :, 0], axis=-1).sum() / 2.0)
 
 
-def _landmarks(ends: Floats) -> tuple[Floats, Floats]:
+def _landmarks(bone_ends: Floats) -> tuple[Floats, Floats]:
     """Return the middles (2, 3) of hips and shoulders, and half their widths (2,), m."""
-    pairs = np.stack([_limb(ends, side, "UpperLeg", "UpperArm")[:, 0] for side in SIDES])
+    pairs = np.stack([_limb(bone_ends, side, "UpperLeg", "UpperArm")[:, 0] for side in SIDES])
     return pairs.mean(axis=0), 0.5 * (pairs[0] - pairs[1])[:, 0]
 
 
-def _upright(ends: Floats) -> bool:
+def _upright(bone_ends: Floats) -> bool:
     """Return whether a rig stands as people do: head above arms above hips above ankles."""
-    long = _leg_length(ends)
-    (_, shoulders), widths = _landmarks(ends)
-    ankles = np.mean([_limb(ends, side, "Foot")[0, 0] for side in SIDES], axis=0)
-    arms = [np.ptp(_limb(ends, side, "UpperArm", "LowerArm"), axis=1) for side in SIDES]
+    long = _leg_length(bone_ends)
+    (_, shoulders), widths = _landmarks(bone_ends)
+    ankles = np.mean([_limb(bone_ends, side, "Foot")[0, 0] for side in SIDES], axis=0)
+    arms = [np.ptp(_limb(bone_ends, side, "UpperArm", "LowerArm"), axis=1) for side in SIDES]
     return bool(
         -ankles[1] > 0.7 * long
         and shoulders[1] > 0.3 * long
-        and ends[0, 1, 1] - shoulders[1] > -0.1 * long
+        and bone_ends[0, 1, 1] - shoulders[1] > -0.1 * long
         and widths.min() > 0.02 * long
         and min(float(np.linalg.norm(arm, axis=-1).sum()) for arm in arms) > 0.3 * long
     )
@@ -200,30 +204,32 @@ def _upright(ends: Floats) -> bool:
 
 def _fitted_points(stored: Mapping[str, Any], fit: _Fit) -> Floats:
     """Return the points (P, 3) as the parts carry them, m, in the axes of the parts' ends."""
-    points, ends = stored["points"].astype(float), stored["ends"].astype(float)
+    points, stored_ends = stored["points"].astype(float), stored["ends"].astype(float)
     carried = np.empty((len(PARTS), *points.shape))
     for part, name in enumerate(PARTS):
         if name == "trunk" or name.endswith("Shoulder"):
-            carried[part] = _on_trunk(points, ends, fit)
+            carried[part] = _on_trunk(points, stored_ends, fit)
         elif name.endswith(("Foot", "Toes")):
             foot = PARTS.index(f"{name[:-4]}Foot")
-            carried[part] = _on_foot(points, ends[foot : foot + 2], fit.ends[foot : foot + 2], fit)
+            carried[part] = _on_foot(
+                points, stored_ends[foot : foot + 2], fit.ends[foot : foot + 2], fit
+            )
         else:
             is_hand = name.endswith(("Hand", "Fingers"))
-            carried[part] = _on_bone(points, ends[part], fit.ends[part], fit.scale, is_hand)
+            carried[part] = _on_bone(points, stored_ends[part], fit.ends[part], fit.scale, is_hand)
     rows = np.arange(len(points))
     shares = stored["weights"].astype(float)[..., None] / FULL_WEIGHT
-    found: Floats = np.sum(shares * carried[stored["parts"], rows[:, None]], axis=1)
+    points_of_rows: Floats = np.sum(shares * carried[stored["parts"], rows[:, None]], axis=1)
     # The shin has no part in the feet, so that their soles are flat.
     feet = [part for part, name in enumerate(PARTS) if name.endswith(("Foot", "Toes"))]
     standing = np.isin(stored["bone"], feet)
-    found[standing] = carried[stored["bone"], rows][standing]
-    return found
+    points_of_rows[standing] = carried[stored["bone"], rows][standing]
+    return points_of_rows
 
 
-def _on_bone(points: Floats, stored: Floats, ends: Floats, scale: float, is_hand: bool) -> Floats:
+def _on_bone(points: Floats, stored: Floats, bone: Floats, scale: float, is_hand: bool) -> Floats:
     """Return points turned and stretched with a bone, and scaled across it."""
-    old, new = stored[1] - stored[0], ends[1] - ends[0]
+    old, new = stored[1] - stored[0], bone[1] - bone[0]
     length, long = float(np.linalg.norm(old)), float(np.linalg.norm(new))
     old /= length
     new = new / long if long > 0.0 else old
@@ -236,8 +242,8 @@ def _on_bone(points: Floats, stored: Floats, ends: Floats, scale: float, is_hand
     turn = np.cross(old, new)
     once = np.cross(turn, across)
     turned = across + once + np.cross(turn, once) / max(1.0 + float(old @ new), 1e-9)
-    found: Floats = ends[0] + (long / length) * along[:, None] * new + turned
-    return found
+    fitted: Floats = bone[0] + (long / length) * along[:, None] * new + turned
+    return fitted
 
 
 def _on_trunk(points: Floats, stored: Floats, fit: _Fit) -> Floats:
@@ -254,28 +260,28 @@ def _on_trunk(points: Floats, stored: Floats, fit: _Fit) -> Floats:
     waist = 0.5 * (before[0, 1] + before[1, 1])
     rates = new_widths / old_widths
     wide = np.interp(y, [low, waist, before[1, 1], high], [rates[0], scale, rates[1], scale])
-    found: Floats = np.stack(
+    fitted: Floats = np.stack(
         [off[1] + wide * (x - off[0]), height, off[3] + scale * (z - off[2])], axis=-1
     )
-    return found
+    return fitted
 
 
-def _on_foot(points: Floats, stored: Floats, ends: Floats, fit: _Fit) -> Floats:
+def _on_foot(points: Floats, stored: Floats, bone_ends: Floats, fit: _Fit) -> Floats:
     """Return points of a foot that stands flat; stored, ends (2, 2, 3): of foot and toes, m."""
     scale = fit.scale
-    (ankle, ball), (_, tip) = ends
+    (ankle, ball), (_, tip) = bone_ends
     old_ankle, old_ball = stored[0]
-    known = [ball[1] - scale * SOLE, tip[1] - scale * TIP] if np.any(ball != ankle) else []
-    sole = min(known, default=ankle[1] - scale * ANKLE)
+    toe_heights = [ball[1] - scale * SOLE, tip[1] - scale * TIP] if np.any(ball != ankle) else []
+    sole = min(toe_heights, default=ankle[1] - scale * ANKLE)
     old_sole = min(old_ball[1] - SOLE, stored[1, 1, 1] - TIP)
     x, y, z = points.T
-    ahead, old_ahead = ball[2] - ankle[2], old_ball[2] - old_ankle[2]
+    length, old_ahead = ball[2] - ankle[2], old_ball[2] - old_ankle[2]
     far = np.clip((z - old_ankle[2]) / old_ahead, 0.0, 1.0)
-    forth = ahead / old_ahead if ahead > 0.3 * scale * old_ahead else scale
-    beside = far * (ball[0] - ankle[0] if known else scale * (old_ball[0] - old_ankle[0]))
-    found: Floats = np.stack(
+    forth = length / old_ahead if length > 0.3 * scale * old_ahead else scale
+    sideways = far * (ball[0] - ankle[0] if toe_heights else scale * (old_ball[0] - old_ankle[0]))
+    fitted: Floats = np.stack(
         [
-            ankle[0] + beside + scale * (x - old_ankle[0] - far * (old_ball[0] - old_ankle[0])),
+            ankle[0] + sideways + scale * (x - old_ankle[0] - far * (old_ball[0] - old_ankle[0])),
             sole + (y - old_sole) * (ankle[1] - sole) / (old_ankle[1] - old_sole),
             ankle[2]
             + np.where(far < 1.0, forth, scale) * (z - old_ankle[2])
@@ -283,7 +289,7 @@ def _on_foot(points: Floats, stored: Floats, ends: Floats, fit: _Fit) -> Floats:
         ],
         axis=-1,
     )
-    return found
+    return fitted
 
 
 def _spine_marks(fit: _Fit, marks: Floats) -> Floats:
@@ -306,10 +312,10 @@ def _weights(
     moves by height. The weights of a point sum to FULL_WEIGHT.
     """
     rows = np.arange(len(heights))
-    parts = np.zeros((len(heights), len(PARTS)))
-    np.add.at(parts, (rows[:, None], stored["parts"]), stored["weights"] / FULL_WEIGHT)
-    found = np.zeros((len(heights), joints))
-    np.add.at(found, (rows[:, None], fit.joints[None, 1:]), parts[:, 1:])
+    part_weights = np.zeros((len(heights), len(PARTS)))
+    np.add.at(part_weights, (rows[:, None], stored["parts"]), stored["weights"] / FULL_WEIGHT)
+    joint_weights = np.zeros((len(heights), joints))
+    np.add.at(joint_weights, (rows[:, None], fit.joints[None, 1:]), part_weights[:, 1:])
     marks = _spine_marks(fit, marks)
     gaps = np.diff([*marks, marks[-1] + HEAD * fit.scale])
     gaps[0] += BELOW * fit.scale
@@ -317,14 +323,18 @@ def _weights(
     shares = 0.5 + 0.5 * (heights[:, None] - marks[1:]) / half
     passed = np.minimum.accumulate(quat.smoothstep(np.clip(shares, 0.0, 1.0)), axis=1)
     passed = np.pad(passed, ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
-    np.add.at(found, (rows[:, None], np.array(fit.spine)), parts[:, :1] * -np.diff(passed, axis=1))
-    chosen = np.argsort(-found, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
-    heavy = np.take_along_axis(found, chosen, axis=1)
+    np.add.at(
+        joint_weights,
+        (rows[:, None], np.array(fit.spine)),
+        part_weights[:, :1] * -np.diff(passed, axis=1),
+    )
+    chosen = np.argsort(-joint_weights, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
+    heavy = np.take_along_axis(joint_weights, chosen, axis=1)
     heavy /= heavy.sum(axis=1, keepdims=True)
-    whole = np.floor(FULL_WEIGHT * heavy + 1e-9).astype(np.int64)
-    whole[:, 0] += FULL_WEIGHT - whole.sum(axis=1)
-    chosen[whole == 0] = 0
-    return chosen, whole.astype(np.uint8)
+    rounded = np.floor(FULL_WEIGHT * heavy + 1e-9).astype(np.int64)
+    rounded[:, 0] += FULL_WEIGHT - rounded.sum(axis=1)
+    chosen[rounded == 0] = 0
+    return chosen, rounded.astype(np.uint8)
 
 
 def _places(stored: Mapping[str, Any], fit: _Fit, marks: Floats) -> tuple[Integers, Floats]:
@@ -335,9 +345,9 @@ def _places(stored: Mapping[str, Any], fit: _Fit, marks: Floats) -> tuple[Intege
     level[:, 1] = shares[trunk]
     heights = _on_trunk(level, stored["ends"].astype(float), fit)[:, 1]
     path = np.array([*fit.spine, fit.anchors[0, 1]])
-    ends = np.append(_spine_marks(fit, marks), fit.crown)
-    first = np.clip(np.searchsorted(ends, heights, "right") - 1, 0, len(path) - 2)
+    spine_and_crown = np.append(_spine_marks(fit, marks), fit.crown)
+    first = np.clip(np.searchsorted(spine_and_crown, heights, "right") - 1, 0, len(path) - 2)
     anchors[trunk] = np.stack([path[first], path[first + 1]], axis=-1)
-    long = np.maximum(ends[first + 1] - ends[first], 1e-6)
-    shares[trunk] = np.clip((heights - ends[first]) / long, 0.0, 1.0)
+    long = np.maximum(spine_and_crown[first + 1] - spine_and_crown[first], 1e-6)
+    shares[trunk] = np.clip((heights - spine_and_crown[first]) / long, 0.0, 1.0)
     return anchors.astype(np.int32), shares

@@ -34,9 +34,9 @@ class BonePlaces:
     anchors: Integers
     shares: Floats
 
-    def displacements(self, moved: Floats) -> Floats:
+    def displacements(self, displaced: Floats) -> Floats:
         """Return how far (M, R, 3) the places move, m, with anchors moved by (M, J + E, 3)."""
-        first, second = (moved.take(self.anchors[:, end], axis=1) for end in (0, 1))
+        first, second = (displaced.take(self.anchors[:, end], axis=1) for end in (0, 1))
         second -= first
         second *= self.shares[:, None]
         first += second
@@ -66,31 +66,31 @@ class SkinnedMesh:
     tints: Integers
     coarse: Integers
 
-    def points_at(self, moved: Floats) -> Singles:
+    def points_at(self, displaced: Floats) -> Singles:
         """Return the points (M, P, 3), m, for places that move by (M, R, 3), m."""
-        found = moved.astype(np.float32).take(self.place, axis=1)
-        found += self.points
-        return found
+        points = displaced.astype(np.float32).take(self.place, axis=1)
+        points += self.points
+        return points
 
 
 def below_root(mesh: SkinnedMesh) -> SkinnedMesh:
     """Return the mesh for a skeleton with another joint before all others."""
-    places = replace(mesh.places, anchors=mesh.places.anchors + 1)
-    return replace(mesh, places=places, joints=mesh.joints + 1)
+    bone_places = replace(mesh.places, anchors=mesh.places.anchors + 1)
+    return replace(mesh, places=bone_places, joints=mesh.joints + 1)
 
 
 def colours(mesh: SkinnedMesh) -> Singles:
     """Return the colours (C, 3) that the tints of a mesh stand for: one for all, or three."""
-    found = TINTS if mesh.tints.any() else np.array([SKIN])
-    return found.astype(np.float32)
+    tints = TINTS if mesh.tints.any() else np.array([SKIN])
+    return tints.astype(np.float32)
 
 
 def distinct_places(anchors: Integers, shares: Floats) -> tuple[BonePlaces, Integers]:
     """Return the distinct places of points, and the index (P,) of each point's."""
     rows = np.concatenate([anchors, shares[:, None]], axis=1)
-    found, index = np.unique(rows, axis=0, return_inverse=True)
-    places = BonePlaces(found[:, :2].astype(np.int32), found[:, 2].copy())
-    return places, index.reshape(-1).astype(np.int32)
+    distinct, index = np.unique(rows, axis=0, return_inverse=True)
+    bone_places = BonePlaces(distinct[:, :2].astype(np.int32), distinct[:, 2].copy())
+    return bone_places, index.reshape(-1).astype(np.int32)
 
 
 def triangles(counts: Integers, corners: Integers) -> Integers:
@@ -150,27 +150,30 @@ def bones_body(skeleton: Skeleton) -> SkinnedMesh:
     size = float(np.max(np.ptp(rest, axis=0))) or 1.0
     count = len(skeleton)
     joints = np.array([*skeleton.parents[1:], *skeleton.tip_joints], np.int32)
-    ends = np.arange(1, len(joints) + 1, dtype=np.int32)
+    bone_numbers = np.arange(1, len(joints) + 1, dtype=np.int32)
     arms = np.concatenate([skeleton.offsets[1:], skeleton.tip_offsets])
-    drawn = _lengths(arms) > SHORTEST * size
-    followed = {*skeleton.parents[1:], *joints[count - 1 :][drawn[count - 1 :]].tolist()}
+    visible = _lengths(arms) > SHORTEST * size
+    followed = {*skeleton.parents[1:], *joints[count - 1 :][visible[count - 1 :]].tolist()}
     stubs = np.array([joint for joint in range(count) if joint not in followed], np.int32)
-    joints, ends = np.append(joints[drawn], stubs), np.append(ends[drawn], stubs)
+    joints, bone_numbers = (
+        np.append(joints[visible], stubs),
+        np.append(bone_numbers[visible], stubs),
+    )
     up = np.tile([0.0, 2 * STUB * size, 0.0], (len(stubs), 1))
-    arms = np.concatenate([arms[drawn], up])
+    arms = np.concatenate([arms[visible], up])
     starts = rest[joints]
     starts[len(starts) - len(stubs) :] -= up / 2
     radii = np.clip(THICKNESS * _lengths(arms), THINNEST * size, THICKEST * size)
     radii[len(radii) - len(stubs) :] = STUB * size
     # Of boxes that coincide the first is drawn.
     rows = np.round(np.concatenate([starts, arms], axis=-1), 5)
-    kept = np.sort(np.unique(rows, axis=0, return_index=True)[1])
-    joints, ends, starts, arms, radii = (
-        joints[kept],
-        ends[kept],
-        starts[kept],
-        arms[kept],
-        radii[kept],
+    first_rows = np.sort(np.unique(rows, axis=0, return_index=True)[1])
+    joints, bone_numbers, starts, arms, radii = (
+        joints[first_rows],
+        bone_numbers[first_rows],
+        starts[first_rows],
+        arms[first_rows],
+        radii[first_rows],
     )
     side = starts[:, 0] + arms[:, 0] / 2 - skeleton.offsets[0, 0]
     tints = np.where(np.abs(side) > radii / 2, np.where(side > 0, 1, 2), 0).astype(np.int32)
@@ -184,8 +187,8 @@ def bones_body(skeleton: Skeleton) -> SkinnedMesh:
         points,
         normals,
         *distinct_places(
-            np.repeat(np.stack([joints, ends], axis=-1), POINTS_PER_BOX, axis=0),
-            np.tile(RING_POSITIONS.reshape(-1).astype(float), len(ends)),
+            np.repeat(np.stack([joints, bone_numbers], axis=-1), POINTS_PER_BOX, axis=0),
+            np.tile(RING_POSITIONS.reshape(-1).astype(float), len(bone_numbers)),
         ),
         movers,
         np.full(movers.shape, FULL_WEIGHT, np.uint8),
@@ -203,10 +206,10 @@ def _points_and_normals(starts: Floats, arms: Floats, radii: Floats) -> tuple[Si
     first = quat.cross(helper, direction)
     first /= _lengths(first)[:, None]
     rows = (starts, arms, direction, first, quat.cross(direction, first))
-    start, arm, ahead, *across = (np.ascontiguousarray(a.T, np.float32) for a in rows)
+    start, arm, forward, *across = (np.ascontiguousarray(a.T, np.float32) for a in rows)
     radial = RING_CORNERS[0] * across[0] + RING_CORNERS[1] * across[1]
     points = start + RING_POSITIONS * arm + RING_WIDTHS * np.float32(radii) * radial
-    radial[0], radial[-1] = -ahead, ahead
+    radial[0], radial[-1] = -forward, forward
     points, normals = (a.transpose(2, 0, 1).reshape(-1, 3) for a in (points, radial))
     return np.ascontiguousarray(points, np.float32), np.ascontiguousarray(normals, np.float32)
 

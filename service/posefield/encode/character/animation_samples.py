@@ -57,25 +57,27 @@ class AnimationSamples:
 def from_clips(clips: Sequence[Clip], root_bone: bool = False) -> AnimationSamples:
     """Return the moves of clips of one skeleton, with the bone offsets of their first frames."""
     starts = _starts([len(clip) for clip in clips])
-    made = _empty(starts, len(clips[0].skeleton))
+    samples = _empty(starts, len(clips[0].skeleton))
     for index, clip in enumerate(clips):
         frames = slice(starts[index], starts[index + 1])
-        _write_real_part_last(clip.rotations, made.rotations[frames])
-        made.path[frames] = clip.translations[:, 0]
-        made.offsets[index] = clip.translations[0]
+        _write_real_part_last(clip.rotations, samples.rotations[frames])
+        samples.path[frames] = clip.translations[:, 0]
+        samples.offsets[index] = clip.translations[0]
     if root_bone:
-        made = replace(made, hips=np.concatenate([c.translations[:, 1] for c in clips], dtype="f4"))
-    return _normalize(made)
+        samples = replace(
+            samples, hips=np.concatenate([c.translations[:, 1] for c in clips], dtype="f4")
+        )
+    return _normalize(samples)
 
 
 def from_motions(batch: Motions) -> AnimationSamples:
     """Return the moves of a crowd's motions."""
     count, frames, joints = batch.rotations.shape[:3]
-    made = _empty(_starts([frames] * count), joints)
-    _write_real_part_last(batch.rotations.reshape(-1, joints, 4), made.rotations)
-    made.path[:] = batch.root_position.reshape(-1, 3)
-    made.offsets[:] = batch.bone_offsets
-    return _normalize(made)
+    samples = _empty(_starts([frames] * count), joints)
+    _write_real_part_last(batch.rotations.reshape(-1, joints, 4), samples.rotations)
+    samples.path[:] = batch.root_position.reshape(-1, 3)
+    samples.offsets[:] = batch.bone_offsets
+    return _normalize(samples)
 
 
 def _starts(frames: Sequence[int]) -> Indices:
@@ -94,28 +96,28 @@ def _write_real_part_last(wxyz: Floats | Singles, xyzw: Singles) -> None:
 
     All numbers move by one in a single copy, then the real parts are set.
     """
-    given, made = np.ascontiguousarray(wxyz).reshape(-1), xyzw.reshape(-1)
-    made[:-1] = given[1:]
-    made[3::4] = given[::4]
+    source, target = np.ascontiguousarray(wxyz).reshape(-1), xyzw.reshape(-1)
+    target[:-1] = source[1:]
+    target[3::4] = source[::4]
 
 
-def _normalize(made: AnimationSamples) -> AnimationSamples:
-    _unroll_quaternions(made)
-    for values in (made.rotations, made.path, made.offsets, made.hips):
+def _normalize(samples: AnimationSamples) -> AnimationSamples:
+    _unroll_quaternions(samples)
+    for values in (samples.rotations, samples.path, samples.offsets, samples.hips):
         if values is not None:
             # USD's deduplication does not distinguish -0 from 0.
             values += np.float32(0.0)
-    return made
+    return samples
 
 
-def _unroll_quaternions(made: AnimationSamples) -> None:
+def _unroll_quaternions(samples: AnimationSamples) -> None:
     """Choose signs so that neighbours lie close: some readers interpolate by component."""
-    products = made.rotations[1:] * made.rotations[:-1]
+    products = samples.rotations[1:] * samples.rotations[:-1]
     dots = products[..., 0] + products[..., 1] + products[..., 2] + products[..., 3]
-    dots[made.starts[1:-1] - 1] = 1.0
+    dots[samples.starts[1:-1] - 1] = 1.0
     if not len(dots) or dots.min() >= 0:
         return
     signs = np.where(dots < 0, np.float32(-1.0), np.float32(1.0))
-    for first, last in zip(made.starts, made.starts[1:], strict=False):
+    for first, last in zip(samples.starts, samples.starts[1:], strict=False):
         turned = np.cumprod(signs[first : last - 1], axis=0, dtype=np.float32)
-        made.rotations[first + 1 : last] *= turned[..., None]
+        samples.rotations[first + 1 : last] *= turned[..., None]

@@ -37,10 +37,10 @@ def legal_names(names: Iterable[str]) -> tuple[str, ...]:
 
 def joint_paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
     """Return the joint tokens of UsdSkel: names of ancestors and joint, separated by slashes."""
-    found: list[str] = []
+    paths: list[str] = []
     for leaf, parent in zip(leaves, parents, strict=True):
-        found.append(leaf if parent < 0 else f"{found[parent]}/{leaf}")
-    return tuple(found)
+        paths.append(leaf if parent < 0 else f"{paths[parent]}/{leaf}")
+    return tuple(paths)
 
 
 def _legal_characters(name: str) -> str:
@@ -85,8 +85,10 @@ def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY, has_root: bool = Fals
 
 def rig_and_clip(clip: Clip, body: BodyKind) -> tuple[CharacterRig, Clip]:
     """Return the rig and the motion of a clip as files have them: with its root bone, if any."""
-    found = rig(clip.skeleton, body, clip.root_bone)
-    return found, root_bone.add_root(clip, found.skeleton) if clip.root_bone else clip
+    character_rig = rig(clip.skeleton, body, clip.root_bone)
+    return character_rig, root_bone.add_root(
+        clip, character_rig.skeleton
+    ) if clip.root_bone else clip
 
 
 def body_size(skeleton: Skeleton, body: BodyKind) -> int:
@@ -100,7 +102,7 @@ def _cached_rig(
     names: tuple[str, ...], parents: tuple[int, ...], owners: tuple[int, ...],
     arms: bytes, tips: bytes, kind: BodyKind, has_root: bool,
 ) -> CharacterRig:  # fmt: skip
-    offsets, tip_offsets = (np.frombuffer(own).reshape(-1, 3) for own in (arms, tips))
+    offsets, tip_offsets = (np.frombuffer(content).reshape(-1, 3) for content in (arms, tips))
     joints = Skeleton(names, parents, offsets, owners, tip_offsets)
     body = _mesh(joints, kind)
     if has_root:
@@ -140,9 +142,9 @@ def rest_pose(rig: CharacterRig, offsets: Floats | Singles) -> RestPose:
     if rig.body is None:
         none = np.zeros((len(rest), len(rig.tree.order)))
         return RestPose(rig, rest, np.empty((len(rest), 0, 3), np.float32), none)
-    moved = rig.bounds.displacements(rest)
-    along = rig.body.places.displacements(moved)
-    return RestPose(rig, rest, rig.body.points_at(along), rig.bounds.radii(moved, along))
+    displacements = rig.bounds.displacements(rest)
+    along = rig.body.places.displacements(displacements)
+    return RestPose(rig, rest, rig.body.points_at(along), rig.bounds.radii(displacements, along))
 
 
 def _lowest(rig: CharacterRig, offsets: Floats) -> Floats:
@@ -156,29 +158,29 @@ def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.ND
     """Return the arrays (M, ...) of the characters, without their extents."""
     bind = _translation_matrices(convention, rest.rig.skeleton.at_rest(rest.offsets))
     local = _translation_matrices(convention, rest.offsets)
-    made: dict[str, npt.NDArray[Any]] = {"bind": bind, "rest": local}
+    arrays: dict[str, npt.NDArray[Any]] = {"bind": bind, "rest": local}
     if rest.rig.body is not None:
         points = conventions.convert_positions(convention, rest.points)
-        made["points"] = points
-    return made
+        arrays["points"] = points
+    return arrays
 
 
 def rest_pose_arrays(rig: CharacterRig, convention: Convention = METRES) -> CharacterArrays:
     """Return the arrays of the character in the skeleton's rest pose."""
     rest = rest_pose(rig, rig.skeleton.offsets[None])
-    made = {name: array[0] for name, array in character_arrays(rest, convention).items()}
-    places = made["bind"][:, 3, :3]
-    if "points" in made:
-        places = np.concatenate([places, made["points"]])
-    box = extent.enlarged_box(places.min(axis=0), places.max(axis=0))
-    return made | {"extent": box.astype(np.float32)}
+    arrays = {name: array[0] for name, array in character_arrays(rest, convention).items()}
+    joint_positions = arrays["bind"][:, 3, :3]
+    if "points" in arrays:
+        joint_positions = np.concatenate([joint_positions, arrays["points"]])
+    box = extent.enlarged_box(joint_positions.min(axis=0), joint_positions.max(axis=0))
+    return arrays | {"extent": box.astype(np.float32)}
 
 
 def _translation_matrices(convention: Convention, metres: Floats) -> Floats:
     """Return translation matrices (..., 4, 4) for row vectors, as in USD."""
-    made = np.zeros((*metres.shape[:-1], 4, 4))
-    made[...] = np.eye(4)
+    matrices = np.zeros((*metres.shape[:-1], 4, 4))
+    matrices[...] = np.eye(4)
     # To a tenth of a micrometre: short as decimals, and still near their float32 values.
     decimals = 7 + math.floor(math.log10(convention.metres_per_unit))
-    made[..., 3, :3] = conventions.convert_positions(convention, metres).round(decimals) + 0.0
-    return made
+    matrices[..., 3, :3] = conventions.convert_positions(convention, metres).round(decimals) + 0.0
+    return matrices

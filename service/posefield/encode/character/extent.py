@@ -83,12 +83,12 @@ def bounding_boxes(tree: PointTree, moves: AnimationSamples, balls: Floats) -> F
 
     balls (M, P): radii about joints and tips, m. The boxes of the motions are independent.
     """
-    found = []
-    for part in moves.parts(FRAMES_AT_ONCE):
-        places = _point_positions(tree, part)
-        ends = (np.minimum, np.maximum)
-        found.append(np.stack([e.reduceat(places, part.starts[:-1], axis=-1) for e in ends]))
-    (low, high), radii = np.concatenate(found, axis=-1), balls.T[tree.order]
+    boxes = []
+    for frames in moves.parts(FRAMES_AT_ONCE):
+        points = _point_positions(tree, frames)
+        extremes = (np.minimum, np.maximum)
+        boxes.append(np.stack([e.reduceat(points, frames.starts[:-1], axis=-1) for e in extremes]))
+    (low, high), radii = np.concatenate(boxes, axis=-1), balls.T[tree.order]
     return enlarged_box((low - radii).min(axis=1).T, (high + radii).max(axis=1).T)
 
 
@@ -97,9 +97,9 @@ def pose_independent_box(skeleton: Skeleton, offsets: Floats, path: Floats) -> F
 
     offsets: of the bones (J, 3), m. path: root positions (F, 3), m.
     """
-    own = np.linalg.norm(np.concatenate([skeleton.offsets, skeleton.tip_offsets]), axis=-1)
-    arms = own.copy()
-    arms[: len(offsets)] = np.maximum(own[: len(offsets)], np.linalg.norm(offsets, axis=-1))
+    lengths = np.linalg.norm(np.concatenate([skeleton.offsets, skeleton.tip_offsets]), axis=-1)
+    arms = lengths.copy()
+    arms[: len(offsets)] = np.maximum(lengths[: len(offsets)], np.linalg.norm(offsets, axis=-1))
     far = [0.0]
     for arm, parent in zip(arms[1:], (*skeleton.parents[1:], *skeleton.tip_joints), strict=True):
         far.append(far[parent] + arm)
@@ -120,19 +120,19 @@ def enlarged_box(low: Floats, high: Floats) -> Floats:
 def _tree_levels(
     above: PointIndices, depths: PointIndices, order: PointIndices, turning: PointIndices
 ) -> Iterator[TreeLevel]:
-    place, turner = np.argsort(order), {joint: at for at, joint in enumerate(turning.tolist())}
+    rank, turner = np.argsort(order), {joint: at for at, joint in enumerate(turning.tolist())}
     for depth in range(1, depths.max() + 1):
         points = slice(*np.searchsorted(depths[order], [depth, depth + 1]))
         turns = slice(*np.searchsorted(depths[turning], [depth, depth + 1]))
         holders = above[order[points]]
         turners = np.array([turner[joint] for joint in holders.tolist()])
-        yield TreeLevel(points, turns, _as_slice(place[holders]), _as_slice(turners))
+        yield TreeLevel(points, turns, _as_slice(rank[holders]), _as_slice(turners))
 
 
-def _as_slice(places: PointIndices) -> PointIndices | slice:
+def _as_slice(indices: PointIndices) -> PointIndices | slice:
     """Return a slice for consecutive places, since it selects a view instead of a copy."""
-    first, count = int(places[0]), len(places)
-    return slice(first, first + count) if np.all(np.diff(places) == 1) else places
+    first, count = int(indices[0]), len(indices)
+    return slice(first, first + count) if np.all(np.diff(indices) == 1) else indices
 
 
 def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
@@ -150,18 +150,18 @@ def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     arms = np.repeat(arms[[0, 1, 2, 0, 1]], np.diff(moves.starts), axis=-1)
     if moves.hips is not None:
         arms[:, np.flatnonzero(tree.order == 1)[0]] = moves.hips.T[[0, 1, 2, 0, 1]]
-    places = np.empty((3, *arms.shape[1:]), np.float32)
-    places[:, 0] = moves.path.T
-    for each in tree.generations:
-        held = _select_rows(turns, each.turning_parents)
-        here = places[:, each.points]
-        _rotate(held, arms[:, each.points], here)
-        here += _select_rows(places, each.parents)
+    positions = np.empty((3, *arms.shape[1:]), np.float32)
+    positions[:, 0] = moves.path.T
+    for level in tree.generations:
+        parent_turns = _select_rows(turns, level.turning_parents)
+        here = positions[:, level.points]
+        _rotate(parent_turns, arms[:, level.points], here)
+        here += _select_rows(positions, level.parents)
         # In place: a joint's local rotation is not read after its orientation is computed.
-        own = turns[:, each.turns]
-        if own.size:
-            _multiply_quaternions(held[:, : own.shape[1]], own)
-    return places
+        level_turns = turns[:, level.turns]
+        if level_turns.size:
+            _multiply_quaternions(parent_turns[:, : level_turns.shape[1]], level_turns)
+    return positions
 
 
 def _select_rows(components: Singles, chosen: PointIndices | slice) -> Singles:
@@ -173,22 +173,22 @@ def _joint_rotations(tree: PointTree, moves: AnimationSamples) -> Singles:
 
     Copied by motion, so that a copy fits the processor's cache.
     """
-    made = np.empty((6, len(tree.turning), len(moves.rotations)), np.float32)
+    rotations = np.empty((6, len(tree.turning), len(moves.rotations)), np.float32)
     for first, last in pairwise(moves.starts):
         turning = moves.rotations[first:last].take(tree.turning, 1).transpose(2, 1, 0)
-        made[:3, :, first:last], made[5, :, first:last] = turning[:3], turning[3]
-    made[3:5] = made[:2]
-    return made
+        rotations[:3, :, first:last], rotations[5, :, first:last] = turning[:3], turning[3]
+    rotations[3:5] = rotations[:2]
+    return rotations
 
 
 def _multiply_quaternions(a: Singles, b: Singles) -> None:
     """Replace each quaternion b, x y z x y w, by the product a b."""
-    vector, part = _cross(a, b), np.empty_like(a[:3])
-    vector += np.multiply(a[5], b[:3], out=part)
-    vector += np.multiply(a[:3], b[5], out=part)
-    np.multiply(a[:3], b[:3], out=part)
+    vector, products = _cross(a, b), np.empty_like(a[:3])
+    vector += np.multiply(a[5], b[:3], out=products)
+    vector += np.multiply(a[:3], b[5], out=products)
+    np.multiply(a[:3], b[:3], out=products)
     b[5] *= a[5]
-    for row in part:
+    for row in products:
         b[5] -= row
     b[:3], b[3:5] = vector, vector[:2]
 
@@ -204,9 +204,9 @@ def _rotate(q: Singles, v: Singles, out: Singles) -> None:
 
 
 def _cross(a: Singles, b: Singles) -> Singles:
-    made = a[1:4] * b[2:5]
-    made -= a[2:5] * b[1:4]
-    return made
+    product = a[1:4] * b[2:5]
+    product -= a[2:5] * b[1:4]
+    return product
 
 
 @dataclass(frozen=True)
@@ -230,17 +230,17 @@ class BodyBounds:
     def displacements(self, offsets: Floats) -> Floats:
         """Return how far bone offsets (M, J, 3) move joints and tips (M, J + E, 3) at rest, m."""
         joints = self.skeleton
-        moved = joints.at_rest(offsets - joints.offsets)
-        return np.concatenate([moved, moved.take(joints.tip_joints, axis=1)], axis=1)
+        displaced = joints.at_rest(offsets - joints.offsets)
+        return np.concatenate([displaced, displaced.take(joints.tip_joints, axis=1)], axis=1)
 
-    def radii(self, moved: Floats, along: Floats) -> Floats:
+    def radii(self, displaced: Floats, along: Floats) -> Floats:
         """Return the radii (M, J + E), m, of bodies made for bones of other lengths.
 
         moved: displacements of joints and tips (M, J + E, 3); along: of the body's places (M, R,
         3), m. A point and the place on the bone next to it move by different displacements, which
         are linear in the share along the bone; so the largest difference is at one of its ends.
         """
-        start, end = moved.take(self.joints, axis=1), moved.take(self.ends, axis=1)
+        start, end = displaced.take(self.joints, axis=1), displaced.take(self.ends, axis=1)
         end -= start
         start -= along.take(self.places, axis=1)
         low, high = (start + share[:, None] * end for share in (self.lowest, self.highest))
@@ -260,11 +260,11 @@ class BodyBounds:
 
         With the points (P,), and the place in that order of each one's first group (P,).
         """
-        found = []
-        for held in (self.joints, self.ends):
-            order = np.argsort(held, kind="stable")
-            found.append((order, *np.unique(held[order], return_index=True)))
-        return found
+        groups = []
+        for indices in (self.joints, self.ends):
+            order = np.argsort(indices, kind="stable")
+            groups.append((order, *np.unique(indices[order], return_index=True)))
+        return groups
 
     def _spheres(self, differences: Floats) -> Floats:
         """Return the radius (M, J + E) about each joint and tip.
@@ -272,14 +272,16 @@ class BodyBounds:
         differences (M, K): by how much the points of each group may be further away than at rest,
         m. A point may belong to several groups, so the largest counts for all.
         """
-        found = np.zeros((len(differences), len(self.skeleton) + len(self.skeleton.tip_joints)))
+        radii_of_points = np.zeros(
+            (len(differences), len(self.skeleton) + len(self.skeleton.tip_joints))
+        )
         if not len(self.joints):
-            return found
+            return radii_of_points
         radii = self.rest + differences.max(axis=1, keepdims=True)
         for order, points, firsts in self._groups_of_points:
-            most = np.maximum.reduceat(radii.take(order, axis=1), firsts, axis=1)
-            found[:, points] = np.maximum(found[:, points], most)
-        return found
+            largest = np.maximum.reduceat(radii.take(order, axis=1), firsts, axis=1)
+            radii_of_points[:, points] = np.maximum(radii_of_points[:, points], largest)
+        return radii_of_points
 
 
 def bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
@@ -290,21 +292,21 @@ def bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
         return BodyBounds(skeleton, none, none, none, share, share, share)
     points, influences = np.nonzero(body.weights)
     joints = body.joints[points, influences].astype(np.intp)
-    ends, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
+    tips, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
     means = np.zeros(len(body.points))
     np.add.at(means, points, far * body.weights[points, influences] / FULL_WEIGHT)
     far = means[points]
-    keys = np.stack([joints, ends, body.place[points]])
+    keys = np.stack([joints, tips, body.place[points]])
     order = np.lexsort(keys)
     keys, shares, far = keys[:, order], shares[order], far[order]
     new = np.concatenate([[True], np.any(np.diff(keys) != 0, axis=0)])
     firsts = np.flatnonzero(new)
-    joints, ends, places = keys[:, firsts]
+    joints, tips, groups = keys[:, firsts]
     return BodyBounds(
         skeleton,
         joints,
-        ends,
-        places,
+        tips,
+        groups,
         np.minimum.reduceat(shares, firsts),
         np.maximum.reduceat(shares, firsts),
         np.maximum.reduceat(far, firsts),
@@ -319,7 +321,7 @@ def _nearest_bones(
     Its end, the share along it of the place next to the point, and the distance from there, m.
     """
     local = points - skeleton.at_rest(skeleton.offsets)[joints]
-    ends, shares = joints.copy(), np.zeros(len(joints))
+    tips, shares = joints.copy(), np.zeros(len(joints))
     far = np.linalg.norm(local, axis=-1)
     arms = np.concatenate([skeleton.offsets, skeleton.tip_offsets])
     above = (*skeleton.parents, *skeleton.tip_joints)
@@ -327,13 +329,13 @@ def _nearest_bones(
         square = float(arm @ arm)
         if joint < 0 or square == 0.0:
             continue
-        own = np.flatnonzero(joints == joint)
-        share = np.clip(local[own] @ arm / square, 0.0, 1.0)
-        off = np.linalg.norm(local[own] - share[:, None] * arm, axis=-1)
-        nearer = off < far[own]
-        ends[own[nearer]], shares[own[nearer]] = end, share[nearer]
-        far[own[nearer]] = off[nearer]
-    return ends, shares, far
+        of_joint = np.flatnonzero(joints == joint)
+        share = np.clip(local[of_joint] @ arm / square, 0.0, 1.0)
+        off = np.linalg.norm(local[of_joint] - share[:, None] * arm, axis=-1)
+        nearer = off < far[of_joint]
+        tips[of_joint[nearer]], shares[of_joint[nearer]] = end, share[nearer]
+        far[of_joint[nearer]] = off[nearer]
+    return tips, shares, far
 
 
 def _lengths(arms: Floats) -> Floats:

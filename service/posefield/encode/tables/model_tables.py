@@ -59,15 +59,15 @@ def _facts(grid: SigmaGrid) -> dict[str, Any]:
     }
 
 
-def explanation(found: Explanation) -> dict[str, Any]:
+def explanation(reasons: Explanation) -> dict[str, Any]:
     """Return the reasons in the schema Reasons of the API."""
-    backing = found.backing
+    backing = reasons.backing
     return {
-        "model": found.model,
-        "controls": found.controls,
-        "performer": found.performer,
-        **_labels(found.labels),
-        "warnings": list(found.warnings),
+        "model": reasons.model,
+        "controls": reasons.controls,
+        "performer": reasons.performer,
+        **_labels(reasons.labels),
+        "warnings": list(reasons.warnings),
         "support": {
             "supported": backing.supported,
             "beyond": {name: round(share, DECIMALS) for name, share in backing.beyond.items()},
@@ -75,13 +75,13 @@ def explanation(found: Explanation) -> dict[str, Any]:
             "variance": round(backing.variance, DECIMALS),
             "most_variance": round(backing.limit, DECIMALS),
         },
-        "nearest": [_clip_facts(clip) for clip in found.nearest],
+        "nearest": [_clip_facts(clip) for clip in reasons.nearest],
         "others": {
-            "count": found.others,
-            "weight": round(found.others_weight, DECIMALS),
-            "share": round(found.others_share, DECIMALS),
+            "count": reasons.others,
+            "weight": round(reasons.others_weight, DECIMALS),
+            "share": round(reasons.others_share, DECIMALS),
         },
-        **({"inferred": list(found.inferred)} if found.inferred else {}),
+        **({"inferred": list(reasons.inferred)} if reasons.inferred else {}),
     }
 
 
@@ -97,20 +97,20 @@ def _labels(labels: Mapping[str, Any]) -> dict[str, Any]:
     return {"labels": dict(labels)} if labels else {}
 
 
-def explanation_text(found: Explanation) -> str:
+def explanation_text(reasons: Explanation) -> str:
     """Return one line for each clip, the nearest first, one for all others, and the support."""
-    wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
+    wide = max(len("clip"), *(len(clip.source) for clip in reasons.nearest))
     lines = [f"{'clip':{wide}}  distance    share     weight  "]
     lines += [
         f"{clip.source:{wide}}  {clip.distance:8.3f}  {_percent(clip.share)}   "
         f"{_percent(clip.weight)}  "
         f"{_clip_line(clip)}"
-        for clip in found.nearest
+        for clip in reasons.nearest
     ]
-    others = f"{found.others} others"
-    shares = f"{_percent(found.others_share)}   {_percent(found.others_weight)}"
-    lines.append(f"{others:{wide}}  {'':8}  {shares}")
-    lines.append(_support_line(found.backing))
+    remainder = f"{reasons.others} others"
+    shares = f"{_percent(reasons.others_share)}   {_percent(reasons.others_weight)}"
+    lines.append(f"{remainder:{wide}}  {'':8}  {shares}")
+    lines.append(_support_line(reasons.backing))
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -118,16 +118,17 @@ def _percent(share: float) -> str:
     return f"{100 * share:5.1f} %"
 
 
-def _support_line(found: SupportReport) -> str:
-    said = "was captured" if found.supported else "was not captured"
+def _support_line(support: SupportReport) -> str:
+    verdict = "was captured" if support.supported else "was not captured"
     beyond = ", ".join(
         f"{name} {100 * share:.0f} % of its range beyond it"
-        for name, share in found.beyond.items()
+        for name, share in support.beyond.items()
         if share
     )
     return (
-        f"something like it {said}: variance {found.variance:.2g} of at most {found.limit:.2g}, "
-        f"{beyond or 'no control beyond its range'} (at most {100 * found.most:.0f} %)"
+        f"something like it {verdict}: variance {support.variance:.2g} of at most "
+        f"{support.limit:.2g}, "
+        f"{beyond or 'no control beyond its range'} (at most {100 * support.most:.0f} %)"
     )
 
 
@@ -136,34 +137,35 @@ def _clip_line(clip: CapturedClip) -> str:
     return ", ".join([*filter(None, [clip.performer]), *clip.labels.values(), values])
 
 
-def suggestions(found: Suggestions) -> dict[str, Any]:
+def suggestions(ranked: Suggestions) -> dict[str, Any]:
     """Return the suggestions in the schema Suggestions of the API."""
     return {
-        "model": found.model,
-        "performer": found.performer,
-        **_labels(found.labels),
-        "candidates": found.candidates,
+        "model": ranked.model,
+        "performer": ranked.performer,
+        **_labels(ranked.labels),
+        "candidates": ranked.candidates,
         "suggestions": [
-            vars(own) | {n: round(getattr(own, n), DECIMALS) for n in ("gain", "variance", "gap")}
-            for own in found.suggestions
+            vars(suggestion)
+            | {n: round(getattr(suggestion, n), DECIMALS) for n in ("gain", "variance", "gap")}
+            for suggestion in ranked.suggestions
         ],
     }
 
 
-def suggestions_text(found: Suggestions) -> str:
+def suggestions_text(ranked: Suggestions) -> str:
     """Return one line for each point, the largest gain first."""
-    rows = [SUGGESTION_HEADING, *map(_suggestion_cells, found.suggestions)]
+    rows = [SUGGESTION_HEADING, *map(_suggestion_cells, ranked.suggestions)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(SUGGESTION_HEADING))]
     lines = ("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows)
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _suggestion_cells(found: Suggestion) -> tuple[str, ...]:
-    controls = ", ".join(f"{name} {value:.4g}" for name, value in found.controls.items())
+def _suggestion_cells(suggestion: Suggestion) -> tuple[str, ...]:
+    controls = ", ".join(f"{name} {value:.4g}" for name, value in suggestion.controls.items())
     return (
-        f"{100 * found.gain:.1f} %",
-        f"{found.variance:.2f}",
-        f"{found.lacking} ({100 * found.gap:.0f} % of its range)",
-        found.nearest or "",
+        f"{100 * suggestion.gain:.1f} %",
+        f"{suggestion.variance:.2f}",
+        f"{suggestion.lacking} ({100 * suggestion.gap:.0f} % of its range)",
+        suggestion.nearest or "",
         controls,
     )

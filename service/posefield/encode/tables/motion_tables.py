@@ -127,15 +127,15 @@ def crowd_table(poses: CrowdPoses) -> Table:
 
 
 def _columns(poses: CrowdPoses) -> dict[str, Column]:
-    found = {name: as_float32(getattr(poses, name)) for name in _FLOAT32_ARRAYS}
-    found["supported"] = poses.supported
+    columns = {name: as_float32(getattr(poses, name)) for name in _FLOAT32_ARRAYS}
+    columns["supported"] = poses.supported
     # A question names levels up to 127.
-    found["levels"] = poses.levels.astype(np.int8)
+    columns["levels"] = poses.levels.astype(np.int8)
     if poses.error_px is not None:
-        found["error_px"] = as_float32(poses.error_px)
+        columns["error_px"] = as_float32(poses.error_px)
     if poses.curves is not None:
-        found["curves"] = as_float32(poses.curves)
-    return found
+        columns["curves"] = as_float32(poses.curves)
+    return columns
 
 
 _UNIT_NAMES = ("length", "time", "rotation", "up", "handedness")
@@ -161,26 +161,26 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
     second. joints: names. With curves also their values, curves: (N, F, C), and curve_names. Raises
     FileError if the file cannot be written.
     """
-    made = list(crowd.batches)
+    batches = list(crowd.batches)
     rotations, roots, bones, *curves = (
-        np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
-        for part in (*_MOTION_ARRAYS, *(["curves"] if crowd.curves else []))
+        np.concatenate([getattr(motions, name) for motions in batches])[crowd.motion]
+        for name in (*_MOTION_ARRAYS, *(["curves"] if crowd.curves else []))
     )
     turns = crowd.placement.turns[:, None]
     rotations[:, :, 0] = quat.mul(turns, rotations[:, :, 0].astype(np.float64))
-    moved = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
-    named: dict[str, Any] = {}
+    world_roots = quat.rotate(turns, roots.astype(np.float64)) + crowd.placement.positions[:, None]
+    arrays: dict[str, Any] = {}
     if curves:
-        named = {"curves": curves[0], "curve_names": np.array(crowd.curves)}
+        arrays = {"curves": curves[0], "curve_names": np.array(crowd.curves)}
     content = BytesIO()
     np.savez(
         content,
         rotations=rotations,
-        root_position=moved.astype(np.float32),
+        root_position=world_roots.astype(np.float32),
         bone_offsets=bones,
         rate=crowd.rate,
         joints=np.array(crowd.skeleton.names),
-        **named,
+        **arrays,
     )
     atomic_files.write(content.getvalue(), path)
 

@@ -100,9 +100,9 @@ _MSGPACK = msgspec.msgpack.Encoder()
 
 
 def _msgpack_array(values: Column) -> dict[str, Any]:
-    own = np.ascontiguousarray(values)
-    plain = own.astype(own.dtype.newbyteorder("<"), copy=False)
-    return {"dtype": plain.dtype.str, "shape": list(own.shape), "data": plain.tobytes()}
+    contiguous = np.ascontiguousarray(values)
+    plain = contiguous.astype(contiguous.dtype.newbyteorder("<"), copy=False)
+    return {"dtype": plain.dtype.str, "shape": list(contiguous.shape), "data": plain.tobytes()}
 
 
 # The earliest time of the zip format, so that the bytes depend on the arrays alone.
@@ -129,9 +129,9 @@ def npz_table(table: Table) -> bytes:
 def _npz_array(value: Any) -> Column:
     if isinstance(value, str | float):
         return np.array(value)
-    if isinstance(value, list) and all(isinstance(each, str) for each in value):
+    if isinstance(value, list) and all(isinstance(text, str) for text in value):
         return np.array(value, dtype=np.str_)
-    if isinstance(value, list) and all(isinstance(each, int) for each in value):
+    if isinstance(value, list) and all(isinstance(text, int) for text in value):
         return np.array(value, dtype=np.int32)
     return np.array(orjson.dumps(value).decode())
 
@@ -141,10 +141,10 @@ def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
     pieces, index, at = list[Any](), list[bytes](), 0
     for label, values in arrays.items():
         # As numpy.save: an array whose columns lie together is written in that order.
-        own = values.T if values.flags.fnc else values
+        array = values.T if values.flags.fnc else values
         head = _array_header(values.dtype, values.shape, values.flags.fnc)
         name = f"{label}.npy".encode("ascii")
-        data = np.ascontiguousarray(own).reshape(-1).view(np.uint8).data
+        data = np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
         size = len(head) + len(data)
         if at + size > MAX_BYTES:
             raise ValueError(f"{at + size} bytes up to {label}, expected at most {MAX_BYTES}")
@@ -193,8 +193,8 @@ def arrow_stream(table: Table) -> bytes:
 
 def _metadata(table: Table) -> dict[str, str]:
     options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_SORT_KEYS
-    said = {**table.facts, **table.fixed}
-    return {PREFIX + key: orjson.dumps(said[key], option=options).decode() for key in said}
+    metadata = {**table.facts, **table.fixed}
+    return {PREFIX + key: orjson.dumps(metadata[key], option=options).decode() for key in metadata}
 
 
 class _ChunkList(list[bytes]):
@@ -242,11 +242,11 @@ def _arrow_array(column: Column) -> Any:
     numbers, shape = _kind(column)
     # One bit for each boolean: nanoarrow would take NumPy's bytes for bits.
     buffer = np.packbits(column, bitorder="little") if numbers == "bool" else column.reshape(-1)
-    made = nanoarrow.c_array_from_buffers(_storage(numbers), column.size, [None, buffer])
+    array = nanoarrow.c_array_from_buffers(_storage(numbers), column.size, [None, buffer])
     if not shape:
-        return made
+        return array
     kind = _list_storage(numbers, math.prod(shape))
-    return nanoarrow.c_array_from_buffers(kind, len(column), [None], children=[made])
+    return nanoarrow.c_array_from_buffers(kind, len(column), [None], children=[array])
 
 
 @cache

@@ -65,32 +65,32 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
 
 def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:
     """Return a new SkelRoot with a skeleton, and a body bound to it, without numeric values."""
-    made = layers.prim(parent, name, "SkelRoot", BINDING_SCHEMAS)
-    made.kind = "component"
-    layers.varying_attribute(made, "extent", ValueTypes.Float3Array)
-    skeleton = layers.prim(made, "Skel", "Skeleton", BINDING_SCHEMAS)
-    layers.add_relationship(made, "skel:skeleton", skeleton.path)
+    skel_root = layers.prim(parent, name, "SkelRoot", BINDING_SCHEMAS)
+    skel_root.kind = "component"
+    layers.varying_attribute(skel_root, "extent", ValueTypes.Float3Array)
+    skeleton = layers.prim(skel_root, "Skel", "Skeleton", BINDING_SCHEMAS)
+    layers.add_relationship(skel_root, "skel:skeleton", skeleton.path)
     _skeleton(skeleton, rig)
     arrays = _mesh_arrays(rig, convention)
     if arrays is not None:
-        mesh = layers.prim(made, "Body", "Mesh", MESH_SCHEMAS)
+        mesh = layers.prim(skel_root, "Body", "Mesh", MESH_SCHEMAS)
         layers.add_relationship(mesh, "skel:skeleton", skeleton.path)
         _mesh(mesh, arrays)
         layers.add_relationship(
-            mesh, "material:binding", _material(made, tinted=bool(arrays.tinted))
+            mesh, "material:binding", _material(skel_root, tinted=bool(arrays.tinted))
         )
-    return made
+    return skel_root
 
 
 def values(numbers: CharacterArrays) -> UsdValues:
     """Return the arrays of a character in the types of usd-core."""
-    made = {name: Vt.Matrix4dArray.FromNumpy(numbers[name]) for name in ("bind", "rest")}
+    matrices = {name: Vt.Matrix4dArray.FromNumpy(numbers[name]) for name in ("bind", "rest")}
     vectors = {
         name: Vt.Vec3fArray.FromNumpy(numbers[name])
         for name in ("points", "extent")
         if name in numbers
     }
-    return made | vectors
+    return matrices | vectors
 
 
 def set_values(root: Any, values: UsdValues) -> None:
@@ -133,19 +133,22 @@ def add_blend_shapes(root: Any, rig: CharacterRig, curves: Sequence[str]) -> Non
 
 def animation(parent: Any, name: str, paths: tuple[str, ...], curves: Sequence[str] = ()) -> Any:
     """Return a new SkelAnimation of these joints and curves, without samples."""
-    made = layers.prim(parent, name, "SkelAnimation")
-    layers.uniform_attribute(made, "joints", ValueTypes.TokenArray, Vt.TokenArray(paths))
-    layers.varying_attribute(made, "translations", ValueTypes.Float3Array)
-    layers.varying_attribute(made, "rotations", ValueTypes.QuatfArray)
+    skel_animation = layers.prim(parent, name, "SkelAnimation")
+    layers.uniform_attribute(skel_animation, "joints", ValueTypes.TokenArray, Vt.TokenArray(paths))
+    layers.varying_attribute(skel_animation, "translations", ValueTypes.Float3Array)
+    layers.varying_attribute(skel_animation, "rotations", ValueTypes.QuatfArray)
     # Without scales some readers silently show the rest pose.
     layers.varying_attribute(
-        made, "scales", ValueTypes.Half3Array, Vt.Vec3hArray(len(paths), Gf.Vec3h(1, 1, 1))
+        skel_animation,
+        "scales",
+        ValueTypes.Half3Array,
+        Vt.Vec3hArray(len(paths), Gf.Vec3h(1, 1, 1)),
     )
     if curves:
         names = Vt.TokenArray(list(curves))
-        layers.uniform_attribute(made, "blendShapes", ValueTypes.TokenArray, names)
-        layers.varying_attribute(made, WEIGHTS, ValueTypes.FloatArray)
-    return made
+        layers.uniform_attribute(skel_animation, "blendShapes", ValueTypes.TokenArray, names)
+        layers.varying_attribute(skel_animation, WEIGHTS, ValueTypes.FloatArray)
+    return skel_animation
 
 
 def _attribute(root: Any, prim: str, name: str) -> Any:
@@ -197,11 +200,11 @@ def _material(parent: Any, *, tinted: bool) -> Any:
 
     tinted: whether it takes its colour from the mesh instead of having one of its own.
     """
-    made = layers.prim(parent, "Material", "Material")
-    surface = _shader(made, "Surface", "UsdPreviewSurface")
+    material = layers.prim(parent, "Material", "Material")
+    surface = _shader(material, "Surface", "UsdPreviewSurface")
     colour = layers.varying_attribute(surface, "inputs:diffuseColor", ValueTypes.Color3f)
     if tinted:
-        reader = _shader(made, "Colour", PRIMVAR_READER)
+        reader = _shader(material, "Colour", PRIMVAR_READER)
         layers.varying_attribute(reader, "inputs:varname", ValueTypes.String, "displayColor")
         result = layers.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
         _connect(colour, result)
@@ -210,14 +213,14 @@ def _material(parent: Any, *, tinted: bool) -> Any:
     for name, value in (("roughness", skinned_mesh.ROUGHNESS), ("metallic", 0.0)):
         layers.varying_attribute(surface, f"inputs:{name}", ValueTypes.Float, value)
     output = layers.varying_attribute(surface, "outputs:surface", ValueTypes.Token)
-    _connect(layers.varying_attribute(made, "outputs:surface", ValueTypes.Token), output)
-    return made.path
+    _connect(layers.varying_attribute(material, "outputs:surface", ValueTypes.Token), output)
+    return material.path
 
 
 def _shader(parent: Any, name: str, kind: str) -> Any:
-    made = layers.prim(parent, name, "Shader")
-    layers.uniform_attribute(made, "info:id", ValueTypes.Token, kind)
-    return made
+    shader = layers.prim(parent, name, "Shader")
+    layers.uniform_attribute(shader, "info:id", ValueTypes.Token, kind)
+    return shader
 
 
 def _connect(taker: Any, giver: Any) -> None:

@@ -51,15 +51,15 @@ def usdz(answer: PerformanceAnswer, convention: Convention) -> bytes:
     return usd_clip.usdz_package(usdc(answer, convention))
 
 
-def segment_frames(begins: float, ends: float, rate: float, frames: int) -> range:
+def segment_frames(begin: float, end: float, rate: float, frames: int) -> range:
     """Return the frames of a segment: from the one at or before its begin to the one at its end.
 
     begins, ends: s. rate: frames a second. frames: of the performance; an end after the last one
     has none of its own.
     """
     slack = ROUNDING * rate
-    first = min(math.floor(begins * rate + slack), frames - 1)
-    last = min(math.ceil(ends * rate - slack), frames - 1)
+    first = min(math.floor(begin * rate + slack), frames - 1)
+    last = min(math.ceil(end * rate - slack), frames - 1)
     return range(first, max(first, last) + 1)
 
 
@@ -67,17 +67,17 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
     """Return the layer; its prims are valid while the caller holds it."""
     (arrays,) = usd_clip.arrays_with_character([answer], convention)
     author = ClipLayerBuilder(arrays.rate, convention, arrays.rig, arrays.curves)
-    made = author.layer(arrays.content)
+    layer = author.layer(arrays.content)
     with Sdf.ChangeBlock():
-        scope = layers.prim(made, PERFORMANCE.name, "Scope")
+        scope = layers.prim(layer, PERFORMANCE.name, "Scope")
         facts = answer.trust.facts()
         segments = facts.pop("segments")
         scope.customData = {layers.FACTS: layers.usd_dictionary(facts)}
         group = layers.prim(scope, SEGMENTS.name, "Scope")
-        for index, own in enumerate(segments):
-            _add_segment(group, index, own, arrays)
-    _add_contacts(made, answer.trust, arrays)
-    return made
+        for index, segment in enumerate(segments):
+            _add_segment(group, index, segment, arrays)
+    _add_contacts(layer, answer.trust, arrays)
+    return layer
 
 
 def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
@@ -86,29 +86,29 @@ def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArra
     prim.customData = {layers.FACTS: layers.usd_dictionary(facts)}
     frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
     rows = slice(frames.start, frames.stop)
-    samples = {name: whole[rows] for name, whole in arrays.content.samples.items()}
+    samples = {name: array[rows] for name, array in arrays.content.samples.items()}
     layers.set_time_samples(prim, samples, frames.start)
 
 
-def _add_contacts(made: Any, report: PerformanceReport, arrays: ClipArrays) -> None:
+def _add_contacts(layer: Any, report: PerformanceReport, arrays: ClipArrays) -> None:
     """Add the contacts of the feet that were made to stand; nothing for feet as predicted."""
     stances = () if report.feet is None else report.feet.stances
     joints = list(dict.fromkeys(stance.joint for stance in stances))
     if not joints:
         return
     times = np.arange(arrays.content.frames) / arrays.rate
-    found = np.zeros((len(times), len(joints)), dtype=bool)
+    standing = np.zeros((len(times), len(joints)), dtype=bool)
     for stance in stances:
         during = (times >= stance.begin - ROUNDING) & (times <= stance.end + ROUNDING)
-        found[:, joints.index(stance.joint)] |= during
-    scope = made.GetPrimAtPath(PERFORMANCE)
+        standing[:, joints.index(stance.joint)] |= during
+    scope = layer.GetPrimAtPath(PERFORMANCE)
     names = Vt.TokenArray(joints)
     layers.uniform_attribute(scope, CONTACT_JOINTS, ValueTypes.TokenArray, names)
     attribute = layers.varying_attribute(scope, CONTACT, ValueTypes.BoolArray)
     scope.attributes[CONTACT_JOINTS].custom = attribute.custom = True
-    for frame in _changes(found):
-        values = Vt.BoolArray([bool(value) for value in found[frame]])
-        made.SetTimeSample(attribute.path, frame, values)
+    for frame in _changes(standing):
+        values = Vt.BoolArray([bool(value) for value in standing[frame]])
+        layer.SetTimeSample(attribute.path, frame, values)
 
 
 def _changes(rows: Booleans) -> Sequence[int]:

@@ -56,14 +56,14 @@ def arrays_with_character(
 ) -> Iterator[ClipArrays]:
     """Yield arrays in the order of their results, with samples, character values and facts."""
     for rig, some in _grouped_by_rig(answers, convention):
-        made = _samples_of(some)
-        rest = character.rest_pose(rig, made.offsets)
-        boxes = extent.bounding_boxes(rig.tree, made, rest.radii)
+        animation = _samples_of(some)
+        rest = character.rest_pose(rig, animation.offsets)
+        boxes = extent.bounding_boxes(rig.tree, animation, rest.radii)
         values = character.character_arrays(rest, convention)
         values["extent"] = conventions.convert_box(convention, boxes).astype(np.float32)
-        for index, samples in enumerate(_samples(made, some, convention)):
-            own = {name: array[index] for name, array in values.items()}
-            yield _clip_arrays(rig, some[index], samples, own)
+        for index, samples in enumerate(_samples(animation, some, convention)):
+            clip_values = {name: array[index] for name, array in values.items()}
+            yield _clip_arrays(rig, some[index], samples, clip_values)
 
 
 def arrays_without_character(
@@ -71,8 +71,8 @@ def arrays_without_character(
 ) -> Iterator[ClipArrays]:
     """Yield arrays in the order of their results, with samples and facts only."""
     for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
-        made = _samples_of(some)
-        for answer, samples in zip(some, _samples(made, some, convention), strict=True):
+        animation = _samples_of(some)
+        for answer, samples in zip(some, _samples(animation, some, convention), strict=True):
             yield _clip_arrays(rig, answer, samples, {})
 
 
@@ -81,16 +81,18 @@ def _grouped_by_rig(
 ) -> Iterator[tuple[CharacterRig, list[SampledClip]]]:
     """Yield consecutive results of one skeleton, at most FRAMES_AT_ONCE frames at a time."""
     _keep_freed_memory()
-    for _, some in groupby(answers, lambda own: (id(own.clip.skeleton), own.clip.root_bone)):
-        part: list[SampledClip] = []
+    for _, some in groupby(
+        answers, lambda clip_answer: (id(clip_answer.clip.skeleton), clip_answer.clip.root_bone)
+    ):
+        group: list[SampledClip] = []
         frames = 0
         for answer in some:
             frames += len(answer.clip)
-            if part and frames > FRAMES_AT_ONCE:
-                yield _rig(part[0].clip, convention), part
-                part, frames = [], len(answer.clip)
-            part.append(answer)
-        yield _rig(part[0].clip, convention), part
+            if group and frames > FRAMES_AT_ONCE:
+                yield _rig(group[0].clip, convention), group
+                group, frames = [], len(answer.clip)
+            group.append(answer)
+        yield _rig(group[0].clip, convention), group
 
 
 def _rig(clip: Clip, convention: Convention) -> CharacterRig:
@@ -99,8 +101,8 @@ def _rig(clip: Clip, convention: Convention) -> CharacterRig:
 
 def _samples_of(answers: Sequence[SampledClip]) -> AnimationSamples:
     """Return the moves of results of one skeleton, with their root bones."""
-    made = [character.rig_and_clip(answer.clip, "none")[1] for answer in answers]
-    return animation_samples.from_clips(made, answers[0].clip.root_bone)
+    clips = [character.rig_and_clip(answer.clip, "none")[1] for answer in answers]
+    return animation_samples.from_clips(clips, answers[0].clip.root_bone)
 
 
 @cache
@@ -124,13 +126,13 @@ def _clip_arrays(
 
 
 def _samples(
-    made: AnimationSamples, answers: Sequence[SampledClip], convention: Convention
+    samples: AnimationSamples, answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[Samples]:
-    translations = conventions.convert_positions(convention, made.translations)
-    rotations = conventions.convert_rotations(convention, made.rotations)
-    for answer, (first, last) in zip(answers, pairwise(made.starts), strict=True):
-        own = {"translations": translations[first:last], "rotations": rotations[first:last]}
-        yield own | _weights(answer.clip)
+    translations = conventions.convert_positions(convention, samples.translations)
+    rotations = conventions.convert_rotations(convention, samples.rotations)
+    for answer, (first, last) in zip(answers, pairwise(samples.starts), strict=True):
+        arrays = {"translations": translations[first:last], "rotations": rotations[first:last]}
+        yield arrays | _weights(answer.clip)
 
 
 def _weights(clip: Clip) -> dict[str, Singles]:
@@ -154,15 +156,15 @@ class ClipLayerBuilder(BaseLayerBuilder):
 
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
-        made = Sdf.Layer.CreateAnonymous("clip.usda")
-        made.TransferContent(_character_prims(self.rig, self.convention, self.curves))
+        layer = Sdf.Layer.CreateAnonymous("clip.usda")
+        layer.TransferContent(_character_prims(self.rig, self.convention, self.curves))
         with Sdf.ChangeBlock():
-            self.set_metadata(made, ROOT.name, content)
+            self.set_metadata(layer, ROOT.name, content)
             character_prims.set_values(
-                made.GetPrimAtPath(ROOT), character_prims.values(content.values)
+                layer.GetPrimAtPath(ROOT), character_prims.values(content.values)
             )
-            layers.set_time_samples(made.GetPrimAtPath(ANIMATION), content.samples)
-        return made
+            layers.set_time_samples(layer.GetPrimAtPath(ANIMATION), content.samples)
+        return layer
 
 
 @lru_cache(maxsize=16)
@@ -171,12 +173,12 @@ def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[st
 
     Cached, since building it takes as long as exporting it.
     """
-    made = Sdf.Layer.CreateAnonymous("prims.usda")
-    root = character_prims.root(made, ROOT.name, rig, convention)
+    layer = Sdf.Layer.CreateAnonymous("prims.usda")
+    root = character_prims.root(layer, ROOT.name, rig, convention)
     character_prims.add_blend_shapes(root, rig, curves)
     made_animation = character_prims.animation(root, ANIMATION.name, rig.paths, curves)
     character_prims.bind_animation(root, made_animation.path)
-    return made
+    return layer
 
 
 def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
@@ -189,7 +191,7 @@ def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
 
 def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers in binary form."""
-    return [crate_template.usdc(*each) for each in builders_and_contents(answers, convention)]
+    return [crate_template.usdc(*pair) for pair in builders_and_contents(answers, convention)]
 
 
 def usdz(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
@@ -222,14 +224,14 @@ class AnimationLayerBuilder(BaseLayerBuilder):
 
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
-        made = Sdf.Layer.CreateAnonymous("animation.usda")
-        self.set_metadata(made, ANIMATION_NAME, content)
+        layer = Sdf.Layer.CreateAnonymous("animation.usda")
+        self.set_metadata(layer, ANIMATION_NAME, content)
         with Sdf.ChangeBlock():
             layers.set_time_samples(
-                character_prims.animation(made, ANIMATION_NAME, self.paths, self.curves),
+                character_prims.animation(layer, ANIMATION_NAME, self.paths, self.curves),
                 content.samples,
             )
-        return made
+        return layer
 
 
 def animation_usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:

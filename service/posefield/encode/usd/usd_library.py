@@ -62,7 +62,7 @@ def library_stage(
     rate: of the stage, frames a second. The stage is as long as the longest clip. curves: names of
     the clips' curves, for which the body has blend shapes. has_root: whether clips have root bones.
     """
-    prims = character.legal_names(each.name for each in entries)
+    prims = character.legal_names(entry.name for entry in entries)
     rig = character.rig(skeleton, convention.body, has_root)
     character_layer = _character_layer(rig, convention, rate, entries)
     root = character_layer.GetPrimAtPath(ROOT)
@@ -80,21 +80,21 @@ def _character_layer(
     rig: CharacterRig, convention: Convention, rate: float, entries: Sequence[LibraryEntry]
 ) -> Any:
     """Return the layer of the stage with its character alone."""
-    made = Sdf.Layer.CreateAnonymous("library.usda")
-    lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
-    layers.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
-    root = character_prims.root(made, ROOT.name, rig, convention)
+    layer = Sdf.Layer.CreateAnonymous("library.usda")
+    lasting = max((entry.frames - 1) / entry.rate for entry in entries) if entries else 0.0
+    layers.set_layer_metadata(layer, ROOT.name, round(lasting * rate) + 1, rate, convention)
+    root = character_prims.root(layer, ROOT.name, rig, convention)
     numbers = character.rest_pose_arrays(rig, convention)
     extent = _library_box(numbers["extent"], entries, convention)
     character_prims.set_values(root, character_prims.values({**numbers, "extent": extent}))
-    return made
+    return layer
 
 
 def _clip_prims(prims: Sequence[str], entries: Sequence[LibraryEntry]) -> Iterator[str]:
-    for name, each in zip(prims, entries, strict=True):
+    for name, entry in zip(prims, entries, strict=True):
         yield (
             f'        def SkelAnimation "{name}" (\n'
-            f"            prepend payload = {_asset_path(each.file)}\n"
+            f"            prepend payload = {_asset_path(entry.file)}\n"
             "        )\n        {\n        }\n"
         )
 
@@ -107,6 +107,6 @@ def _asset_path(file: str) -> str:
 
 def _library_box(rest: Floats, entries: Sequence[LibraryEntry], convention: Convention) -> Floats:
     """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
-    boxes = np.array([(each.low, each.high) for each in entries]).reshape(-1, 2, 3)
-    every = np.concatenate([rest[None], conventions.convert_box(convention, boxes)])
-    return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]).astype(np.float32)
+    boxes = np.array([(entry.low, entry.high) for entry in entries]).reshape(-1, 2, 3)
+    box = np.concatenate([rest[None], conventions.convert_box(convention, boxes)])
+    return np.stack([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]).astype(np.float32)

@@ -27,8 +27,8 @@ from posefield.question.motion_question import BodyKind
 
 def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKind) -> Any:
     """Return a layer in which every character refers to one prototype; the caller must hold it."""
-    made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
-    root = made.GetPrimAtPath(crowd_scene.ROOT)
+    layer, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
+    root = layer.GetPrimAtPath(crowd_scene.ROOT)
     prototype = character_prims.root(root, crowd_scene.PROTOTYPE.name, rig)
     character_prims.add_blend_shapes(prototype, rig, crowd.curves)
     character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
@@ -40,28 +40,28 @@ def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKi
         animation = character_prims.animation(group, name, rig.paths, crowd.curves)
         layers.set_time_samples(animation, motion.samples)
         notes.append(motion.summary)
-    crowd_scene.add_references(made, crowd, instanced)
-    crowd_scene.add_to_references(made, crowd, notes)
-    return made
+    crowd_scene.add_references(layer, crowd, instanced)
+    crowd_scene.add_to_references(layer, crowd, notes)
+    return layer
 
 
 def flat_layer(crowd: CrowdClip, form: str, body: BodyKind) -> Any:
     """Return a layer in which every character has its own data; the caller must hold it."""
-    made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
-    _copy_prototype(made, crowd, rig)
+    layer, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
+    _copy_prototype(layer, crowd, rig)
     notes = []
     for index, motion in enumerate(crowd_scene.all_motions(crowd, rig)):
-        _copy_motion(made, crowd, index, rig, motion)
+        _copy_motion(layer, crowd, index, rig, motion)
         notes.append(motion.summary)
-    crowd_scene.add_to_flat(made, crowd, notes)
-    return made
+    crowd_scene.add_to_flat(layer, crowd, notes)
+    return layer
 
 
-def _copy_prototype(made: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
+def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
     # Sdf.CopySpec would take a third of the time, but it adds the fields of a spec in the order of
     # their names' addresses, which differs between processes and shows in binary files.
     group, values = (
-        crowd_scene.characters_prim(made),
+        crowd_scene.characters_prim(layer),
         character_prims.values(character.rest_pose_arrays(rig)),
     )
     for some in crowd_scene.character_blocks(crowd):
@@ -85,14 +85,14 @@ def _copy_motion(
     for index in np.flatnonzero(crowd.motion == played).tolist():
         cancellation.check()
         root = layer.GetPrimAtPath(crowd_scene.character_path(index))
-        own = character_prims.animation(root, root.name, rig.paths, crowd.curves)
+        skel_animation = character_prims.animation(root, root.name, rig.paths, crowd.curves)
         if first is None:
-            layers.set_time_samples(own, motion.samples)
-            first = own.path
+            layers.set_time_samples(skel_animation, motion.samples)
+            first = skel_animation.path
         else:
             # Each spec lacks at most one field, so the order of copying does not matter.
-            Sdf.CopySpec(layer, first, layer, own.path)
-        character_prims.bind_animation(root, own.path)
+            Sdf.CopySpec(layer, first, layer, skel_animation.path)
+        character_prims.bind_animation(root, skel_animation.path)
 
 
 FOLDER, CHARACTER, SUMMARY = "crowd_clips", "character.usdc", "summary.usdc"
@@ -116,18 +116,18 @@ def size_bound(crowd: CrowdClip) -> int:
 
 def check_size(crowd: CrowdClip) -> None:
     """Raise InvalidField if an archive of the crowd could exceed the limits of a zip."""
-    taken, members = size_bound(crowd), crowd_scene.motion_count(crowd) + 3
-    if taken > archives.BYTES or members > archives.MEMBERS:
-        found = f"{taken / 1e9:.1f} GB in {members} layers"
+    size, members = size_bound(crowd), crowd_scene.motion_count(crowd) + 3
+    if size > archives.BYTES or members > archives.MEMBERS:
+        sizes = f"{size / 1e9:.1f} GB in {members} layers"
         expected = f"{archives.BYTES / 1e9:.1f} GB in {archives.MEMBERS}"
-        raise InvalidField("format", f"{found}, expected at most {expected} in a usdz; take usd")
+        raise InvalidField("format", f"{sizes}, expected at most {expected} in a usdz; take usd")
 
 
 def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
     """Return the root layer, which refers to the others in a folder beside it."""
-    made = crowd_scene.new_layer(crowd, "usdc")
-    root = made.GetPrimAtPath(crowd_scene.ROOT)
-    made.subLayerPaths.append(f"./{folder}/{SUMMARY}")
+    layer = crowd_scene.new_layer(crowd, "usdc")
+    root = layer.GetPrimAtPath(crowd_scene.ROOT)
+    layer.subLayerPaths.append(f"./{folder}/{SUMMARY}")
     with Sdf.ChangeBlock():
         prototype = layers.prim(root, crowd_scene.PROTOTYPE.name, "SkelRoot")
         prototype.specifier, prototype.kind = Sdf.SpecifierClass, "component"
@@ -137,8 +137,8 @@ def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
             crowd_scene.set_payload(
                 layers.prim(group, name, "SkelAnimation"), f"./{folder}/{name}.usdc"
             )
-    crowd_scene.add_references(made, crowd, instanced)
-    return layers.crate_bytes(made)
+    crowd_scene.add_references(layer, crowd, instanced)
+    return layers.crate_bytes(layer)
 
 
 def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, bytes]]:
@@ -168,6 +168,6 @@ def members(crowd: CrowdClip, instanced: bool, body: BodyKind) -> Iterator[ZipMe
 
 
 def _layer(default: str, crowd: CrowdClip) -> Any:
-    made = Sdf.Layer.CreateAnonymous("part.usdc")
-    layers.set_layer_metadata(made, default, crowd.frames, crowd.rate)
-    return made
+    layer = Sdf.Layer.CreateAnonymous("part.usdc")
+    layers.set_layer_metadata(layer, default, crowd.frames, crowd.rate)
+    return layer

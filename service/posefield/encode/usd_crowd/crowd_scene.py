@@ -38,17 +38,17 @@ from posefield.motion.clip import CrowdClip, Motions, Placement
 CORNERS = np.array(list(product((False, True), repeat=3)))
 
 
-def motion_boxes(rig: CharacterRig, made: AnimationSamples) -> Floats:
+def motion_boxes(rig: CharacterRig, samples: AnimationSamples) -> Floats:
     """Return the lowest and highest corner (M, 2, 3) of each motion in its own frame, m."""
-    return extent.bounding_boxes(rig.tree, made, rig.bounds.radii_of_others(made.offsets))
+    return extent.bounding_boxes(rig.tree, samples, rig.bounds.radii_of_others(samples.offsets))
 
 
 def placed_box(placement: Placement, boxes: Floats) -> Floats:
     """Return a box (2, 3) in the world, m, around boxes (N, 2, 3) of placed characters."""
     low, high = boxes[:, 0], boxes[:, 1]
     corners = np.where(CORNERS, high[:, None], low[:, None])
-    moved = quat.rotate(placement.turns[:, None], corners) + placement.positions[:, None]
-    return extent.enlarged_box(moved.min(axis=(0, 1)), moved.max(axis=(0, 1)))
+    world_corners = quat.rotate(placement.turns[:, None], corners) + placement.positions[:, None]
+    return extent.enlarged_box(world_corners.min(axis=(0, 1)), world_corners.max(axis=(0, 1)))
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,13 @@ def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
 
     Raises ValueError for a number of motions other than the characters play, and for other shapes.
     """
-    made = 0
+    count = 0
     # The variable of a for loop would keep each batch in memory while the next is computed.
     for motion in chain.from_iterable(map(partial(_batch_motions, crowd, rig), crowd.batches)):
-        made += 1
+        count += 1
         yield motion
-    if made != motion_count(crowd):
-        raise ValueError(f"{made} motions, expected {motion_count(crowd)}")
+    if count != motion_count(crowd):
+        raise ValueError(f"{count} motions, expected {motion_count(crowd)}")
 
 
 def motion_layer(crowd: CrowdClip, rig: CharacterRig, samples: Samples) -> bytes:
@@ -105,10 +105,10 @@ def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Itera
     if batch.rotations.shape[1:] != expected:
         raise ValueError(f"motions of {batch.rotations.shape[1:]}, expected {expected}")
     weights = _weights(crowd, batch)
-    made = animation_samples.from_motions(batch)
-    boxes = motion_boxes(rig, made)
-    for index, (part, box) in enumerate(zip(made.parts(1), boxes, strict=True)):
-        samples = {"translations": part.translations, "rotations": part.rotations}
+    animation = animation_samples.from_motions(batch)
+    boxes = motion_boxes(rig, animation)
+    for index, (motion, box) in enumerate(zip(animation.parts(1), boxes, strict=True)):
+        samples = {"translations": motion.translations, "rotations": motion.rotations}
         if weights is not None:
             samples[WEIGHTS] = weights[index]
         yield MotionSamples(samples, MotionSummary(box, _level_changes(batch.levels[index])))
@@ -119,10 +119,10 @@ def _weights(crowd: CrowdClip, batch: Motions) -> Singles | None:
 
     Raises ValueError for other curves than the crowd names.
     """
-    found = () if batch.curves is None else batch.curves.shape
+    shape = () if batch.curves is None else batch.curves.shape
     expected = (len(batch), crowd.frames, len(crowd.curves)) if crowd.curves else ()
-    if found != expected:
-        raise ValueError(f"curves of {found}, expected {expected}")
+    if shape != expected:
+        raise ValueError(f"curves of {shape}, expected {expected}")
     # USD's deduplication does not distinguish -0 from 0.
     return None if batch.curves is None else batch.curves + np.float32(0.0)
 
@@ -163,16 +163,16 @@ def new_layer(crowd: CrowdClip, form: str) -> Any:
     form: usda or usdc, in which it will be exported. usd-core copies a layer of the other form
     before it writes it, which takes half as much memory again.
     """
-    made = Sdf.Layer.CreateAnonymous(f"crowd.{form}")
-    layers.set_layer_metadata(made, ROOT.name, crowd.frames, crowd.rate)
-    made.customLayerData = {layers.FACTS: layers.usd_dictionary(crowd.facts)}
-    layers.prim(made, ROOT.name, "Xform", MODEL_SCHEMAS).kind = "assembly"
-    return made
+    layer = Sdf.Layer.CreateAnonymous(f"crowd.{form}")
+    layers.set_layer_metadata(layer, ROOT.name, crowd.frames, crowd.rate)
+    layer.customLayerData = {layers.FACTS: layers.usd_dictionary(crowd.facts)}
+    layers.prim(layer, ROOT.name, "Xform", MODEL_SCHEMAS).kind = "assembly"
+    return layer
 
 
-def characters_prim(made: Any) -> Any:
+def characters_prim(layer: Any) -> Any:
     """Return a new prim for the characters."""
-    characters = layers.prim(made.GetPrimAtPath(ROOT), CHARACTERS.name, "Xform", MODEL_SCHEMAS)
+    characters = layers.prim(layer.GetPrimAtPath(ROOT), CHARACTERS.name, "Xform", MODEL_SCHEMAS)
     characters.kind = "group"
     return characters
 
@@ -182,13 +182,13 @@ def set_payload(owner: Any, path: str) -> None:
     owner.SetInfo("payload", Sdf.PayloadListOp.Create(prependedItems=[Sdf.Payload(path)]))
 
 
-def add_references(made: Any, crowd: CrowdClip, instanced: bool) -> None:
+def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
     """Add every character as a reference to the prototype, instanceable where `instanced`.
 
     A prim cannot be added below an instance, so each character's root is bound to its motion.
     """
     with Sdf.ChangeBlock():
-        characters = characters_prim(made)
+        characters = characters_prim(layer)
     prototype = Sdf.ReferenceListOp.Create(prependedItems=[Sdf.Reference("", PROTOTYPE)])
     for some in character_blocks(crowd):
         with Sdf.ChangeBlock():
@@ -233,53 +233,55 @@ LEVEL_ATTRIBUTE = "posefield:level"
 """Level of detail of a motion's frames, with a time sample at each change."""
 
 
-def add_to_references(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+def add_to_references(layer: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
     """Add extents to a crowd of references to one prototype, and levels to its motions."""
-    _placed_boxes(made, crowd, notes)
+    _placed_boxes(layer, crowd, notes)
     boxes = np.array([note.box for note in notes])
-    every = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    box = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     with Sdf.ChangeBlock():
         for path in (PROTOTYPE, PROTOTYPE.AppendChild("Body")):
-            _set_extent(made, path, every)
+            _set_extent(layer, path, box)
         for index, note in enumerate(notes):
-            _set_levels(made, MOTIONS.AppendChild(motion_name(index)), note)
+            _set_levels(layer, MOTIONS.AppendChild(motion_name(index)), note)
 
 
-def add_to_flat(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+def add_to_flat(layer: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
     """Add extents and levels to a crowd in which each character has its own body and motion."""
-    _placed_boxes(made, crowd, notes)
+    _placed_boxes(layer, crowd, notes)
     for some in character_blocks(crowd):
         with Sdf.ChangeBlock():
             for index, played in zip(some, crowd.motion[some], strict=True):
                 path = character_path(index)
-                _set_extent(made, path.AppendChild("Body"), notes[played].box)
-                _set_levels(made, path.AppendChild(character_name(index)), notes[played])
+                _set_extent(layer, path.AppendChild("Body"), notes[played].box)
+                _set_levels(layer, path.AppendChild(character_name(index)), notes[played])
 
 
-def _placed_boxes(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
-    own = np.array([notes[played].box for played in crowd.motion])
+def _placed_boxes(layer: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+    boxes = np.array([notes[played].box for played in crowd.motion])
     for some in character_blocks(crowd):
         with Sdf.ChangeBlock():
             for index in some:
-                _set_extent(made, character_path(index), own[index])
-    whole = layers.float3_array(placed_box(crowd.placement, own))
+                _set_extent(layer, character_path(index), boxes[index])
+    crowd_box = layers.float3_array(placed_box(crowd.placement, boxes))
     for path in (ROOT, CHARACTERS):
-        _attribute(made, path.AppendProperty("extentsHint"), ValueTypes.Float3Array).default = whole
+        _attribute(
+            layer, path.AppendProperty("extentsHint"), ValueTypes.Float3Array
+        ).default = crowd_box
 
 
-def _set_extent(made: Any, prim: Any, box: Floats) -> None:
+def _set_extent(layer: Any, prim: Any, box: Floats) -> None:
     _attribute(
-        made, prim.AppendProperty("extent"), ValueTypes.Float3Array
+        layer, prim.AppendProperty("extent"), ValueTypes.Float3Array
     ).default = layers.float3_array(box)
 
 
-def _set_levels(made: Any, prim: Any, note: MotionSummary) -> None:
+def _set_levels(layer: Any, prim: Any, note: MotionSummary) -> None:
     path = prim.AppendProperty(LEVEL_ATTRIBUTE)
-    _attribute(made, path, ValueTypes.Int).custom = True
+    _attribute(layer, path, ValueTypes.Int).custom = True
     for frame, level in note.levels.items():
-        made.SetTimeSample(path, frame, level)
+        layer.SetTimeSample(path, frame, level)
 
 
-def _attribute(made: Any, path: Any, kind: Any) -> Any:
-    found = made.GetAttributeAtPath(path)
-    return found or Sdf.CreatePrimAttributeInLayer(made, path, kind)
+def _attribute(layer: Any, path: Any, kind: Any) -> Any:
+    attribute = layer.GetAttributeAtPath(path)
+    return attribute or Sdf.CreatePrimAttributeInLayer(layer, path, kind)

@@ -98,9 +98,9 @@ class _Feeder:
             with suppress(BrokenPipeError):
                 self.pipe.close()
 
-    def _write(self, part: object) -> None:
+    def _write(self, batch: object) -> None:
         cancel.check()
-        pickle.dump(part, self.pipe, protocol=pickle.HIGHEST_PROTOCOL)
+        pickle.dump(batch, self.pipe, protocol=pickle.HIGHEST_PROTOCOL)
         self.pipe.flush()
 
 
@@ -149,8 +149,8 @@ def write(
     elif ending == "usd" and instancing != "flatten":
         _write_folder(crowd, path, instancing == "scenegraph", body)
     else:
-        with atomic_files.replacing(path) as made:
-            layers.export_layer(_layer(crowd, _form(ending), instancing, body), made)
+        with atomic_files.replacing(path) as temporary:
+            layers.export_layer(_layer(crowd, _form(ending), instancing, body), temporary)
 
 
 def stream(
@@ -174,10 +174,10 @@ def stream(
         character.body_size(crowd.skeleton, body),
         len(crowd.curves),
     )
-    apart = (
+    in_child = (
         crowd_size.layer_size_bound(counts, ending, instancing == "flatten") > CHILD_PROCESS_SIZE
     )
-    return (stream_from_child if apart else encode_here)(crowd, ending, instancing, body)
+    return (stream_from_child if in_child else encode_here)(crowd, ending, instancing, body)
 
 
 def encode_here(
@@ -196,10 +196,10 @@ def _validate(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancin
         crowd_package.check_size(crowd)
 
 
-def _check_choice(field: str, found: str, expected: tuple[str, ...]) -> None:
-    if found not in expected:
-        hint = did_you_mean(found, expected)
-        raise InvalidField(field, f"{found!r}{hint}, expected one of {', '.join(expected)}")
+def _check_choice(field: str, value: str, expected: tuple[str, ...]) -> None:
+    if value not in expected:
+        hint = did_you_mean(value, expected)
+        raise InvalidField(field, f"{value!r}{hint}, expected one of {', '.join(expected)}")
 
 
 def _form(ending: str) -> str:
@@ -250,7 +250,7 @@ def _write_folder(crowd: CrowdClip, path: Path, instanced: bool, body: BodyKind)
 
 
 def _check_crowd_folder(folder: Path) -> None:
-    found = [folder] if folder.is_file() else sorted(folder.glob("*"))
-    for path in found:
+    files = [folder] if folder.is_file() else sorted(folder.glob("*"))
+    for path in files:
         if not CROWD_LAYER_NAME.fullmatch(path.name):
             raise FileError(path, "in the way; expected nothing here but an earlier crowd's layers")

@@ -24,14 +24,14 @@ def main() -> None:
     """
     path, instancing = Path(sys.argv[1]), sys.argv[2]
     body = cast(BodyKind, sys.argv[3])
-    given = sys.stdin.buffer
-    crowd = replace(pickle.load(given), batches=_received_batches(given))
+    stdin = sys.stdin.buffer
+    crowd = replace(pickle.load(stdin), batches=_received_batches(stdin))
     with path.open("wb") as file:
         file.writelines(crowd_writer.encode_here(crowd, path.suffix[1:], instancing, body))
 
 
-def _received_batches(given: IO[bytes]) -> Iterator[Motions]:
-    while (batch := pickle.load(given)) is not None:
+def _received_batches(stream: IO[bytes]) -> Iterator[Motions]:
+    while (batch := pickle.load(stream)) is not None:
         yield batch
 
 

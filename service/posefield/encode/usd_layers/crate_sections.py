@@ -71,8 +71,8 @@ def split_crate(data: bytes) -> CrateParts | None:
         or listed[0][1] < TABLE_OFFSET_POSITION + TABLE_OFFSET.size
     ):
         return None
-    found = CrateParts(data[: listed[0][1]], sections)
-    return found if join_crate(bytearray(found.values), sections) == data else None
+    crate = CrateParts(data[: listed[0][1]], sections)
+    return crate if join_crate(bytearray(crate.values), sections) == data else None
 
 
 def _table_of_contents(data: bytes) -> list[tuple[bytes, int, int]]:
@@ -168,8 +168,8 @@ def _append_samples(values: bytearray, rows: Singles) -> Indices:
     values += bytes(-len(values) % ALIGNMENT)
     offset = len(values)
     values += block.data
-    found: Indices = offset + which * block.shape[1]
-    return found
+    offsets: Indices = offset + which * block.shape[1]
+    return offsets
 
 
 def repeated_rows(rows: Singles) -> Indices | None:
@@ -185,7 +185,7 @@ def repeated_rows(rows: Singles) -> Indices | None:
     if _all_distinct(probes):
         return None
     first = dict[Any, int]()
-    alike = [first.setdefault(each, index) for index, each in enumerate(probes.tolist())]
+    alike = [first.setdefault(probe, index) for index, probe in enumerate(probes.tolist())]
     if not np.array_equal(rows, rows[alike]):
         first = {}
         alike = [first.setdefault(row.tobytes(), index) for index, row in enumerate(rows)]

@@ -77,9 +77,9 @@ class FactPlace:
         Raises ValueError for a text with the character NUL, which ends a token.
         """
         writer = _FactWriter(values, {}, len(self.strings) // INDEX.size)
-        found = writer.dictionary(facts)
+        description = writer.dictionary(facts)
         JUMP.pack_into(values, self.jump, len(values) - self.jump)
-        values += COUNT.pack(found)
+        values += COUNT.pack(description)
         return self._tables(list(writer.texts))
 
     def _tables(self, texts: list[str]) -> tuple[CrateSection, CrateSection]:
@@ -97,12 +97,12 @@ class FactPlace:
         )
 
 
-def find_place(parts: CrateParts) -> FactPlace | None:
+def find_place(crate: CrateParts) -> FactPlace | None:
     """Return the place of the facts in a layer with a mark; None for another layout."""
-    jump = parts.values.find(MARKED)
-    if jump < 0 or [section.name for section in parts.sections[:2]] != [b"TOKENS", b"STRINGS"]:
+    jump = crate.values.find(MARKED)
+    if jump < 0 or [section.name for section in crate.sections[:2]] != [b"TOKENS", b"STRINGS"]:
         return None
-    tokens, strings = (section.content for section in parts.sections[:2])
+    tokens, strings = (section.content for section in crate.sections[:2])
     count, text_bytes, size = TOKENS_HEAD.unpack_from(tokens)
     packed = tokens[TOKENS_HEAD.size :]
     # The first byte counts further parts of a text of gigabytes.
@@ -130,7 +130,7 @@ class _FactWriter:
         For each there is its name, an offset, a value unless the description holds it, and this.
         """
         names = sorted([name for name, fact in facts.items() if fact is not None])
-        found = self._append(COUNT.pack(len(names)))
+        description = self._append(COUNT.pack(len(names)))
         for name in names:
             fact, index = facts[name], self._string(name)
             if type(fact) not in PLAIN:
@@ -141,7 +141,7 @@ class _FactWriter:
                 self.values += _float_fact(index, fact, len(self.values))
             else:
                 self._fact(index, fact)
-        return TYPES[dict] | found
+        return TYPES[dict] | description
 
     def _fact(self, index: int, fact: Any) -> None:
         """Write a fact of any length, by the index of its name."""
@@ -166,15 +166,15 @@ class _FactWriter:
         kind, form = ELEMENTS[fact.kind]
         if not fact.items:
             return kind | ARRAY
-        items = [self._string(each) for each in fact.items] if fact.kind is str else fact.items
+        items = [self._string(text) for text in fact.items] if fact.kind is str else fact.items
         self.values += bytes(-len(self.values) % ALIGNMENT)
-        found = self._append(COUNT.pack(len(items)) + struct.pack(f"<{len(items)}{form}", *items))
-        return kind | ARRAY | found
+        offset = self._append(COUNT.pack(len(items)) + struct.pack(f"<{len(items)}{form}", *items))
+        return kind | ARRAY | offset
 
-    def _append(self, written: bytes) -> int:
+    def _append(self, content: bytes) -> int:
         """Return the offset of bytes after they are written."""
         offset = len(self.values)
-        self.values += written
+        self.values += content
         return offset
 
     def _string(self, text: str) -> int:
@@ -251,29 +251,29 @@ class CrateTemplate:
 
     def write(self, rate: float, content: LayerContent) -> bytes:
         """Return the layer of a content, at so many frames a second."""
-        made = bytearray(self.parts.values)
-        DOUBLE.pack_into(made, self.rate, rate)
-        DOUBLE.pack_into(made, self.end, content.frames - 1)
+        data = bytearray(self.parts.values)
+        DOUBLE.pack_into(data, self.rate, rate)
+        DOUBLE.pack_into(data, self.end, content.frames - 1)
         for name, at in self.values.items():
             value = content.values[name].tobytes()
-            made[at : at + len(value)] = value
-        times = crate_sections.add_times(made, content.frames)
-        for name, place in self.samples.items():
-            place.add(made, times, content.samples[name])
+            data[at : at + len(value)] = value
+        times = crate_sections.add_times(data, content.frames)
+        for name, samples_place in self.samples.items():
+            samples_place.add(data, times, content.samples[name])
         sections = self.parts.sections
         if self.facts is not None:
-            tables = self.facts.add(made, content.facts)
+            tables = self.facts.add(data, content.facts)
             sections = (*tables, *sections[len(tables) :])
-        return crate_sections.join_crate(made, sections)
+        return crate_sections.join_crate(data, sections)
 
 
 def usdc(author: LayerBuilder, content: LayerContent) -> bytes:
     """Return a binary layer; equal authors and contents have equal bytes."""
     # Layers of all rates and lengths have one template.
-    found = template(author.with_rate(MARKED_RATE), layers.first_frame(content).pattern)
-    if found is None:
+    filled = template(author.with_rate(MARKED_RATE), layers.first_frame(content).pattern)
+    if filled is None:
         return layers.crate_bytes(author.layer(content))
-    return found.write(author.rate, content)
+    return filled.write(author.rate, content)
 
 
 @lru_cache(maxsize=MAX_TEMPLATES)
@@ -283,39 +283,45 @@ def template(author: LayerBuilder, pattern: LayerPattern) -> CrateTemplate | Non
     author: of the marked rate. pattern: of a single frame.
     """
     marks = layers.random_content(pattern, {}, seed=1)
-    made = author.layer(marks)
-    made.endTimeCode = MARKED_END
+    layer = author.layer(marks)
+    layer.endTimeCode = MARKED_END
     if pattern.facts:
-        made.customLayerData = {layers.FACTS: MARK}
-    parts = crate_sections.split_crate(layers.crate_bytes(made))
-    found = parts and _located(parts, marks, pattern.facts)
-    return found if found and _is_verified(found, author.with_rate(TRIAL_RATE), pattern) else None
+        layer.customLayerData = {layers.FACTS: MARK}
+    crate = crate_sections.split_crate(layers.crate_bytes(layer))
+    candidate = crate and _located(crate, marks, pattern.facts)
+    return (
+        candidate
+        if candidate and _is_verified(candidate, author.with_rate(TRIAL_RATE), pattern)
+        else None
+    )
 
 
-def _is_verified(found: CrateTemplate, author: LayerBuilder, pattern: LayerPattern) -> bool:
+def _is_verified(candidate: CrateTemplate, author: LayerBuilder, pattern: LayerPattern) -> bool:
     """Return whether usd-core reads filled layers as those that it builds itself."""
     facts = TRIAL_FACTS if pattern.facts else {}
     one = layers.random_content(pattern, facts, seed=2)
     rows = [0, *range(TRIAL_FRAMES), 0]
-    others = {
+    random_rows = {
         name: np.random.default_rng(3).standard_normal((TRIAL_FRAMES, *shape[1:]), np.float32)[rows]
         for name, shape in pattern.samples
     }
     return all(
-        layers.crate_text(found.write(author.rate, content))
+        layers.crate_text(candidate.write(author.rate, content))
         == author.layer(content).ExportToString()
-        for content in (one, replace(one, samples=others))
+        for content in (one, replace(one, samples=random_rows))
     )
 
 
-def _located(parts: CrateParts, marks: LayerContent, facts: bool) -> CrateTemplate | None:
-    values = parts.values
+def _located(crate: CrateParts, marks: LayerContent, facts: bool) -> CrateTemplate | None:
+    values = crate.values
     rate, end = (values.find(DOUBLE.pack(mark)) for mark in (MARKED_RATE, MARKED_END))
-    places = {name: values.find(value.tobytes()) for name, value in marks.values.items()}
+    offsets = {name: values.find(value.tobytes()) for name, value in marks.values.items()}
     samples = {n: crate_sections.find_place(values, row) for n, row in marks.samples.items()}
-    place = find_place(parts) if facts else None
-    if min(rate, end, *places.values()) < 0 or (facts and place is None):
+    fact_place = find_place(crate) if facts else None
+    if min(rate, end, *offsets.values()) < 0 or (facts and fact_place is None):
         return None
-    known = {name: each for name, each in samples.items() if each is not None}
-    complete = len(known) == len(samples)
-    return CrateTemplate(parts, rate, end, known, places, place) if complete else None
+    located = {
+        name: samples_place for name, samples_place in samples.items() if samples_place is not None
+    }
+    complete = len(located) == len(samples)
+    return CrateTemplate(crate, rate, end, located, offsets, fact_place) if complete else None

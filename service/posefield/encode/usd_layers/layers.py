@@ -55,7 +55,7 @@ class LayerContent:
         """Return the shapes of the content."""
         return LayerPattern(
             tuple((name, rows.shape) for name, rows in self.samples.items()),
-            tuple((name, found.shape, found.dtype.char) for name, found in self.values.items()),
+            tuple((name, array.shape, array.dtype.char) for name, array in self.values.items()),
             bool(self.facts),
         )
 
@@ -165,24 +165,24 @@ Sdf.Layer.CreateAnonymous("first.usda")
 
 
 def set_layer_metadata(
-    made: Any, default: str, frames: int, rate: float, convention: Convention = METRES
+    layer: Any, default: str, frames: int, rate: float, convention: Convention = METRES
 ) -> None:
     """Set default prim, units, axes and times: frames at the time codes 0 to frames - 1.
 
     rate: frames a second.
     """
-    made.defaultPrim = default
-    made.startTimeCode, made.endTimeCode = 0.0, float(frames - 1)
+    layer.defaultPrim = default
+    layer.startTimeCode, layer.endTimeCode = 0.0, float(frames - 1)
     # Some readers use one of the two, some the other.
-    made.timeCodesPerSecond = made.framesPerSecond = float(rate)
-    made.pseudoRoot.SetInfo("metersPerUnit", convention.metres_per_unit)
-    made.pseudoRoot.SetInfo("upAxis", convention.up.upper())
+    layer.timeCodesPerSecond = layer.framesPerSecond = float(rate)
+    layer.pseudoRoot.SetInfo("metersPerUnit", convention.metres_per_unit)
+    layer.pseudoRoot.SetInfo("upAxis", convention.up.upper())
 
 
-def set_custom_data(made: Any, facts: Mapping[str, Any]) -> None:
+def set_custom_data(layer: Any, facts: Mapping[str, Any]) -> None:
     """Set the custom layer data `FACTS` to facts, unless there are none."""
-    if said := usd_dictionary(facts):
-        made.customLayerData = {FACTS: said}
+    if dictionary := usd_dictionary(facts):
+        layer.customLayerData = {FACTS: dictionary}
 
 
 @dataclass(frozen=True)
@@ -196,13 +196,13 @@ class BaseLayerBuilder:
         """Return layers of another rate."""
         return replace(self, rate=rate)
 
-    def set_metadata(self, made: Any, default: str, content: LayerContent) -> None:
+    def set_metadata(self, layer: Any, default: str, content: LayerContent) -> None:
         """Set the metadata of a layer, with this default prim, and the facts of its content."""
-        set_layer_metadata(made, default, content.frames, self.rate, self.convention)
-        set_custom_data(made, content.facts)
+        set_layer_metadata(layer, default, content.frames, self.rate, self.convention)
+        set_custom_data(layer, content.facts)
 
 
-def crate_bytes(made: Any, memory: Path = MEMORY_FOLDER) -> bytes:
+def crate_bytes(layer: Any, memory: Path = MEMORY_FOLDER) -> bytes:
     """Return the layer in its binary form, which pxr can only write to a file.
 
     memory: folder for that file; the default folder of temporary files if it cannot be used. Raises
@@ -210,7 +210,7 @@ def crate_bytes(made: Any, memory: Path = MEMORY_FOLDER) -> bytes:
     """
 
     def exported(path: Path) -> bytes:
-        export_layer(made, path)
+        export_layer(layer, path)
         return path.read_bytes()
 
     return _with_file(exported, memory)
@@ -244,19 +244,19 @@ def _with_file(use: Callable[[Path], Result], memory: Path) -> Result:
         raise FileError(tempfile.gettempdir(), message) from fault
 
 
-def _in_folder(use: Callable[[Path], Result], place: Path | None) -> Result:
-    with tempfile.TemporaryDirectory(dir=place) as folder:
+def _in_folder(use: Callable[[Path], Result], parent: Path | None) -> Result:
+    with tempfile.TemporaryDirectory(dir=parent) as folder:
         return use(Path(folder, "layer.usdc"))
 
 
-def export_layer(made: Any, path: Path) -> None:
+def export_layer(layer: Any, path: Path) -> None:
     """Write a layer as text if the path ends in .usda, and in binary form otherwise.
 
     Raises OSError if it cannot be written.
     """
     form = "usda" if path.suffix == ".usda" else "usdc"
     try:
-        made.Export(str(path), args={"format": form})
+        layer.Export(str(path), args={"format": form})
     except Tf.ErrorException as fault:
         raise OSError(errno.EIO, str(fault.args[0].commentary)) from fault
 

@@ -49,8 +49,8 @@ def animation_glb(answer: SampledClip, rest: RestJoints) -> bytes:
 def _nodes(rest: RestJoints) -> dict[str, Any]:
     """Return the scene and its nodes; node j is joint j."""
     nodes: list[dict[str, Any]] = [
-        {"name": name, "rotation": turn, "translation": place} | _scale(size)
-        for name, turn, place, size in zip(
+        {"name": name, "rotation": turn, "translation": translation} | _scale(size)
+        for name, turn, translation, size in zip(
             rest.names,
             rest.rotations[:, [1, 2, 3, 0]].tolist(),
             rest.translations.tolist(),
@@ -72,12 +72,12 @@ def _nodes(rest: RestJoints) -> dict[str, Any]:
 def _outer_node(rest: RestJoints) -> dict[str, Any]:
     """Return the transform above the root joint; nothing for the identity."""
     outer = rest.outer
-    found = _scale(outer.scale)
+    node = _scale(outer.scale)
     if not np.isclose(abs(outer.rotation[0]), 1.0):
-        found["rotation"] = outer.rotation[[1, 2, 3, 0]].tolist()
+        node["rotation"] = outer.rotation[[1, 2, 3, 0]].tolist()
     if not np.allclose(outer.translation, 0.0):
-        found["translation"] = outer.translation.tolist()
-    return found
+        node["translation"] = outer.translation.tolist()
+    return node
 
 
 def _scale(size: Floats) -> dict[str, Any]:
@@ -157,16 +157,16 @@ class RigTarget:
                 "true with a character, expected false: sigma is of the joints of the model",
             )
 
-    def convention(self, form: ClipEncoder, asked: FileAxes) -> Convention:
+    def convention(self, form: ClipEncoder, axes: FileAxes) -> Convention:
         """Return the convention of files in a format.
 
         Raises InvalidField for a body, for a package, and for another unit or up axis than that of
         the character's file.
         """
-        if asked.body is not None:
+        if axes.body is not None:
             raise InvalidField(
                 "body",
-                f"{asked.body!r} with a character, expected none given: the body is in its file",
+                f"{axes.body!r} with a character, expected none given: the body is in its file",
             )
         if form.extension == "usdz" and self.stage is not None:
             raise InvalidField(
@@ -174,46 +174,46 @@ class RigTarget:
                 "a USD file with the format usdz, expected usda or usdc: a package holds all its "
                 f"files, and {self.file} is referred to, not copied",
             )
-        found = form.convention(asked.unit, asked.up)
+        convention = form.convention(axes.unit, axes.up)
         if form.extension not in LAYERS:
-            return found
-        own = METRES
+            return convention
+        character_axes = METRES
         if self.stage is not None:
-            own = Convention(self.rig.rest.metres_per_unit, self.rig.rest.up)
-        if asked.unit is not None and found.metres_per_unit != own.metres_per_unit:
-            raise InvalidField("unit", f"{asked.unit!r}, {self._expected(own)}")
-        if asked.up is not None and found.up != own.up:
-            raise InvalidField("up", f"{asked.up!r}, {self._expected(own)}")
-        return own
+            character_axes = Convention(self.rig.rest.metres_per_unit, self.rig.rest.up)
+        if axes.unit is not None and convention.metres_per_unit != character_axes.metres_per_unit:
+            raise InvalidField("unit", f"{axes.unit!r}, {self._expected(character_axes)}")
+        if axes.up is not None and convention.up != character_axes.up:
+            raise InvalidField("up", f"{axes.up!r}, {self._expected(character_axes)}")
+        return character_axes
 
-    def _expected(self, own: Convention) -> str:
+    def _expected(self, character_axes: Convention) -> str:
         return (
-            f"expected none given: the layer has the unit, {own.metres_per_unit:g} m, and the up "
-            f"axis, {own.up}, of the character {self.file}"
+            f"expected none given: the layer has the unit, {character_axes.metres_per_unit:g} m, "
+            f"and the up axis, {character_axes.up}, of the character {self.file}"
         )
 
     def notes(self, form: ClipEncoder, clip: Clip) -> tuple[str, ...]:
         """Return a sentence for each thing that a file in a format lacks."""
-        found = []
+        notes = []
         if form.extension in LAYERS and self.stage is None:
-            found.append(
+            notes.append(
                 f"USD cannot refer to glTF files: the layer has the skeleton of {self.file} "
                 "without its skin; glb binds to the file by the names of its joints"
             )
         if form.extension in LAYERS and self.stage is not None:
-            found += self.stage.notes
+            notes += self.stage.notes
         if form.extension == "glb":
-            found.append(
+            notes.append(
                 "glTF cannot refer to the skin of another file: this one has the animation alone, "
                 f"which binds to {self.file} by the names of its joints"
             )
         curves = clip.curves
         if curves is not None and form.has_curves and form.extension not in TABLES:
-            found.append(
+            notes.append(
                 f"files of a character in {form.extension} carry no curves: {len(curves.curves)} "
                 f"are left out ({', '.join(curves.names)}); {', '.join(TABLES)} have them"
             )
-        return tuple(found)
+        return tuple(notes)
 
     def encode(self, form: ClipEncoder, answer: SampledClip, convention: Convention) -> bytes:
         """Return the file of a motion of the rig's skeleton, in the convention of `convention`."""
@@ -231,8 +231,8 @@ class RigTarget:
             binary = layers.crate_bytes(layer)
             return binary if form.extension == "usdc" else usd_clip.usdz_package(binary)
         if form.extension == "glb":
-            own = self.rig.rest if self.stage is None else rig_stage.in_metres(self.rig.rest)
-            return animation_glb(answer, own)
+            rest = self.rig.rest if self.stage is None else rig_stage.in_metres(self.rig.rest)
+            return animation_glb(answer, rest)
         return form.encode(answer, replace(convention, body="none"))
 
     def _layer(self, answer: SampledClip) -> Any:

@@ -77,15 +77,15 @@ def _radii(skeleton: Any, skel_root: Any, joints: tuple[str, ...]) -> Floats:
         path = skeleton.GetPath()
         raise ValueError(f"{path} has {len(matrices)} bindTransforms, expected {len(order)}")
     binds = matrices[:, 3, :3]
-    found = dict.fromkeys(order, 0.0)
+    radii = dict.fromkeys(order, 0.0)
     for binding in cache.ComputeSkelBindings(skel_root, Usd.PrimDefaultPredicate):
         if binding.GetSkeleton().GetPath() == skeleton.GetPath():
             for skinned in binding.GetSkinningTargets():
-                _widen(found, order, binds, skinned)
-    return np.array([found[joint] for joint in joints])
+                _widen(radii, order, binds, skinned)
+    return np.array([radii[joint] for joint in joints])
 
 
-def _widen(found: dict[str, float], order: list[str], binds: Floats, skinned: Any) -> None:
+def _widen(radii: dict[str, float], order: list[str], binds: Floats, skinned: Any) -> None:
     """Widen the radii of the joints that move a skinned mesh."""
     points = UsdGeom.PointBased(skinned.GetPrim()).GetPointsAttr().Get()
     if not points:
@@ -93,22 +93,26 @@ def _widen(found: dict[str, float], order: list[str], binds: Floats, skinned: An
     matrix = np.array(skinned.GetGeomBindTransform(), float)
     placed = np.array(points, float) @ matrix[:3, :3] + matrix[3, :3]
     indices, weights = (
-        np.array(part).reshape(len(placed), -1)
-        for part in skinned.ComputeVaryingJointInfluences(len(placed))
+        np.array(influences).reshape(len(placed), -1)
+        for influences in skinned.ComputeVaryingJointInfluences(len(placed))
     )
-    own = [str(token) for token in skinned.GetJointOrder() or order]
+    joint_order = [str(token) for token in skinned.GetJointOrder() or order]
     for column in range(indices.shape[1]):
-        moved = weights[:, column] > 0.0
-        for index in np.unique(indices[moved, column]).tolist():
-            these = placed[moved & (indices[:, column] == index)]
-            apart = np.linalg.norm(these - binds[order.index(own[index])], axis=-1)
-            found[own[index]] = max(found[own[index]], float(apart.max()))
+        weighted = weights[:, column] > 0.0
+        for index in np.unique(indices[weighted, column]).tolist():
+            these = placed[weighted & (indices[:, column] == index)]
+            distances = np.linalg.norm(these - binds[order.index(joint_order[index])], axis=-1)
+            radii[joint_order[index]] = max(radii[joint_order[index]], float(distances.max()))
 
 
 def _lost_targets(root: Any) -> list[str]:
     """Return a note if prims refer to others beside the root prim, which a reference leaves out."""
     below = root.GetPath()
-    relations = (own for prim in Usd.PrimRange(root) for own in prim.GetAuthoredRelationships())
+    relations = (
+        relationship
+        for prim in Usd.PrimRange(root)
+        for relationship in prim.GetAuthoredRelationships()
+    )
     targets = (target for relation in relations for target in relation.GetTargets())
     lost = sorted({str(target) for target in targets if not target.HasPrefix(below)})
     if not lost:
@@ -127,52 +131,54 @@ def referring_layer(answer: SampledClip, rest: RestJoints, stage: RigStage, refe
 
     reference: path of the file, as the layer states it.
     """
-    made = Sdf.Layer.CreateAnonymous("clip.usda")
+    layer = Sdf.Layer.CreateAnonymous("clip.usda")
     with Sdf.ChangeBlock():
-        _set_metadata(made, answer, stage.root, Convention(rest.metres_per_unit, rest.up))
-        root = Sdf.PrimSpec(made, stage.root, Sdf.SpecifierDef)
+        _set_metadata(layer, answer, stage.root, Convention(rest.metres_per_unit, rest.up))
+        root = Sdf.PrimSpec(layer, stage.root, Sdf.SpecifierDef)
         root.referenceList.prependedItems = [Sdf.Reference(reference, root.path)]
-        _set_extent(made, answer, rest, stage)
-        skeleton = Sdf.CreatePrimInLayer(made, stage.skeleton)
+        _set_extent(layer, answer, rest, stage)
+        skeleton = Sdf.CreatePrimInLayer(layer, stage.skeleton)
         schemas = Sdf.TokenListOp.Create(prependedItems=list(character_prims.BINDING_SCHEMAS))
         skeleton.SetInfo("apiSchemas", schemas)
         animation = Sdf.Path(stage.animation)
         layers.add_relationship(skeleton, "skel:animationSource", animation)
         _add_animation(root, animation.name, stage.joints, answer, rest)
-    return made
+    return layer
 
 
 def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
     """Return a layer of the same joints in metres with Y up and their motion, without a skin."""
-    own = rig_stage.in_metres(rest)
-    made = Sdf.Layer.CreateAnonymous("clip.usda")
-    paths = character.joint_paths(character.legal_names(own.names), own.parents)
+    rest_in_metres = rig_stage.in_metres(rest)
+    layer = Sdf.Layer.CreateAnonymous("clip.usda")
+    paths = character.joint_paths(
+        character.legal_names(rest_in_metres.names), rest_in_metres.parents
+    )
     schemas = character_prims.BINDING_SCHEMAS
     with Sdf.ChangeBlock():
-        _set_metadata(made, answer, SKELETON_ROOT, METRES)
-        root = layers.prim(made, SKELETON_ROOT, "SkelRoot", schemas)
+        _set_metadata(layer, answer, SKELETON_ROOT, METRES)
+        root = layers.prim(layer, SKELETON_ROOT, "SkelRoot", schemas)
         root.kind = "component"
-        places = answer.clip.positions().reshape(-1, 3)
-        box = np.stack([places.min(axis=0), places.max(axis=0)])
+        points = answer.clip.positions().reshape(-1, 3)
+        box = np.stack([points.min(axis=0), points.max(axis=0)])
         _add_extent(root, box)
-        _add_skeleton(root, paths, own)
-        _add_animation(root, ANIMATION, paths, answer, own)
+        _add_skeleton(root, paths, rest_in_metres)
+        _add_animation(root, ANIMATION, paths, answer, rest_in_metres)
         character_prims.bind_animation(root, root.path.AppendChild(ANIMATION))
-    return made
+    return layer
 
 
-def _set_metadata(made: Any, answer: SampledClip, root: str, convention: Convention) -> None:
+def _set_metadata(layer: Any, answer: SampledClip, root: str, convention: Convention) -> None:
     clip = answer.clip
-    layers.set_layer_metadata(made, root, len(clip), clip.rate, convention)
-    layers.set_custom_data(made, answer.trust.facts())
+    layers.set_layer_metadata(layer, root, len(clip), clip.rate, convention)
+    layers.set_custom_data(layer, answer.trust.facts())
 
 
-def _set_extent(made: Any, answer: SampledClip, rest: RestJoints, stage: RigStage) -> None:
+def _set_extent(layer: Any, answer: SampledClip, rest: RestJoints, stage: RigStage) -> None:
     """Set the extent of the whole motion instead of that of the file's rest pose."""
     clip = answer.clip
     rotations = quat.normalize(rest.file_rotations(clip.rotations))
     box = stage.extent(rest, rotations, rest.file_translations(clip.translations))
-    _add_extent(Sdf.CreatePrimInLayer(made, stage.skel_root), box)
+    _add_extent(Sdf.CreatePrimInLayer(layer, stage.skel_root), box)
 
 
 def _add_extent(root: Any, box: Floats) -> None:
@@ -184,12 +190,12 @@ def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
     """Add a skeleton, whose bind pose is its rest pose."""
     skeleton = layers.prim(root, "Skel", "Skeleton", character_prims.BINDING_SCHEMAS)
     layers.add_relationship(root, "skel:skeleton", skeleton.path)
-    places = rest.skeleton.at_rest(rest.skeleton.offsets)
+    positions = rest.skeleton.at_rest(rest.skeleton.offsets)
     tokens = {"joints": list(paths), "jointNames": list(rest.names)}
     for name, values in tokens.items():
         layers.uniform_attribute(skeleton, name, ValueTypes.TokenArray, Vt.TokenArray(values))
     for name, poses in (
-        ("bindTransforms", (rest.orientations, places)),
+        ("bindTransforms", (rest.orientations, positions)),
         ("restTransforms", (rest.rotations, rest.translations)),
     ):
         matrices = Vt.Matrix4dArray.FromNumpy(rig_stage.matrices(*poses))
@@ -205,10 +211,10 @@ def _add_animation(
         "rotations": _as_float32(rotations[..., [1, 2, 3, 0]]),
         "translations": _as_float32(rest.file_translations(clip.translations)),
     }
-    made = character_prims.animation(root, name, tuple(joints))
+    skel_animation = character_prims.animation(root, name, tuple(joints))
     sizes = Vt.Vec3hArray([Gf.Vec3h(*size) for size in rest.scales.tolist()])
-    made.attributes["scales"].default = sizes
-    layers.set_time_samples(made, samples)
+    skel_animation.attributes["scales"].default = sizes
+    layers.set_time_samples(skel_animation, samples)
 
 
 def _as_float32(values: Floats) -> Singles:

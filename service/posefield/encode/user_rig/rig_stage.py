@@ -32,11 +32,11 @@ def matrices(
     translations: Annotated[Floats, "*batch joints 3"],
 ) -> Annotated[Floats, "*batch joints 4 4"]:
     """Return matrices (..., 4, 4) for row vectors, as in USD."""
-    made = np.zeros((*rotations.shape[:-1], 4, 4))
-    made[..., :3, :3] = np.swapaxes(quat.to_matrix(rotations), -1, -2)
-    made[..., 3, :3] = translations
-    made[..., 3, 3] = 1.0
-    return made
+    stacked = np.zeros((*rotations.shape[:-1], 4, 4))
+    stacked[..., :3, :3] = np.swapaxes(quat.to_matrix(rotations), -1, -2)
+    stacked[..., 3, :3] = translations
+    stacked[..., 3, 3] = 1.0
+    return stacked
 
 
 BLOCK = 256
@@ -84,8 +84,8 @@ class RigStage:
         local = matrices(rotations, translations)
         local[..., :3, :3] *= rest.scales[:, :, None]
         for joint, parent in enumerate(rest.parents):
-            own = local[:, joint]
-            placed[:, joint] = own @ (self.to_root if parent < 0 else placed[:, parent])
+            joint_matrices = local[:, joint]
+            placed[:, joint] = joint_matrices @ (self.to_root if parent < 0 else placed[:, parent])
         sizes = np.linalg.norm(self.to_root[:3, :3], axis=1).max()
-        places, reach = placed[..., 3, :3], (sizes * self.radii)[:, None]
-        return np.stack([(places - reach).min(axis=(0, 1)), (places + reach).max(axis=(0, 1))])
+        origins, reach = placed[..., 3, :3], (sizes * self.radii)[:, None]
+        return np.stack([(origins - reach).min(axis=(0, 1)), (origins + reach).max(axis=(0, 1))])
