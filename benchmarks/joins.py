@@ -169,8 +169,8 @@ def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float
     motion = SampledMotion(passage.rotations, passage.roots, RATE)
     plan = body_plans.plan_feet(own.character, motion, own.contacts, passage.contacts)
     times = np.arange(len(passage)) / RATE
-    found = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
-    placed = Passage(found.rotations, found.roots, passage.contacts, passage.sigmas)
+    rotations, roots = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
+    placed = Passage(rotations, roots, passage.contacts, passage.sigmas)
     near = _near(cut.exit, len(passage))
     points = joins.positions(own.character, placed, 0, len(placed))[..., [0, 2]]
     slides = []

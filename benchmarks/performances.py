@@ -83,7 +83,7 @@ def stood(made: Made) -> tuple[list[float], Frames]:
     plan = composition.plan_feet(made.script, made.composed)
     motion, timeline = made.composed.motion, made.composed.timeline
     times = np.arange(len(motion)) / RATE
-    paths = foot_placement.foot_paths([plan])[0].after
+    ((_, paths),) = foot_placement.foot_paths([plan])
     slides = []
     for join in timeline.joins:
         time = (join.frame - timeline.begin) / RATE

@@ -46,31 +46,18 @@ def plan_paths(
     feet: FootRows,
     found: Runs,
     goal: Annotated[Floats, "frames 3"],
-    places: Annotated[FloorVectors, "runs"] | None = None,
 ) -> Annotated[Floats, "frames 3"]:
     """Return the paths (N, 3), m, of feet that stand in the runs `found`.
 
-    goal: points (N, 3), m, that the paths go through; not a number in other frames. places: of the
-    stances over the floor, if they are given.
+    goal: points (N, 3), m, that the paths go through; not a number in other frames.
     """
     led = ~np.isnan(goal[:, 0])
     over, up = (floor_plane.project(goal), goal @ UP) if led.any() else (None, None)
-    floor = smooth_change(feet, feet.floor, held(feet, found, led), places, over)
+    floor = smooth_change(feet, feet.floor, held(feet, found, led), fixed=over)
     heights = smooth_change(feet, feet.heights, found, feet.height[found.rows], up)
     added, least = lifts(feet, floor, heights, found, goal @ UP)
     own = feet.height[feet.rows.groups.group]
     return floor_plane.at_height(floor, np.maximum(heights + added, own + least))
-
-
-def mean_places(feet: FootRows, found: Runs) -> Annotated[FloorVectors, "runs"]:
-    """Return the mean predicted places of feet over the floor in stances that end in their row."""
-    run, frames = found.frames()
-    own = FrameGroups(found.lengths)
-    first = feet.floor[feet.rows.flat(found.rows, found.begins)]
-    # From each stance's start, so that sums stay small.
-    gone = feet.floor[feet.rows.flat(found.rows[run], frames)] - first[run]
-    means: FloorVectors = first + own.means(gone.real) + 1j * own.means(gone.imag)
-    return means
 
 
 def lifts(

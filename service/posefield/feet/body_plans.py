@@ -37,13 +37,8 @@ FootPaths = Annotated[Floats, "foot_frames 3"]
 
 def plan_motions(requests: Sequence[PlanRequest]) -> list[FeetPlan]:
     """Return where the feet of motions stand, and how low the pelvis must be for that."""
-    found: dict[int, FeetPlan] = {}
-    kinds = [own.kind for own in requests]
-    for kind in dict.fromkeys(kinds):
-        places = [place for place, own in enumerate(kinds) if own == kind]
-        plans = _Bodies.of([requests[place] for place in places]).plans()
-        found |= zip(places, plans, strict=True)
-    return [found[place] for place in range(len(requests))]
+    kinds = [request.kind for request in requests]
+    return footsteps.evaluate_by_kind(requests, kinds, lambda alike: _Bodies.of(alike).plans())
 
 
 def plan_feet(

@@ -5,9 +5,9 @@ the frames that a question asks for. `body_plans` makes it, and `foot_placement`
 frames.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,22 @@ from posefield.question.floor import LEVEL_FLOOR, Floor
 
 # A foot that is led to two places that are farther apart does not stand on both, m.
 SAME_PLACE = 1e-3
+
+Value = TypeVar("Value")
+Result = TypeVar("Result")
+
+
+def evaluate_by_kind(
+    values: Sequence[Value],
+    kinds: Sequence[object],
+    evaluate: Callable[[Sequence[Value]], list[Result]],
+) -> list[Result]:
+    """Return the result of each value; those of one kind are evaluated at once."""
+    results: dict[int, Result] = {}
+    for kind in dict.fromkeys(kinds):
+        indices = [index for index, other in enumerate(kinds) if other == kind]
+        results |= zip(indices, evaluate([values[index] for index in indices]), strict=True)
+    return [results[index] for index in range(len(values))]
 
 
 @dataclass(frozen=True)

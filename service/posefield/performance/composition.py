@@ -10,7 +10,6 @@ from posefield.common import cancellation
 from posefield.common.errors import InvalidField
 from posefield.common.units import Frames, RootPath, Rotations
 from posefield.feet import body_plans, foot_placement
-from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import FeetPlan, SampledMotion
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip, assemble
@@ -37,8 +36,7 @@ def plan(script: Script, most: int) -> PerformanceReport:
     """
     composed = compose(script)
     times = frame_times(composed, script.question.fps, most)
-    every = PlacedFrames(composed.motion.rotations, composed.motion.roots)
-    joins = _judge_joins(script, composed, every)
+    joins = _judge_joins(script, composed, composed.motion)
     return reporting.report(script, composed, joins, len(times), None)
 
 
@@ -51,12 +49,13 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     times = frame_times(composed, script.question.fps, most)
     told: FeetResult | None = None
     planned: FeetPlan | None = None
-    every = PlacedFrames(composed.motion.rotations, composed.motion.roots)
+    every = composed.motion
     if script.question.feet == "stand" and script.character.feet:
         planned = plan_feet(script, composed)
         (told,) = standing_feet.describe([planned], script.character.skeleton.names)
         even = np.arange(len(composed.motion)) / RATE
-        every = foot_placement.place_feet(planned, even, every.rotations, every.roots)
+        rotations, roots = foot_placement.place_feet(planned, even, every.rotations, every.roots)
+        every = replace(every, rotations=rotations, roots=roots)
     judged = _judge_joins(script, composed, every)
     rotations, roots = _at_times(script, composed.motion, planned, every, times)
     character = script.character
@@ -81,7 +80,7 @@ def _held_joints(timeline: Timeline, clip: Clip) -> tuple[HeldJoint, ...]:
     return tuple(found)
 
 
-def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Sequence[JoinFacts]:
+def _judge_joins(script: Script, composed: Composed, every: Passage) -> Sequence[JoinFacts]:
     """Judge the joins as they are sent: with targets met, and feet placed where they stand.
 
     Each hard one has a warning, and so has each act that is too fast.
@@ -191,7 +190,7 @@ def plan_feet(script: Script, composed: Composed) -> FeetPlan:
 
 
 def _at_times(
-    script: Script, motion: Passage, planned: FeetPlan | None, every: PlacedFrames, times: Frames
+    script: Script, motion: Passage, planned: FeetPlan | None, every: Passage, times: Frames
 ) -> tuple[Rotations, RootPath]:
     """Return rotations and roots at the times (F,), s, of the clip, with placed feet.
 
@@ -204,5 +203,4 @@ def _at_times(
     rotations, roots = resample(motion.rotations, motion.roots, RATE, times)
     if planned is None:
         return rotations, roots
-    placed = foot_placement.place_feet(planned, times, rotations, roots)
-    return placed.rotations, placed.roots
+    return foot_placement.place_feet(planned, times, rotations, roots)

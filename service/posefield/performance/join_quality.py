@@ -13,7 +13,6 @@ import numpy as np
 
 from posefield.common.units import UP, Floats, Frames
 from posefield.feet import limbs
-from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import Character
 from posefield.feet.stance_rows import DECIMALS, STANDING
 from posefield.locomotion import floor_plane
@@ -136,7 +135,7 @@ def describe_cut(
 
 
 def judge(
-    character: Character, joins: Sequence[tuple[int, CutFacts]], sent: PlacedFrames
+    character: Character, joins: Sequence[tuple[int, CutFacts]], sent: Passage
 ) -> list[JoinFacts]:
     """Return the facts about joins in the motion that is sent.
 
@@ -145,9 +144,7 @@ def judge(
     return [JoinFacts(cut, _peak(character, sent, frame)) for frame, cut in joins]
 
 
-def judge_act(
-    character: Character, sent: PlacedFrames, frames: tuple[int, int], captured: float
-) -> str:
+def judge_act(character: Character, sent: Passage, frames: tuple[int, int], captured: float) -> str:
     """Return a warning about an act that is faster than captured clips of its model; else "".
 
     sent: all frames of the performance, at `RATE`. frames: of the act, from its begin until before
@@ -157,7 +154,7 @@ def judge_act(
     # The first and the last one of these frames have no acceleration of their own.
     begin = frames[0] + round(AFTER * RATE) if frames[0] else 0
     end = frames[1] - round(BEFORE * RATE) + 1 if frames[1] < len(sent.roots) else frames[1]
-    found = _accelerations(character, sent, slice(begin, max(end, begin)))
+    found = accelerations(character, sent, begin + 1, max(end, begin) - 1)
     peak = float(found.max(initial=0.0))
     if peak <= MOST_PEAK * captured:
         return ""
@@ -168,19 +165,11 @@ def judge_act(
     )
 
 
-def _peak(character: Character, sent: PlacedFrames, frame: int) -> float:
+def _peak(character: Character, sent: Passage, frame: int) -> float:
     """Return the largest acceleration near a frame, m/s², as `JoinFacts.peak` is."""
     first = max(frame - round(BEFORE * RATE) - 1, 0)
-    found = _accelerations(character, sent, slice(first, frame + round(AFTER * RATE) + 2))
+    found = accelerations(character, sent, first + 1, frame + round(AFTER * RATE) + 1)
     return float(found.max(initial=0.0))
-
-
-def _accelerations(character: Character, sent: PlacedFrames, rows: slice) -> Frames:
-    """Return the mean accelerations of some frames without the first and the last one, m/s²."""
-    rotations, roots = sent.rotations[rows], sent.roots[rows]
-    count = len(roots)
-    passage = Passage(rotations, roots, np.zeros((count, 0)), np.zeros(count))
-    return accelerations(character, passage, 0, count)
 
 
 FARTHEST = 0.05

@@ -10,7 +10,6 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import UP, Floats, round_micrometres
 from posefield.constraints.targets import ConstraintSet
 from posefield.feet import body_plans, foot_placement, footsteps, limbs
-from posefield.feet.foot_placement import PlacementRequest
 from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest, SampledMotion
 from posefield.feet.limbs import LimbPoses
 from posefield.feet.stances import Cycle
@@ -148,24 +147,23 @@ def stand(model: Synthesizer, requests: Sequence[StandRequest]) -> list[PoseAnsw
     plans = body_plans.plan_motions(
         [_plan_request(model, requests[place], choices[place], known) for place in placed]
     )
+    answers = [requests[place].answer for place in placed]
     frames = foot_placement.place_motions(
-        [
-            PlacementRequest(plan, own.times, own.rotations, own.root_position)
-            for plan, own in zip(plans, (requests[place].answer for place in placed), strict=True)
-        ]
+        plans,
+        [answer.times for answer in answers],
+        [answer.rotations for answer in answers],
+        [answer.root_position for answer in answers],
     )
     told = describe(plans, card.skeleton.names)
     found = [_unplaced(card, *own) for own in zip(requests, choices, strict=True)]
-    for place, plan, poses, facts in zip(placed, plans, frames, told, strict=True):
+    for place, plan, (rotations, roots), facts in zip(placed, plans, frames, told, strict=True):
         answer = found[place]
         left = answer.trust.feet.left if answer.trust.feet else ()
         measured = _measured(card, requests[place], plan)
         trust = replace(
             answer.trust, feet=replace(facts, left=left + facts.left), measured=measured
         )
-        found[place] = replace(
-            answer, rotations=poses.rotations, root_position=poses.roots, trust=trust
-        )
+        found[place] = replace(answer, rotations=rotations, root_position=roots, trust=trust)
     return found
 
 
@@ -195,15 +193,15 @@ def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult
     paths = foot_placement.foot_paths(plans)
     # Feet on a slope are low where they are near it.
     level = [
-        own.after - plan.floor.heights(own.after)[..., None] * UP
-        for plan, own in zip(plans, paths, strict=True)
+        after - plan.floor.heights(after)[..., None] * UP
+        for plan, (_, after) in zip(plans, paths, strict=True)
     ]
     rates = [plan.rate for plan in plans]
     skates = (
-        contact_detection.mean_skate_speeds([own.before for own in paths], rates),
+        contact_detection.mean_skate_speeds([before for before, _ in paths], rates),
         contact_detection.mean_skate_speeds(level, rates),
     )
-    drifts = foot_placement.largest_drifts(plans, [own.after for own in paths])
+    drifts = foot_placement.largest_drifts(plans, [after for _, after in paths])
     return [
         FeetResult(
             _stances(plan, names),
@@ -303,7 +301,7 @@ def _measured(card: ModelCard, request: StandRequest, plan: FeetPlan) -> dict[st
         _joint_positions(limbs.evaluate_joints(parents, bones, joints, rotations, roots), joints)
         for rotations, roots in (
             (before.rotations, before.root_position),
-            (after.rotations, after.roots),
+            after,
         )
     ]
     # Measures of a motion need no parents; measures of a body are left out above.

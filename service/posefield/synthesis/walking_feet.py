@@ -9,9 +9,8 @@ from posefield.common import cancellation
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.constraints import take_variation
-from posefield.feet import footsteps, walkers_feet
-from posefield.feet.footsteps import LimbChoice
-from posefield.feet.walkers_feet import Walkers, WalkersFeet
+from posefield.feet import body_plans, foot_placement, footsteps
+from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest, SampledMotion
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.session import Session
 from posefield.kriging import random_field
@@ -278,29 +277,47 @@ def standing_motions(
 
     Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
     """
-    made = walking_crowd.motions(session, plan, who, shown, pose)
-    placed = _placed_feet(session, plan, who, shown, made)
-    rotations = made.rotations
-    for joint, turns in placed.turns.items():
-        rotations[:, :, joint] = turns
-    roots = placed.roots.astype(np.float32)
-    feet = _describe(session.card, placed, plan.rate)
-    return replace(made, rotations=rotations, root_position=roots, feet=feet)
+    motions = walking_crowd.motions(session, plan, who, shown, pose)
+    plans = _plan_feet(session, plan, who, shown, motions)
+    count, frames, *shape = motions.rotations.shape
+    # The rotations of the legs are written into those of the motions.
+    shift, *paths = foot_placement.place_grids(plans, motions.rotations.reshape(-1, *shape))
+    roots = motions.root_position + shift.reshape(count, frames, 3)
+    before, after = (path.reshape(count, frames, -1, 3) for path in paths)
+    skate_before, skate = (
+        walking_crowd.measure_skate_of_feet(session.card, feet, plan.rate).mean(axis=1)
+        for feet in (before, after)
+    )
+    feet = StandingFeet(
+        skate_before,
+        skate,
+        np.array(foot_placement.largest_drifts(plans, list(after))),
+        np.array([(walker.lowered - walker.followed).max() for walker in plans]),
+    )
+    return replace(motions, root_position=roots.astype(np.float32), feet=feet)
 
 
-def _placed_feet(
-    session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule, made: Motions
-) -> WalkersFeet:
-    """Return where the feet of predicted motions are placed."""
+def _plan_feet(
+    session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule, motions: Motions
+) -> list[FeetPlan]:
     card = session.card
     choice = choose_legs(card)
-    contacts = [foot_contacts(card)[place] for place in choice.feet]
-    places = [card.contacts.index(own) for own in contacts]
-    likely = contact_probabilities(session, plan, who, shown)[..., places]
-    doubles = (made.bone_offsets, made.rotations, made.root_position)
+    contacts = [foot_contacts(card)[index] for index in choice.feet]
+    columns = [card.contacts.index(contact) for contact in contacts]
+    likely = contact_probabilities(session, plan, who, shown)[..., columns]
+    doubles = (motions.bone_offsets, motions.rotations, motions.root_position)
     bones, rotations, roots = (part.astype(np.float64) for part in doubles)
-    walkers = Walkers(card.skeleton.parents, bones, rotations, roots, plan.rate)
-    return walkers_feet.stand(walkers, choice.character.legs, contacts, likely)
+    return body_plans.plan_motions(
+        [
+            PlanRequest(
+                replace(choice.character, bones=bones[walker]),
+                SampledMotion(rotations[walker], roots[walker], plan.rate),
+                contacts,
+                likely[walker],
+            )
+            for walker in range(len(bones))
+        ]
+    )
 
 
 def contact_probabilities(
@@ -345,11 +362,3 @@ def _contacts_at_levels(
             session, plan.controls[pair], labels, plan.phases[pair], level
         )
     return found
-
-
-def _describe(card: ModelCard, placed: WalkersFeet, rate: float) -> StandingFeet:
-    before, after = (
-        walking_crowd.measure_skate_of_feet(card, paths, rate).mean(axis=1)
-        for paths in (placed.before, placed.after)
-    )
-    return StandingFeet(before, after, placed.drift, placed.lowered)

@@ -65,8 +65,9 @@ def alternating():
 
 def placed(motion, plan):
     times = np.arange(FRAMES) / RATE
-    found = foot_placement.place_feet(plan, times, motion.rotations, motion.roots)
-    return SampledMotion(found.rotations, found.roots, RATE)
+    return SampledMotion(
+        *foot_placement.place_feet(plan, times, motion.rotations, motion.roots), RATE
+    )
 
 
 def test_four_feet_stand_and_step():
@@ -80,9 +81,9 @@ def test_four_feet_stand_and_step():
         for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
             apart = feet[stance.begin : stance.end, foot] - anchor
             assert np.abs(apart).max() < 1e-9
-    (told,) = foot_placement.foot_paths([plan])
-    assert np.abs(told.after - feet).max() < 1e-9
-    assert np.abs(told.before - feet_of(motion)).max() < 1e-9
+    ((before, after),) = foot_placement.foot_paths([plan])
+    assert np.abs(after - feet).max() < 1e-9
+    assert np.abs(before - feet_of(motion)).max() < 1e-9
 
 
 def test_only_limbs_above_the_wanted_joints_are_turned():
@@ -90,12 +91,14 @@ def test_only_limbs_above_the_wanted_joints_are_turned():
     plan = body_plans.plan_feet(body(), motion, [contact(motion, foot) for foot in FEET])
     whole = placed(motion, plan)
     wanted = {FEET[1], len(PARENTS) - 1}
-    found = foot_placement.place_feet(plan, times, motion.rotations, motion.roots, wanted)
-    assert np.array_equal(found.roots, whole.roots)
-    own = feet_of(SampledMotion(found.rotations, found.roots, RATE))
+    some = SampledMotion(
+        *foot_placement.place_feet(plan, times, motion.rotations, motion.roots, wanted), RATE
+    )
+    assert np.array_equal(some.roots, whole.roots)
+    own = feet_of(some)
     assert np.array_equal(own[:, 1], feet_of(whole)[:, 1])
     # The other legs are as predicted.
-    assert np.array_equal(found.rotations[:, :4], motion.rotations[:, :4])
+    assert np.array_equal(some.rotations[:, :4], motion.rotations[:, :4])
     assert not np.array_equal(whole.rotations[:, :4], motion.rotations[:, :4])
 
 
@@ -148,16 +151,16 @@ def test_feet_are_tilted_as_the_floor_is():
     height = skeleton.positions(parents, rotations, skeleton.translations(bones, motion.roots))
     known = [FootContact(ball, float(height[0, ball, 1]), 0.3, 0.5, 0.05) for ball in balls]
     plan = body_plans.plan_feet(character, whole, known, alternating(), floor)
-    found = foot_placement.place_feet(plan, np.arange(FRAMES) / RATE, whole.rotations, whole.roots)
-    moved = skeleton.translations(bones, found.roots)
-    after = skeleton.positions(parents, found.rotations, moved)
+    times = np.arange(FRAMES) / RATE
+    turned, roots = foot_placement.place_feet(plan, times, whole.rotations, whole.roots)
+    after = skeleton.positions(parents, turned, skeleton.translations(bones, roots))
     for leg, ball in zip(FEET, balls, strict=True):
         arm = after[:, ball] - after[:, leg]
         assert arm == pytest.approx(
             np.tile(floor.tilted(height[0, ball] - height[0, leg]), (FRAMES, 1)), abs=1e-9
         )
-    (told,) = foot_placement.foot_paths([plan])
-    assert np.abs(told.after - after[:, list(balls)]).max() < 1e-9
+    ((_, paths),) = foot_placement.foot_paths([plan])
+    assert np.abs(paths - after[:, list(balls)]).max() < 1e-9
 
 
 def test_a_floor_out_of_reach_of_a_fixed_body_is_told():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from passages import character, smooth
 
-from posefield.feet.foot_placement import PlacedFrames
 from posefield.performance import join_quality, joins
 from posefield.performance.join_quality import CutFacts, JoinFacts, UsualMotion
+from posefield.performance.passage import Passage
 
 CUT = CutFacts(0.05, 0.02, "dead", UsualMotion(4.0, "captured"))
 EASY = JoinFacts(CUT, 8.0)
@@ -21,8 +21,7 @@ def judged(before, after, kind):
     found = join_quality.usual_acceleration(character(), [before, after])
     usual = UsualMotion(found, "synthesised")
     facts = join_quality.describe_cut((before, after), cut, kind, usual)
-    sent = PlacedFrames(joined.rotations, joined.roots)
-    (judgement,) = join_quality.judge(character(), [(cut.exit, facts)], sent)
+    (judgement,) = join_quality.judge(character(), [(cut.exit, facts)], joined)
     return judgement
 
 
@@ -39,7 +38,8 @@ def twitching(frame, frames=160):
     still = smooth(1, 1)
     rotations = np.repeat(still.rotations, frames, axis=0)
     rotations[frame] = smooth(2, 1).rotations[0]
-    return PlacedFrames(rotations, np.repeat(still.roots, frames, axis=0))
+    roots = np.repeat(still.roots, frames, axis=0)
+    return Passage(rotations, roots, np.zeros((frames, 0)), np.zeros(frames))
 
 
 def test_an_act_that_is_faster_than_captured_clips_is_told():

@@ -45,9 +45,9 @@ def slides(passage):
         passage.contacts,
     )
     times = np.arange(len(passage)) / RATE
-    placed = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
-    moved = skeleton.translations(character().bones, placed.roots)
-    feet = skeleton.positions(PARENTS, placed.rotations, moved)[:, list(FEET)]
+    turned, roots = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
+    moved = skeleton.translations(character().bones, roots)
+    feet = skeleton.positions(PARENTS, turned, moved)[:, list(FEET)]
     found = []
     for foot, steps in enumerate(plan.steps):
         for stance in steps.stances:
