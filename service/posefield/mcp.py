@@ -101,9 +101,9 @@ class Toolbox:
         arguments, and FileError if the file cannot be written.
         """
         if name not in self.tools:
-            known = ", ".join(self.tools)
+            names = ", ".join(self.tools)
             hint = did_you_mean(name, self.tools)
-            raise InvalidField("", f"no tool {name!r}{hint}, expected one of {known}")
+            raise InvalidField("", f"no tool {name!r}{hint}, expected one of {names}")
         return self.tools[name].call(arguments)
 
     def list_models(self, arguments: Mapping[str, Any]) -> Facts:
@@ -119,9 +119,9 @@ class Toolbox:
 
     def perform(self, arguments: Mapping[str, Any]) -> Facts:
         """Write a performance to a file; return its path and its report."""
-        asked = json_decoding.convert_question(FileRequest, arguments)
-        path = self.folder / _file_name(asked.file)
-        encoder, question = CLIP_ENCODERS[path.suffix[1:]], asked.script
+        request = json_decoding.convert_question(FileRequest, arguments)
+        path = self.folder / _file_name(request.file)
+        encoder, question = CLIP_ENCODERS[path.suffix[1:]], request.script
         with errors_under("script"):
             convention = encoder.convention(question.unit, question.up, question.body)
         script = self._resolve(question)
@@ -141,9 +141,9 @@ def _file_name(name: str) -> str:
         raise InvalidField("file", f"{name[:100]!r}, expected a name without folders")
     ending = Path(name).suffix[1:]
     if ending not in CLIP_ENCODERS:
-        known = ", ".join(CLIP_ENCODERS)
+        formats = ", ".join(CLIP_ENCODERS)
         hint = did_you_mean(ending, CLIP_ENCODERS)
-        raise InvalidField("file", f"{name!r} ends in none of {known}{hint}")
+        raise InvalidField("file", f"{name!r} ends in none of {formats}{hint}")
     return name
 
 
@@ -153,13 +153,13 @@ def _model_facts(model: Synthesizer) -> Facts:
     kind = "walk" if walks else "none" if card.cyclic else "act"
     controls = [
         {
-            "name": own.name,
-            "unit": own.unit,
-            "minimum": own.minimum,
-            "maximum": own.maximum,
-            "description": own.description,
+            "name": control.name,
+            "unit": control.unit,
+            "minimum": control.minimum,
+            "maximum": control.maximum,
+            "description": control.description,
         }
-        for own in card.controls
+        for control in card.controls
     ]
     return {
         "name": model.name,
@@ -170,7 +170,7 @@ def _model_facts(model: Synthesizer) -> Facts:
         "controls": controls,
         "event": card.event is not None,
         "joints": list(card.skeleton.names),
-        "labels": {own.name: list(own.names) for own in card.labels},
+        "labels": {label_set.name: list(label_set.names) for label_set in card.labels},
     }
 
 
@@ -277,9 +277,9 @@ def server(box: Toolbox) -> Server[Any]:
     )
 
 
-async def _serve(made: Server[Any]) -> None:
+async def _serve(server: Server[Any]) -> None:
     async with stdio_server() as (incoming, outgoing):
-        await made.run(incoming, outgoing, made.create_initialization_options())
+        await server.run(incoming, outgoing, server.create_initialization_options())
 
 
 def _described(tool: AgentTool) -> Tool:
@@ -297,12 +297,12 @@ def _described(tool: AgentTool) -> Tool:
 def _result(box: Toolbox, name: str, arguments: dict[str, Any]) -> CallToolResult:
     """Return the result of a tool, or what is wrong with its arguments, for the agent to mend."""
     try:
-        found = box.call(name, arguments)
+        answer = box.call(name, arguments)
     except MotionError as fault:
         text = TextContent(text=error_text(fault))
         return CallToolResult(content=[text], is_error=True)
-    text = TextContent(text=orjson.dumps(found).decode())
-    return CallToolResult(content=[text], structured_content=found)
+    text = TextContent(text=orjson.dumps(answer).decode())
+    return CallToolResult(content=[text], structured_content=answer)
 
 
 def error_text(fault: MotionError) -> str:

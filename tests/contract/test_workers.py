@@ -31,7 +31,7 @@ async def block_the_loop(request):
     time.sleep(100)
 own = socket.create_server(("127.0.0.1", 0))
 line = StartAnnouncement("at http://127.0.0.1:%d" % own.getsockname()[1], threading.Semaphore(1))
-beside = partial(lifespan, shelf=ReloadingRegistry([], VersionLimits()), announcement=line)
+beside = partial(lifespan, models=ReloadingRegistry([], VersionLimits()), announcement=line)
 handlers = {**OPERATIONS, "listModels": block_the_loop}
 settings = Settings(unresponsive=2)
 agreed = contract.load_contract()

@@ -95,11 +95,11 @@ def _program() -> Callable[[], Any]:
 
 def _missing(module: str) -> str:
     """Return the message for a missing module: all missing ones of its extra, and the pip line."""
-    own = [extra for extra, modules in EXTRAS.items() if module.partition(".")[0] in modules]
-    if not own:
+    extras = [extra for extra, modules in EXTRAS.items() if module.partition(".")[0] in modules]
+    if not extras:
         return f"needs {module}, which posefield installs: pip install posefield"
-    absent = [name for name in EXTRAS[own[0]] if not find_spec(name)]
-    return f'needs {", ".join(absent)}: pip install "posefield[{own[0]}]"'
+    absent = [name for name in EXTRAS[extras[0]] if not find_spec(name)]
+    return f'needs {", ".join(absent)}: pip install "posefield[{extras[0]}]"'
 
 
 def _list_training() -> None:

@@ -23,7 +23,7 @@ from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import clips, poses
 
 
-@with_question_options(PoseQuestion, usual={"times": [0.0]})
+@with_question_options(PoseQuestion, default_values={"times": [0.0]})
 def pose(model: ModelPath, question: PoseQuestion, json: Json = False) -> None:
     """Print the poses at one or more times as JSON.
 
@@ -42,7 +42,7 @@ def clip(
         Path, typer.Option("--output", "-o", help="output file; its extension selects the format")
     ],
     question: FileQuestion,
-    whom: CharacterOptions,
+    character: CharacterOptions,
     json: Json = False,
 ) -> None:
     """Write a clip to a file: USD, glTF, BVH or numbers.
@@ -52,17 +52,17 @@ def clip(
     animate its nodes, others have its skeleton. Blender plays USD files at the scene's frame rate,
     24 by default: write them with --fps 24, or set the scene's rate.
     """
-    found, opened = encoder_for(output), open_model(model)
-    delivery = whom.delivery(found, question, output)
+    encoder, opened = encoder_for(output), open_model(model)
+    delivery = character.delivery(encoder, question, output)
     if delivery is None:
-        convention = found.convention(question.unit, question.up, question.body)
-        answer = found.noted(clips.synthesize_clip(opened, question))
-        content = found.encode(answer, convention)
+        convention = encoder.convention(question.unit, question.up, question.body)
+        answer = encoder.noted(clips.synthesize_clip(opened, question))
+        content = encoder.encode(answer, convention)
     else:
         card = opened.session.card
         delivery.check(question, card.skeleton, card.roles)
         predicted = clips.synthesize_clip(opened, question)
-        answer = found.noted(delivery.clip(predicted, question, card.roles))
+        answer = encoder.noted(delivery.clip(predicted, question, card.roles))
         content = delivery.encode(answer)
     atomic_files.write(content, output)
     print_warnings(answer.trust)
@@ -72,7 +72,7 @@ def clip(
 DEFAULT_COUNT = 500
 
 
-@with_question_options(WalkQuestion, usual={"seconds": 10.0}, without={"count"})
+@with_question_options(WalkQuestion, default_values={"seconds": 10.0}, without={"count"})
 def crowd(
     model: ModelPath,
     output: Annotated[
@@ -104,6 +104,6 @@ def crowd(
     if paths and count is not None:
         raise InvalidField("count", f"{count}, expected none: every path has one character")
     question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
-    asked = walking_crowd.from_question(question, crowd_files.routes(paths) if paths else ())
-    facts = crowd_files.write_crowd(open_model(model), asked, question, output)
+    order = walking_crowd.from_question(question, crowd_files.routes(paths) if paths else ())
+    facts = crowd_files.write_crowd(open_model(model), order, question, output)
     typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

@@ -117,9 +117,11 @@ def export(
     """
     content = checked_file.read(model)
     opened = model_registry.open_model(model.stem, model, content)
-    asked = SourceOptions(rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed)
-    source = open_source(asked, Defaults(rows.form, question), opened)
-    found = layouts.find_layout(execution.layout)
+    source_options = SourceOptions(
+        rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed
+    )
+    source = open_source(source_options, Defaults(rows.form, question), opened)
+    layout = layouts.find_layout(execution.layout)
     character = _character(output, execution)
     if character is not None:
         chunks.check_character_model(opened.session.card)
@@ -128,7 +130,7 @@ def export(
         hashlib.sha256(content).hexdigest(),
         source.digest,
         execution.layout,
-        found.chunk if execution.chunk is None else execution.chunk,
+        layout.chunk if execution.chunk is None else execution.chunk,
         question.unit,
         question.up,
         question.names,
@@ -136,11 +138,11 @@ def export(
         question.body,
         () if character is None else character.facts,
     )
-    part = Shard.parse(execution.shard)
-    place = _absolute(output) if execution.scheduler else output
+    shard = Shard.parse(execution.shard)
+    target = _absolute(output) if execution.scheduler else output
     with _runner(execution) as runner, ExportMonitor() as monitor:
-        work = WorkerInput(job, content, place, execution.skip_errors, character)
-        outcome = run.run(work, source, monitor, runner, part, execution.verify)
+        work = WorkerInput(job, content, target, execution.skip_errors, character)
+        outcome = run.run(work, source, monitor, runner, shard, execution.verify)
     _finish(output, outcome, monitor, execution.verify, json)
 
 
@@ -205,13 +207,13 @@ class ExportMonitor:
         for number in (signal.SIGINT, signal.SIGTERM):
             self._stack.callback(signal.signal, number, signal.signal(number, self._receive))
 
-    def advance(self, part: ChunkResult) -> None:
+    def advance(self, chunk: ChunkResult) -> None:
         """Show that a chunk is finished, and the first of the rows that were skipped."""
-        for fault in part.skipped[: max(MAX_KEPT_FAULTS - self._skipped, 0)]:
+        for fault in chunk.skipped[: max(MAX_KEPT_FAULTS - self._skipped, 0)]:
             self.note(f"skipped: {fault.place}: {fault.message}")
-        self._skipped += len(part.skipped)
-        self._done += part.clips + len(part.skipped)
-        self._bar.advance(part.clips + len(part.skipped))
+        self._skipped += len(chunk.skipped)
+        self._done += chunk.clips + len(chunk.skipped)
+        self._bar.advance(chunk.clips + len(chunk.skipped))
 
     def note(self, message: str) -> None:
         """Print a line on standard error."""
@@ -238,33 +240,33 @@ class ExportMonitor:
 
 
 def _finish(
-    place: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool, json: bool
+    target: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool, json: bool
 ) -> None:
     """Print the outcome; exit with the code that shells expect after a signal."""
     if json:
         facts = {
-            "target": place,
+            "target": target,
             "rows": outcome.rows,
             "done": outcome.done,
             "seconds": monitor.seconds,
             "export": outcome.facts,
         }
         typer.echo(as_json(facts))
-    typer.echo(_summary(place, outcome, monitor, verify), err=json)
+    typer.echo(_summary(target, outcome, monitor, verify), err=json)
     if monitor.signal and outcome.done < outcome.rows:
         raise typer.Exit(128 + monitor.signal)
 
 
-def _summary(place: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool) -> str:
+def _summary(target: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool) -> str:
     if outcome.done < outcome.rows:
         return (
-            f"{place}: stopped when {outcome.done} of {outcome.rows} clips were finished; the same "
-            "command resumes the export"
+            f"{target}: stopped when {outcome.done} of {outcome.rows} clips were finished; the "
+            "same command resumes the export"
         )
     if outcome.facts is None:
-        return f"{place}: clips of this part: {outcome.rows}, all finished; other parts are not"
+        return f"{target}: clips of this part: {outcome.rows}, all finished; other parts are not"
     facts = outcome.facts
-    text = f"{place}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
+    text = f"{target}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
         text += f", with a warning in the manifest: {facts['warned']}"
     if facts["skipped"]:

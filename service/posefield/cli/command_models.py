@@ -52,7 +52,7 @@ class LocalModel:
             ],
             "clips": self.card.samples,
             "performers": list(self.card.performers),
-            "labels": {own.name: list(own.names) for own in self.card.labels},
+            "labels": {label_set.name: list(label_set.names) for label_set in self.card.labels},
             "bytes": self.size,
             "licence": self.licence,
             "file": self.file.location,
@@ -72,11 +72,12 @@ class LocalModel:
 
 
 def models(
-    places: Annotated[
+    sources: Annotated[
         list[str] | None,
         typer.Argument(
             help="model files, folders with model files, or URLs of object stores, which are "
             "listed after the shipped models",
+            metavar="PLACES",
             show_default=False,
         ),
     ] = None,
@@ -86,13 +87,13 @@ def models(
 
     A file that is no model is named on standard error, and the exit code is then 3.
     """
-    listed = list(_listed([str(model_registry.SHIPPED_FOLDER), *(places or ())]))
-    found = [one for one in listed if isinstance(one, LocalModel)]
+    listed = list(_listed([str(model_registry.SHIPPED_FOLDER), *(sources or ())]))
+    local_models = [one for one in listed if isinstance(one, LocalModel)]
     faults = [one for one in listed if isinstance(one, ModelError)]
     if json:
-        typer.echo(as_json([model.facts() for model in found]))
+        typer.echo(as_json([model.facts() for model in local_models]))
     else:
-        typer.echo(_table([HEADING, *(model.cells() for model in found)]))
+        typer.echo(_table([HEADING, *(model.cells() for model in local_models)]))
         typer.echo(f"origin and licences of the shipped models: {model_registry.NOTICE}")
     for fault in faults:
         typer.echo(f"posefield: {fault}", err=True)
@@ -100,11 +101,11 @@ def models(
         raise typer.Exit(3)
 
 
-def _listed(places: list[str]) -> Iterator[LocalModel | ModelError]:
+def _listed(sources: list[str]) -> Iterator[LocalModel | ModelError]:
     """Yield the models of places in order, or the error of a place or file."""
-    for place in places:
+    for source in sources:
         try:
-            files = model_registry.open_source(place)()
+            files = model_registry.open_source(source)()
         except ModelError as fault:
             yield fault
             continue
@@ -160,7 +161,10 @@ def _summary(plain: dict[str, Any]) -> str:
         *map(_curve, plain.get("curves", [])),
         *_contacts(plain),
         *_accelerations(plain),
-        *(f"{own['name']}s: {', '.join(own['names'])}" for own in plain["labels"]),
+        *(
+            f"{label_set['name']}s: {', '.join(label_set['names'])}"
+            for label_set in plain["labels"]
+        ),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),
     ]
@@ -184,36 +188,38 @@ def _curve(plain: dict[str, Any]) -> str:
 def _contacts(plain: dict[str, Any]) -> list[str]:
     """Return a line on each joint with contacts, and one on the accuracy of the contacts."""
     names, accuracy = plain["skeleton"]["names"], plain["diagnostics"].get("contacts")
-    found = [
-        f"contacts of {names[own['joint']]}: {100 * own['height']:.1f} cm high, swings of "
-        f"{own['swing']:.2f} s, at most {own['longest_swing']:.2f} s in nine of ten, lifted by "
-        f"{100 * own['clearance']:.1f} cm"
-        for own in plain.get("contacts", [])
+    texts = [
+        f"contacts of {names[contact['joint']]}: {100 * contact['height']:.1f} cm high, swings of "
+        f"{contact['swing']:.2f} s, at most {contact['longest_swing']:.2f} s in nine of ten, "
+        f"lifted by {100 * contact['clearance']:.1f} cm"
+        for contact in plain.get("contacts", [])
     ]
     if accuracy:
-        found.append(
+        texts.append(
             f"contacts of clips left out: {accuracy['agreement']:.0%} of frames agree, Brier score "
             f"{accuracy['brier']:.3f}, {accuracy['climatology']:.3f} by the mean of the others"
         )
-    return found
+    return texts
 
 
 def _accelerations(plain: dict[str, Any]) -> list[str]:
     """Return a line on the accelerations of the captured clips, if the card has them."""
-    own = plain.get("captured_acceleration")
-    if own is None:
+    facts = plain.get("captured_acceleration")
+    if facts is None:
         return []
     return [
         "accelerations of the joints relative to the root in the captured clips: median "
-        f"{own['median']:.1f} m/s², 99th percentile {own['p99']:.1f} m/s²"
+        f"{facts['median']:.1f} m/s², 99th percentile {facts['p99']:.1f} m/s²"
     ]
 
 
 def _control(plain: dict[str, Any], joints: list[str]) -> str:
     """Return one line on a control: its sampled range, its description and its measure."""
     span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
-    own = plain.get("measure")
-    how = f" (measured: {measures.describe(measures.from_dict(own), joints)})" if own else ""
+    measure = plain.get("measure")
+    how = (
+        f" (measured: {measures.describe(measures.from_dict(measure), joints)})" if measure else ""
+    )
     return f"  {plain['name']}: {span}, {plain['description']}{how}"
 
 
@@ -223,10 +229,10 @@ def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
 
     Each clip has its distance, and its weight in the answer.
     """
-    found = find_reasons(open_model(model), question)
-    print_warnings(found)
+    answer = find_reasons(open_model(model), question)
+    print_warnings(answer)
     as_text = model_tables.explanation_text
-    typer.echo(as_json(model_tables.explanation(found)) if json else as_text(found))
+    typer.echo(as_json(model_tables.explanation(answer)) if json else as_text(answer))
 
 
 @with_question_options(SuggestQuestion)
@@ -245,8 +251,8 @@ def suggest(
 ) -> None:
     """List the clips to capture next, the most useful first."""
     synthesizer = open_model(model)
-    given = rows.points(candidates, synthesizer) if candidates else None
+    points = rows.points(candidates, synthesizer) if candidates else None
     with LateProgress("points", question.count) as bar:
-        found = find_suggestions(synthesizer, question, given, bar.update)
+        answer = find_suggestions(synthesizer, question, points, bar.update)
     as_text = model_tables.suggestions_text
-    typer.echo(as_json(model_tables.suggestions(found)) if json else as_text(found))
+    typer.echo(as_json(model_tables.suggestions(answer)) if json else as_text(answer))

@@ -122,26 +122,29 @@ def perform(
         if getattr(many, option) not in (None, False):
             raise InvalidField(option, "given for one script, expected a folder or a .jsonl file")
     if one.plan == (one.output is not None):
-        found = "neither --output nor --plan" if one.output is None else "--output and --plan"
-        raise InvalidField("output", f"{found}, expected one of them")
+        options = "neither --output nor --plan" if one.output is None else "--output and --plan"
+        raise InvalidField("output", f"{options}, expected one of them")
     if one.plan and one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --plan, expected with an output file")
-    asked = json_decoding.decode_question(PerformanceQuestion, _read(script))
+    script_question = json_decoding.decode_question(PerformanceQuestion, _read(script))
     find = model_registry.with_shipped(model or []).find
     if one.output is None:
         one.refuse("with --plan, expected with an output file")
-        report = composition.plan(resolve_script(asked, find), MAX_FRAMES)
+        report = composition.plan(resolve_script(script_question, find), MAX_FRAMES)
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
     path = Path(one.output)
-    answer, content = _performed(asked, find, path, one)
+    answer, content = _performed(script_question, find, path, one)
     atomic_files.write(content, path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
 
 
 def _performed(
-    asked: PerformanceQuestion, find: "Callable[[str], Synthesizer]", path: Path, one: OneArguments
+    script_question: PerformanceQuestion,
+    find: "Callable[[str], Synthesizer]",
+    path: Path,
+    one: OneArguments,
 ) -> tuple[PerformanceAnswer, bytes]:
     """Return the performance of a script, and its file, whose format is known before models are."""
     from posefield.performance import composition
@@ -149,7 +152,7 @@ def _performed(
 
     form = encoder_for(path)
     encode = performance_files.encoder(form, one.layout)
-    script = resolve_script(asked, find)
+    script = resolve_script(script_question, find)
     question = script.question
     order = one.delivery(form, question, path)
     if order is None:
@@ -158,8 +161,8 @@ def _performed(
         return answer, encode(answer, convention)
     order.check_layout(one.layout)
     order.check(question, script.character.skeleton, script.character.roles)
-    made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
-    return made, order.encode(made)
+    performance = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
+    return performance, order.encode(performance)
 
 
 @dataclass(frozen=True)
@@ -173,9 +176,9 @@ class _Stage:
 
 def _check_stage(question: CrowdStageQuestion, many: ManyArguments) -> None:
     """Raise InvalidField for options of a crowd without one, and of files with one."""
-    usual = CrowdStageQuestion()
+    defaults = CrowdStageQuestion()
     for name in question.__struct_fields__:
-        if not many.crowd and getattr(question, name) != getattr(usual, name):
+        if not many.crowd and getattr(question, name) != getattr(defaults, name):
             raise InvalidField(name, "given without --crowd, expected only with it")
     if many.crowd and many.format is not None:
         raise InvalidField("format", "given with --crowd, expected the output's extension")
@@ -206,21 +209,23 @@ def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: 
     output = _output(one, "a folder for the files of many scripts")
     form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
     workers, rows = _workers(many), read_scripts(scripts)
-    whom = _batch_character(output, one)
-    batch = PerformanceBatch(stage.models, output, form, one.layout, whom)
+    character = _batch_character(output, one)
+    batch = PerformanceBatch(stage.models, output, form, one.layout, character)
     with ProgressBar("performances", len(rows), 0) as bar:
         outcome = run(batch, rows, workers, bar.advance)
     typer.echo(as_json(outcome.facts(output)) if stage.json else f"{output}: {outcome.sentence}")
 
 
-def _batch_character(output: str, whom: CharacterOptions) -> "UserCharacter | None":
+def _batch_character(output: str, options: CharacterOptions) -> "UserCharacter | None":
     """Return the character of many scripts, to which files in the folder of performances refer."""
     from posefield.batch import target
     from posefield.batch.scripts import FOLDER
 
     if target.URL.match(output):
-        whom.refuse("with the URL of an object store, expected a folder: files refer to its file")
-    return whom.open(Path(output) / FOLDER)
+        options.refuse(
+            "with the URL of an object store, expected a folder: files refer to its file"
+        )
+    return options.open(Path(output) / FOLDER)
 
 
 def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
@@ -250,11 +255,11 @@ def _read(script: Path) -> bytes:
 def report_text(report: PerformanceReport) -> str:
     """Return a report as lines: segments, joins, feet and warnings."""
     lines = [f"{report.duration:.2f} s, {report.frames} frames, character of {report.character}"]
-    for index, own in enumerate(report.segments):
-        name = own.model.partition("@")[0]
+    for index, segment in enumerate(report.segments):
+        name = segment.model.partition("@")[0]
         lines.append(
-            f"{index}  {own.begins:6.2f} to {own.ends:6.2f} s  {own.kind} {name}, "
-            f"give or take {100.0 * own.sigma:.1f} cm"
+            f"{index}  {segment.begins:6.2f} to {segment.ends:6.2f} s  {segment.kind} {name}, "
+            f"give or take {100.0 * segment.sigma:.1f} cm"
         )
     for join in report.joins:
         lines.append(

@@ -27,7 +27,7 @@ from posefield.registry import model_registry
 
 
 def serve(
-    places: Annotated[
+    sources: Annotated[
         list[str] | None,
         typer.Argument(
             help="model files, folders with model files, or URLs of object stores; "
@@ -52,7 +52,7 @@ def serve(
     from posefield.http.api import settings
 
     server.serve(
-        model_registry.or_shipped(places or ()), settings.read_settings(host=host, port=port)
+        model_registry.or_shipped(sources or ()), settings.read_settings(host=host, port=port)
     )
 
 
@@ -85,7 +85,7 @@ def key(
 
 
 def mcp(
-    places: Annotated[
+    sources: Annotated[
         list[Path] | None,
         typer.Argument(
             help="model files, or folders of them, besides the shipped ones",
@@ -115,7 +115,7 @@ def mcp(
 
     if not output.is_dir():
         raise FileError(output, "no folder, expected one to write files to")
-    server.serve(server.Toolbox(model_registry.with_shipped(places or ()), output.resolve()))
+    server.serve(server.Toolbox(model_registry.with_shipped(sources or ()), output.resolve()))
 
 
 SPEEDS = (0.8, 1.2, 1.6)
@@ -189,8 +189,10 @@ def _served(port: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
     Raises WorkerDied if it does not start; its message is on standard error.
     """
     command = [sys.executable, "-m", "posefield", "serve", "--host", "127.0.0.1"]
-    own = {name: text for name, text in os.environ.items() if not name.startswith("POSEFIELD_")}
-    quiet = {**own, "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "1"}
+    environment = {
+        name: text for name, text in os.environ.items() if not name.startswith("POSEFIELD_")
+    }
+    quiet = {**environment, "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "1"}
     with subprocess.Popen(
         [*command, "--port", str(port)], stdout=subprocess.PIPE, text=True, env=quiet
     ) as service:
@@ -226,5 +228,5 @@ def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:
 
 def _has_desktop() -> bool:
     """Return True if a browser would have a window; one of the terminal would take the terminal."""
-    given = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
-    return sys.platform == "darwin" or any(os.environ.get(name) for name in given)
+    variables = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in variables)

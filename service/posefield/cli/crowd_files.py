@@ -30,7 +30,7 @@ EXTENSIONS = (*usd_crowd.FILES, "npz")
 
 
 def write_crowd(
-    model: Synthesizer, asked: CrowdOrder, question: WalkQuestion, output: Path
+    model: Synthesizer, order: CrowdOrder, question: WalkQuestion, output: Path
 ) -> dict[str, Any]:
     """Write a crowd to a file, and return its report as plain values.
 
@@ -45,26 +45,26 @@ def write_crowd(
             "body", f"{question.body!r}, expected none given: npz files carry no body"
         )
     opened = gait.fit_gait(model.session)
-    made = walking_feet.build_crowd(model, opened, asked)
-    feet = _FootSkateMeter(opened, asked.fps)
-    watched = _with_progress(made, asked.motions or len(made.motion), feet)
+    crowd = walking_feet.build_crowd(model, opened, order)
+    feet = _FootSkateMeter(opened, order.fps)
+    watched = _with_progress(crowd, order.motions or len(crowd.motion), feet)
     if ending == "npz":
         motion_tables.write_npz(watched, output)
     else:
         crowd_writer.write(watched, output, question.instancing, question.body or DEFAULT_BODY)
     return {
         "file": str(output),
-        "model": made.facts["model"],
-        "characters": len(made.motion),
-        "motions": asked.motions or len(made.motion),
-        "frames": made.frames,
-        "rate": made.rate,
-        "seed": asked.seed,
-        "level_shares": made.facts["level_shares"],
-        "outside_share": made.facts["outside_share"],
-        "feet_stand": made.facts["feet_stand"],
-        "take": made.facts.get("take", {}),
-        "warnings": made.facts.get("warnings", []),
+        "model": crowd.facts["model"],
+        "characters": len(crowd.motion),
+        "motions": order.motions or len(crowd.motion),
+        "frames": crowd.frames,
+        "rate": crowd.rate,
+        "seed": order.seed,
+        "level_shares": crowd.facts["level_shares"],
+        "outside_share": crowd.facts["outside_share"],
+        "feet_stand": crowd.facts["feet_stand"],
+        "take": crowd.facts.get("take", {}),
+        "warnings": crowd.facts.get("warnings", []),
         **feet.facts(),
     }
 
@@ -118,7 +118,7 @@ class _FootSkateMeter:
         if not self.standing:
             return {}
         before, drift, lowered = (
-            100.0 * np.concatenate([getattr(own, name) for own in self.standing])
+            100.0 * np.concatenate([getattr(feet, name) for feet in self.standing])
             for name in ("skate_before", "drift", "lowered")
         )
         return {
@@ -128,17 +128,17 @@ class _FootSkateMeter:
         }
 
 
-def _with_progress(made: CrowdClip, motions: int, feet: _FootSkateMeter) -> CrowdClip:
+def _with_progress(crowd: CrowdClip, motions: int, feet: _FootSkateMeter) -> CrowdClip:
     """Return the crowd with a progress bar on standard error while its motions are computed."""
 
     def batches() -> Iterator[Motions]:
         with ProgressBar("motions", motions) as bar:
-            for batch in made.batches:
+            for batch in crowd.batches:
                 feet.measure(batch)
                 yield batch
                 bar.advance(len(batch))
 
-    return replace(made, batches=batches())
+    return replace(crowd, batches=batches())
 
 
 def report_text(facts: dict[str, Any]) -> str:

@@ -61,33 +61,39 @@ TYPED_FIELDS = (float, int, bool)
 
 
 def with_question_options(
-    form: type[Struct], usual: Mapping[str, Any] | None = None, without: Collection[str] = ()
+    form: type[Struct],
+    default_values: Mapping[str, Any] | None = None,
+    without: Collection[str] = (),
 ) -> Callable[[Command], Command]:
     """Return a decorator that builds the parameter `question` of a command from its options.
 
-    usual: defaults of fields that differ from the form's. without: fields without an option.
+    default_values: of fields that differ from the form's. without: fields without an option.
     """
-    known = [p for p in text_decoding.parameters(form).values() if p.field not in without]
-    defaults = {p.field: p.default for p in known} | dict(usual or {})
+    shown_parameters = [
+        p for p in text_decoding.parameters(form).values() if p.field not in without
+    ]
+    defaults = {p.field: p.default for p in shown_parameters} | dict(default_values or {})
 
     def decorate(command: Command) -> Command:
-        own = inspect.signature(command, eval_str=True).parameters.values()
-        first = [p for p in own if p.name != "question" and p.default is p.empty]
-        last = [p for p in own if p.default is not p.empty]
-        options = [_option(p, defaults[p.field]) for p in known]
+        signature = inspect.signature(command, eval_str=True).parameters.values()
+        first = [p for p in signature if p.name != "question" and p.default is p.empty]
+        last = [p for p in signature if p.default is not p.empty]
+        options = [_option(p, defaults[p.field]) for p in shown_parameters]
         if CONTROLS_FIELD in form.__struct_fields__ and CONTROLS_FIELD not in without:
             options.insert(0, CONTROL_OPTION)
 
         @functools.wraps(command)
-        def run(**given: Any) -> None:
-            said = {p.field: _value(p, given.pop(p.field), defaults[p.field]) for p in known}
+        def run(**values: Any) -> None:
+            fields = {
+                p.field: _value(p, values.pop(p.field), defaults[p.field]) for p in shown_parameters
+            }
             if CONTROLS_FIELD in form.__struct_fields__:
-                said[CONTROLS_FIELD] = parse_controls(given.pop("control", None) or [])
-            command(question=form(**said), **given)
+                fields[CONTROLS_FIELD] = parse_controls(values.pop("control", None) or [])
+            command(question=form(**fields), **values)
 
-        every = [p.replace(kind=p.KEYWORD_ONLY) for p in (*first, *options, *last)]
-        run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
-        run.__annotations__ = {p.name: p.annotation for p in every}
+        arguments = [p.replace(kind=p.KEYWORD_ONLY) for p in (*first, *options, *last)]
+        run.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in arguments}
         return run
 
     return decorate
@@ -98,19 +104,21 @@ def with_option_groups(command: Command) -> Command:
 
     The fields have typer's annotations, as parameters would.
     """
-    own = inspect.signature(command, eval_str=True).parameters.values()
-    groups: dict[str, Any] = {p.name: p.annotation for p in own if is_dataclass(p.annotation)}
+    signature = inspect.signature(command, eval_str=True).parameters.values()
+    groups: dict[str, Any] = {p.name: p.annotation for p in signature if is_dataclass(p.annotation)}
 
     @functools.wraps(command)
-    def run(**given: Any) -> None:
+    def run(**values: Any) -> None:
         for name, group in groups.items():
-            given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
-        command(**given)
+            values[name] = group(**{f.name: values.pop(f.name) for f in fields(group)})
+        command(**values)
 
-    every = [q for p in own for q in (_members(groups[p.name]) if p.name in groups else [p])]
-    every = [p.replace(kind=p.KEYWORD_ONLY) for p in every]
-    run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in every}
+    arguments = [
+        q for p in signature for q in (_members(groups[p.name]) if p.name in groups else [p])
+    ]
+    arguments = [p.replace(kind=p.KEYWORD_ONLY) for p in arguments]
+    run.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in arguments}
     return run
 
 
@@ -119,23 +127,23 @@ def _members(group: Any) -> list[inspect.Parameter]:
     hints = get_type_hints(group, include_extras=True)
     return [
         inspect.Parameter(
-            each.name,
+            member.name,
             inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if each.default is MISSING else each.default,
-            annotation=hints[each.name],
+            default=inspect.Parameter.empty if member.default is MISSING else member.default,
+            annotation=hints[member.name],
         )
-        for each in fields(group)
+        for member in fields(group)
     ]
 
 
 def _option(parameter: Parameter, default: Any) -> inspect.Parameter:
     kind = parameter.kind
     typed = kind in TYPED_FIELDS or get_origin(kind) is Literal
-    shown = kind if typed else str
+    shown_type = kind if typed else str
     if parameter.repeated:
-        shown = list[shown]  # type: ignore[valid-type]
+        shown_type = list[shown_type]  # type: ignore[valid-type]
     if default is None or parameter.repeated or not typed:
-        shown = shown | None
+        shown_type = shown_type | None
     unit = f", {parameter.unit}" if parameter.unit and parameter.unit not in parameter.help else ""
     flag = "--" + parameter.word.replace("_", "-")
     info = typer.Option(flag, help=parameter.help + unit, metavar=parameter.metavar)
@@ -144,23 +152,23 @@ def _option(parameter: Parameter, default: Any) -> inspect.Parameter:
         parameter.field,
         inspect.Parameter.KEYWORD_ONLY,
         default=plain,
-        annotation=Annotated[shown, info],
+        annotation=Annotated[shown_type, info],
     )
 
 
-def _value(parameter: Parameter, given: Any, default: Any) -> Any:
+def _value(parameter: Parameter, value: Any, default: Any) -> Any:
     """Return the value of a field; `given` is text where typer does not parse the field's type."""
-    if given is None or given == []:
+    if value is None or value == []:
         return default
     if parameter.field == LABELS_FIELD:
         return text_decoding.merge_labels(
-            text_decoding.parse_value(parameter, word) for word in given
+            text_decoding.parse_value(parameter, word) for word in value
         )
     if parameter.repeated and parameter.kind not in TYPED_FIELDS:
-        return tuple(text_decoding.parse_value(parameter, word) for word in given)
-    if isinstance(given, str) and get_origin(parameter.kind) is not Literal:
-        return text_decoding.parse_value(parameter, given)
-    return given
+        return tuple(text_decoding.parse_value(parameter, word) for word in value)
+    if isinstance(value, str) and get_origin(parameter.kind) is not Literal:
+        return text_decoding.parse_value(parameter, value)
+    return value
 
 
 def parse_controls(pairs: Sequence[str]) -> dict[str, float]:
@@ -214,7 +222,7 @@ class CharacterOptions:
         return user_character.open_character(self.character, reference, roles)
 
     def delivery(
-        self, form: ClipEncoder, asked: FileQuestion | PerformanceQuestion, output: Path
+        self, form: ClipEncoder, question: FileQuestion | PerformanceQuestion, output: Path
     ) -> "Delivery | None":
         """Return the delivery of answers to a file; None without a character.
 
@@ -225,7 +233,7 @@ class CharacterOptions:
             return None
         from posefield.characters import delivery
 
-        return delivery.deliver(opened, form, asked)
+        return delivery.deliver(opened, form, question)
 
     def refuse(self, reason: str) -> None:
         """Raise InvalidField with a reason if a character or roles are given."""

@@ -32,12 +32,12 @@ def written_message(path: Path, answer: ClipAnswer, json: bool) -> str:
     )
 
 
-def print_warnings(found: Trust | Explanation) -> None:
+def print_warnings(answer: Trust | Explanation) -> None:
     """Print inferred controls and warnings on standard error."""
-    if found.inferred:
-        chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)
+    if answer.inferred:
+        chosen = " ".join(f"{name}={answer.controls[name]!r}" for name in answer.inferred)
         typer.echo(f"inferred: {chosen}, most typical for what was given", err=True)
-    for warning in found.warnings:
+    for warning in answer.warnings:
         typer.echo(f"warning: {warning}", err=True)
 
 
@@ -85,6 +85,6 @@ class LateProgress(ExitStack):
             from posefield.console.progress import INTERVAL, ProgressBar
 
             interval = INTERVAL if self._interval is None else self._interval
-            made = ProgressBar(self._label, self._total, interval=interval)
-            self._bar = self.enter_context(made)
+            bar = ProgressBar(self._label, self._total, interval=interval)
+            self._bar = self.enter_context(bar)
         return self._bar

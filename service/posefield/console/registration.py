@@ -52,9 +52,9 @@ class PlainGroup(TyperGroup):
         groups = {
             name: getattr(self.commands[name], "rich_help_panel", "") for name in self.commands
         }
-        known = [name for name in groups if groups[name] in GROUPS]
-        return sorted(known, key=lambda name: GROUPS.index(groups[name])) + [
-            name for name in groups if name not in known
+        names = [name for name in groups if groups[name] in GROUPS]
+        return sorted(names, key=lambda name: GROUPS.index(groups[name])) + [
+            name for name in groups if name not in names
         ]
 
     def get_params(self, ctx: typer.Context) -> list[Any]:  # type: ignore[override]

@@ -85,8 +85,8 @@ class ClipBatcher:
         def work(answers: Sequence[ClipAnswer]) -> list[bytes]:
             return encoder.write(answers, convention)
 
-        made: bytes = await self._result((encoder.extension, convention), answer, work)
-        return made
+        content: bytes = await self._result((encoder.extension, convention), answer, work)
+        return content
 
     def _result(self, key: Hashable, item: Any, work: Work) -> "Future[Any]":
         future: Future[Any] = asyncio.get_running_loop().create_future()
@@ -108,14 +108,14 @@ class ClipBatcher:
 
 def _encoded_clips(
     model: Synthesizer,
-    most: int,
+    longest: int,
     encoder: ClipEncoder,
     convention: Convention,
-    asked: Sequence[ClipQuestion],
+    questions: Sequence[ClipQuestion],
 ) -> list[EncodedClip | Exception]:
-    answers = clips.synthesize_clips(model, asked, most)
-    made = [answer for answer in answers if isinstance(answer, ClipAnswer)]
-    files = iter(encoder.write(made, convention))
+    answers = clips.synthesize_clips(model, questions, longest)
+    clip_answers = [answer for answer in answers if isinstance(answer, ClipAnswer)]
+    files = iter(encoder.write(clip_answers, convention))
     return [
         answer if isinstance(answer, Exception) else EncodedClip(answer, next(files))
         for answer in answers
@@ -129,14 +129,14 @@ def _uncancelled_context() -> Context:
     return context
 
 
-async def _work_batch(work: Work, own: Pending) -> None:
-    wanted = [(item, future) for item, future in own if not future.done()]
+async def _work_batch(work: Work, batch: Pending) -> None:
+    open_items = [(item, future) for item, future in batch if not future.done()]
     try:
-        items = [item for item, _ in wanted]
-        results = await to_thread.run_sync(work, items) if wanted else []
+        items = [item for item, _ in open_items]
+        results = await to_thread.run_sync(work, items) if open_items else []
     except Exception as fault:
-        results = [fault] * len(wanted)
-    for (_, future), result in zip(wanted, results, strict=True):
+        results = [fault] * len(open_items)
+    for (_, future), result in zip(open_items, results, strict=True):
         if future.done():
             continue
         if isinstance(result, Exception):
@@ -158,7 +158,7 @@ class PoseBatcher:
         self._waiting: dict[tuple[str, int], tuple[Synthesizer, PendingPoses]] = {}
         self._arrived = self._previous = 0
 
-    async def row(self, model: Synthesizer, asked: PreparedPoseQuestion) -> OutputRow:
+    async def row(self, model: Synthesizer, question: PreparedPoseQuestion) -> OutputRow:
         """Return the graph's output for a question; the batch does not affect its bytes.
 
         A question is batched if it is for one time, the model's level is exact in batches, and the
@@ -167,12 +167,12 @@ class PoseBatcher:
         self._count_arrival()
         if (
             self._previous < 2
-            or len(asked.when) > 1
-            or not poses.is_batch_exact(model, asked.level)
+            or len(question.when) > 1
+            or not poses.is_batch_exact(model, question.level)
         ):
             metrics.count_inference(1)
-            return poses.run_batch(model, [asked])[0]
-        return await self._enqueue(model, asked)
+            return poses.run_batch(model, [question])[0]
+        return await self._enqueue(model, question)
 
     def _count_arrival(self) -> None:
         """Count the questions of an iteration, which predict the number in the next one."""
@@ -183,32 +183,32 @@ class PoseBatcher:
     def _end_iteration(self) -> None:
         self._previous, self._arrived = self._arrived, 0
 
-    def _enqueue(self, model: Synthesizer, asked: PreparedPoseQuestion) -> "Future[OutputRow]":
+    def _enqueue(self, model: Synthesizer, question: PreparedPoseQuestion) -> "Future[OutputRow]":
         loop = asyncio.get_running_loop()
         if not self._waiting:
             loop.call_soon(self._evaluate_batches)
         # Keyed by identity: requests may be for two versions of a model at the same time.
-        key = model.identity, asked.level
+        key = model.identity, question.level
         future: Future[OutputRow] = loop.create_future()
-        self._waiting.setdefault(key, (model, []))[1].append((asked, future))
+        self._waiting.setdefault(key, (model, []))[1].append((question, future))
         return future
 
     def _evaluate_batches(self) -> None:
         waiting, self._waiting = self._waiting, {}
-        for model, own in waiting.values():
-            for first in range(0, len(own), MAX_POSES):
-                _evaluate_batch(model, own[first : first + MAX_POSES])
+        for model, pending in waiting.values():
+            for first in range(0, len(pending), MAX_POSES):
+                _evaluate_batch(model, pending[first : first + MAX_POSES])
 
 
-def _evaluate_batch(model: Synthesizer, own: PendingPoses) -> None:
-    metrics.count_inference(len(own))
+def _evaluate_batch(model: Synthesizer, pending: PendingPoses) -> None:
+    metrics.count_inference(len(pending))
     try:
-        rows = poses.run_batch(model, [asked for asked, _ in own])
+        rows = poses.run_batch(model, [question for question, _ in pending])
     except Exception as fault:
-        for _, future in own:
+        for _, future in pending:
             if not future.done():
                 future.set_exception(fault)
         return
-    for (_, future), row in zip(own, rows, strict=True):
+    for (_, future), row in zip(pending, rows, strict=True):
         if not future.done():
             future.set_result(row)

@@ -93,15 +93,15 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     detail: bool = False
 
 
-def of_body(content: bytes, most: float) -> CrowdQuestion:
+def of_body(content: bytes, largest: float) -> CrowdQuestion:
     """Return the question of a JSON body.
 
-    most: maximum number of characters. Raises FormError for a malformed body, InvalidField for
+    largest: maximum number of characters. Raises FormError for a malformed body, InvalidField for
     invalid values and RequestError 413 for too many values.
     """
-    _check_values(content, most)
+    _check_values(content, largest)
     body = bodies.decode_question(CrowdBody, content)
-    count = _count(body, most)
+    count = _count(body, largest)
     performers, performer = _distinct(body.performer, count)
     return CrowdQuestion(
         {name: _column(values, count) for name, values in body.controls.items()},
@@ -113,19 +113,22 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
         body.root,
         body.extrapolate,
         _blending(body, count),
-        {name: LabelColumn(*_distinct(given, count)) for name, given in body.labels.items()},
+        {
+            name: LabelColumn(*_distinct(label_values, count))
+            for name, label_values in body.labels.items()
+        },
         _takes(body, count),
     )
 
 
-def _check_values(content: bytes, most: float) -> None:
+def _check_values(content: bytes, largest: float) -> None:
     """Raise RequestError for more values than a valid body has: decoded, each takes 32 bytes."""
-    found, limit = content.count(b","), VALUES * max(most, FEWEST)
-    if found > limit:
-        raise RequestError(BODY_TOO_LARGE, f"{found} values, expected at most {limit:.0f}")
+    count, limit = content.count(b","), VALUES * max(largest, FEWEST)
+    if count > limit:
+        raise RequestError(BODY_TOO_LARGE, f"{count} values, expected at most {limit:.0f}")
 
 
-def _count(body: CrowdBody, most: float) -> int:
+def _count(body: CrowdBody, largest: float) -> int:
     """Return the number of characters; raises InvalidField for lists of different lengths."""
     fields = {f"controls/{name}": values for name, values in body.controls.items()} | {
         name: getattr(body, name) for name in CrowdBody.__struct_fields__ if name != "controls"
@@ -134,8 +137,8 @@ def _count(body: CrowdBody, most: float) -> int:
     sizes = {name: len(values) for name, values in fields.items() if isinstance(values, list)}
     first, count = next(iter(sizes.items()), ("", 1))
     for name, size in sizes.items():
-        if not 1 <= size <= most:
-            raise InvalidField(name, f"{size} characters, expected 1 to {most:.0f}")
+        if not 1 <= size <= largest:
+            raise InvalidField(name, f"{size} characters, expected 1 to {largest:.0f}")
         if size != count:
             raise InvalidField(name, f"{size} characters, expected {count} as in {first}")
     return count
@@ -144,28 +147,30 @@ def _count(body: CrowdBody, most: float) -> int:
 def _column(values: Numbers, count: int) -> Floats:
     """Return the values (N,)."""
     # np.fromiter takes two thirds of the time of np.array. Adding 0.0 turns -0 into 0.
-    given = (
+    column = (
         np.fromiter(values, float, count) if isinstance(values, list) else np.full(count, values)
     )
-    return given + 0.0
+    return column + 0.0
 
 
-def _positions(given: list[tuple[float, float, float]] | None, count: int) -> Floats:
-    if given is None:
+def _positions(positions: list[tuple[float, float, float]] | None, count: int) -> Floats:
+    if positions is None:
         return np.zeros((count, 3))
     # np.fromiter takes half the time of np.array for tuples.
-    return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3) + 0.0
+    return (
+        np.fromiter(chain.from_iterable(positions), float, 3 * len(positions)).reshape(-1, 3) + 0.0
+    )
 
 
-def _distinct(given: Any, count: int) -> tuple[tuple[Any, ...], Indices]:
+def _distinct(labels: Any, count: int) -> tuple[tuple[Any, ...], Indices]:
     """Return the distinct labels and the index (N,) of each character's label."""
-    if not isinstance(given, list):
-        return (given,), np.zeros(count, dtype=np.int64)
+    if not isinstance(labels, list):
+        return (labels,), np.zeros(count, dtype=np.int64)
     # Weights are dicts, which have no hash; their text has quotes, as that of a name.
-    values = {repr(label): label for label in given}
-    places = {key: place for place, key in enumerate(values)}
-    index = (places[repr(label)] for label in given)
-    return tuple(values.values()), np.fromiter(index, np.int64, len(given))
+    values = {repr(label): label for label in labels}
+    indices = {key: number for number, key in enumerate(values)}
+    index = (indices[repr(label)] for label in labels)
+    return tuple(values.values()), np.fromiter(index, np.int64, len(labels))
 
 
 def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:
@@ -177,21 +182,21 @@ def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:
     return _whole_column("level", body.level, count)
 
 
-def _whole(name: str, given: Sequence[float]) -> Indices:
+def _whole(name: str, numbers: Sequence[float]) -> Indices:
     """Return whole numbers (N,); FormError for another number."""
-    values = np.array(given)
-    parts = np.flatnonzero(values % 1.0)
-    if len(parts):
-        place, found = str(parts[0]), values[parts[0]]
-        raise FormError(f"{name}/{place}", f"{found:g}, expected a whole number")
+    values = np.array(numbers)
+    fractional = np.flatnonzero(values % 1.0)
+    if len(fractional):
+        index, fraction = str(fractional[0]), values[fractional[0]]
+        raise FormError(f"{name}/{index}", f"{fraction:g}, expected a whole number")
     return values.astype(np.int64)
 
 
-def _whole_column(name: str, given: Numbers, count: int) -> Indices:
+def _whole_column(name: str, numbers: Numbers, count: int) -> Indices:
     """Return whole numbers (N,), of a list or of one number for all; FormError for another."""
-    if isinstance(given, list):
-        return _whole(name, given)
-    return _whole(name, [given]).repeat(count)
+    if isinstance(numbers, list):
+        return _whole(name, numbers)
+    return _whole(name, [numbers]).repeat(count)
 
 
 def _takes(body: CrowdBody, count: int) -> CharacterTakes | None:
@@ -236,23 +241,23 @@ def checked_order(
     ending: extension of the format. card: of the model. Raises InvalidField for characters, poses,
     frames or bytes beyond the limits of the settings.
     """
-    made, flat = orders.from_question(question), question.instancing == "flatten"
-    _check_size(made, flat, settings)
+    order, flat = orders.from_question(question), question.instancing == "flatten"
+    _check_size(order, flat, settings)
     skeleton, curves = card.skeleton, len(card.curves)
     points = character.body_size(skeleton, question.body or DEFAULT_BODY)
-    motions = made.motions or made.count
-    frames = walking_crowd.frame_count(motions, made.seconds, made.fps, made.seed)
-    counts = CrowdCounts(len(skeleton), made.count, motions, frames, points, curves)
+    motions = order.motions or order.count
+    frames = walking_crowd.frame_count(motions, order.seconds, order.fps, order.seed)
+    counts = CrowdCounts(len(skeleton), order.count, motions, frames, points, curves)
     _check_output(counts, flat, ending, settings)
-    return made
+    return order
 
 
 def _check_output(counts: CrowdCounts, flat: bool, ending: str, settings: Settings) -> None:
-    taken = crowd_size.file_size_bound(counts, ending, flat)
-    if taken > settings.output_limit:
+    size = crowd_size.file_size_bound(counts, ending, flat)
+    if size > settings.output_limit:
         raise InvalidField(
             "count",
-            f"{taken / 1e6:.1f} MB for {counts.characters} characters and {counts.motions} motions "
+            f"{size / 1e6:.1f} MB for {counts.characters} characters and {counts.motions} motions "
             f"of {counts.frames} frames as {ending}, expected at most "
             f"{settings.output_limit / 1e6:.1f} MB",
         )

@@ -66,12 +66,12 @@ def negotiated_format(request: Request, offers: Offers) -> str:
     accept = ", ".join(lines)
     # Long headers are not cached: 256 of them would take megabytes.
     find = preferred_format if len(accept) <= MAX_ACCEPT_LENGTH else preferred_format.__wrapped__
-    found = find(accept, offers)
-    if found is None:
+    preferred = find(accept, offers)
+    if preferred is None:
         there = ", ".join(media_type for _, media_type in offers)
         detail = f"Accept {accept[:200]!r}, expected one of {there}"
         raise RequestError(NOT_ACCEPTABLE, detail, headers={"Vary": VARY})
-    return found
+    return preferred
 
 
 # Most clients send one of few headers; the cache evicts the others.
@@ -85,21 +85,21 @@ def preferred_format(accept: str, offers: Offers) -> str | None:
     if not accept.strip():
         return offers[0][0]
     ranges = list(_media_ranges(accept))
-    best, found = (0.0, -1), None
+    best, preferred = (0.0, -1), None
     for name, media_type in offers:
-        own = max(((r.precedence(media_type), r.weight) for r in ranges), default=(-1, 0.0))
-        if own[0] >= 0 and own[1] > 0.0 and own[::-1] > best:
-            best, found = own[::-1], name
-    return found
+        match = max(((r.precedence(media_type), r.weight) for r in ranges), default=(-1, 0.0))
+        if match[0] >= 0 and match[1] > 0.0 and match[::-1] > best:
+            best, preferred = match[::-1], name
+    return preferred
 
 
 def _media_ranges(accept: str) -> Iterator[_MediaRange]:
     """Yield the valid media ranges; skip those with parameters that no offer has."""
     for member in _MEMBER.finditer(accept):
-        found = _RANGE.fullmatch(member[0])
-        weight = _range_weight(found[3]) if found else None
-        if found and weight is not None:
-            yield _MediaRange(found[1].lower(), found[2].lower(), weight)
+        media_range = _RANGE.fullmatch(member[0])
+        weight = _range_weight(media_range[3]) if media_range else None
+        if media_range and weight is not None:
+            yield _MediaRange(media_range[1].lower(), media_range[2].lower(), weight)
 
 
 def _range_weight(parameters: str) -> float | None:
@@ -145,9 +145,9 @@ def preferred_coding(accepted: bytes) -> str | None:
     """Return the coding that an Accept-Encoding header prefers; None for no coding."""
     weights = dict(reversed(parse_weights(accepted.decode("latin-1"))))
     anything = weights.get("*", 0.0)
-    found = max(CODINGS, key=lambda coding: weights.get(coding, anything))
-    weight = weights.get(found, anything)
-    return found if weight > 0.0 and weight >= weights.get("identity", 0.0) else None
+    preferred = max(CODINGS, key=lambda coding: weights.get(coding, anything))
+    weight = weights.get(preferred, anything)
+    return preferred if weight > 0.0 and weight >= weights.get("identity", 0.0) else None
 
 
 def is_compressible(media_type: str | None) -> bool:
@@ -212,10 +212,10 @@ _WEIGHT = re.compile(r"q=(0(?:\.[0-9]{0,3})?|1(?:\.0{0,3})?)", re.IGNORECASE)
 
 def parse_weights(header: str) -> list[tuple[str, float]]:
     """Return the names, in lower case, and their weights; 1 for a missing or invalid weight."""
-    return [_parse_weight(part) for part in header.split(",") if part.strip()]
+    return [_parse_weight(member) for member in header.split(",") if member.strip()]
 
 
-def _parse_weight(part: str) -> tuple[str, float]:
-    name, *parameters = (piece.strip() for piece in part.split(";"))
-    weights = [found for found in map(_WEIGHT.fullmatch, parameters) if found]
+def _parse_weight(member: str) -> tuple[str, float]:
+    name, *parameters = (piece.strip() for piece in member.split(";"))
+    weights = [match for match in map(_WEIGHT.fullmatch, parameters) if match]
     return name.lower(), float(weights[0][1]) if weights else 1.0

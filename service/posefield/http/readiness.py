@@ -47,8 +47,8 @@ class Readiness:
         if not library.models:
             raise RequestError(problems.NOT_READY, "there is no model")
         if wrong := self._tested(library):
-            known = ", ".join(name for name in wrong if may_read(name.partition("@")[0]))
-            detail = f"not as when opened answers {known or 'a model'}"
+            names = ", ".join(name for name in wrong if may_read(name.partition("@")[0]))
+            detail = f"not as when opened answers {names or 'a model'}"
             raise RequestError(problems.NOT_READY, detail)
         return {
             "status": "ready",

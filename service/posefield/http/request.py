@@ -85,16 +85,18 @@ class HeadLimits:
         if hosts and hosts[0] not in self._known:
             self._check_host(hosts[0])
 
-    def _check_host(self, given: bytes) -> None:
-        name = _without_port(given.decode("latin-1").lower())
-        if not (_is_address(name) or any(_matches(name, known) for known in self.names)):
-            shown = (f"*{known}" if known.startswith(".") else known for known in self.names)
-            expected = ", ".join(shown)
+    def _check_host(self, header: bytes) -> None:
+        name = _without_port(header.decode("latin-1").lower())
+        if not (_is_address(name) or any(_matches(name, pattern) for pattern in self.names)):
+            patterns = (
+                f"*{pattern}" if pattern.startswith(".") else pattern for pattern in self.names
+            )
+            expected = ", ".join(patterns)
             detail = f"{name[:100]!r}, expected an address or one of {expected} (POSEFIELD_HOSTS)"
             raise RequestError(UNKNOWN_HOST, detail)
         # Bounded: clients can make up any number of accepted Host values.
         if len(self._known) < 100:
-            self._known.add(given)
+            self._known.add(header)
 
 
 def host_names(text: str, setting: str) -> tuple[str, ...]:
@@ -103,24 +105,24 @@ def host_names(text: str, setting: str) -> tuple[str, ...]:
     `*.example.com` stands for all names below `example.com`, `*` for all names. Raises
     InvalidField, which names the setting, for a name with a port or a scheme.
     """
-    found = [part.strip().lower() for part in text.split(",") if part.strip()]
-    for name in found:
+    names = [item.strip().lower() for item in text.split(",") if item.strip()]
+    for name in names:
         if name != "*" and not _NAME.issuperset(name.removeprefix("*.")):
             raise InvalidField(setting, f"{name!r}, expected names as example.com, *.example.com")
-    return tuple(name.removeprefix("*") if name != "*" else name for name in found) or LOOPBACK
+    return tuple(name.removeprefix("*") if name != "*" else name for name in names) or LOOPBACK
 
 
 _NAME = frozenset("abcdefghijklmnopqrstuvwxyz0123456789.-_")
 
 
-def _matches(name: str, known: str) -> bool:
-    return known in ("*", name) or (known.startswith(".") and name.endswith(known))
+def _matches(name: str, pattern: str) -> bool:
+    return pattern in ("*", name) or (pattern.startswith(".") and name.endswith(pattern))
 
 
-def _without_port(given: str) -> str:
-    if given.startswith("["):
-        return given[1:].partition("]")[0]
-    return given.partition(":")[0].removesuffix(".")
+def _without_port(host: str) -> str:
+    if host.startswith("["):
+        return host[1:].partition("]")[0]
+    return host.partition(":")[0].removesuffix(".")
 
 
 def _is_address(name: str) -> bool:
@@ -171,26 +173,26 @@ async def read_body(request: Request, limit: int, memory: BodyMemory) -> bytes:
     declared = _declared_length(request)
     if declared > limit:
         raise _too_large(limit)
-    found, taken = bytearray(), 0
+    body, counted = bytearray(), 0
     async for chunk in request.stream():
-        found += chunk
-        if len(found) > limit:
+        body += chunk
+        if len(body) > limit:
             raise _too_large(limit)
-        if (beyond := len(found) - FREE_BYTES) > taken:
-            memory.take(beyond - taken)
-            request.scope["body_memory"] = taken = beyond
-    if declared != len(found) and declared:
+        if (beyond := len(body) - FREE_BYTES) > counted:
+            memory.take(beyond - counted)
+            request.scope["body_memory"] = counted = beyond
+    if declared != len(body) and declared:
         # httptools skips the body of a request with an Upgrade to another protocol (h2c).
-        detail = f"{len(found)} of {declared} bytes arrived; send HTTP/1.1 without `Upgrade`"
+        detail = f"{len(body)} of {declared} bytes arrived; send HTTP/1.1 without `Upgrade`"
         raise RequestError(BAD_BODY, detail, {"pointer": ""}, _CLOSE)
-    return bytes(found)
+    return bytes(body)
 
 
-def _check_media_type(given: str) -> None:
-    name, _, parameters = given.partition(";")
+def _check_media_type(header: str) -> None:
+    name, _, parameters = header.partition(";")
     charset = parameters.strip().lower()
     if name.strip().lower() != MEDIA_TYPE or charset not in ("", "charset=utf-8"):
-        raise RequestError(NOT_JSON, f"Content-Type {given!r}, expected {MEDIA_TYPE!r}")
+        raise RequestError(NOT_JSON, f"Content-Type {header!r}, expected {MEDIA_TYPE!r}")
 
 
 def _declared_length(request: Request) -> int:

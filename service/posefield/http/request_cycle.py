@@ -104,14 +104,14 @@ def find_path(routes: RouteTree, scope: Scope) -> PathRoutes:
     Raises UnknownFormat, and RequestError 404 for a path that is not in the contract.
     """
     path = scope["path"]
-    found = routes.find(path)
-    if found is not None:
-        operations, scope["path_params"] = found
+    match = routes.find(path)
+    if match is not None:
+        operations, scope["path_params"] = match
         return operations
     if formats := routes.other_formats(path):
-        unknown, known = formats
-        detail = f"no format {unknown!r}{did_you_mean(unknown, known)}"
-        raise UnknownFormat("format", f"{detail}; there are {', '.join(known)}")
+        unknown, names = formats
+        detail = f"no format {unknown!r}{did_you_mean(unknown, names)}"
+        raise UnknownFormat("format", f"{detail}; there are {', '.join(names)}")
     raise RequestError(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")
 
 
@@ -157,10 +157,10 @@ def negotiate(request: ServiceRequest, route: Route) -> None:
         request.format = negotiation.negotiated_format(request, route.offers)
 
 
-def _check_parameters(request: ServiceRequest, known: frozenset[str]) -> None:
-    if unknown := request.query_params.keys() - known:
+def _check_parameters(request: ServiceRequest, parameters: frozenset[str]) -> None:
+    if unknown := request.query_params.keys() - parameters:
         name = min(unknown)
-        names = sorted(known)
+        names = sorted(parameters)
         hint = did_you_mean(name, names)
         detail = f"{name}: no such query parameter{hint}; there are {names or 'none'}"
         raise RequestError(problems.BAD_PARAMETER, detail, {"parameter": name})
@@ -177,21 +177,21 @@ def revalidate(request: ServiceRequest, route: Route) -> bool:
         request.model = model = request.library.find(key)
         if not operation.pure:
             return False
-        parts = [service.code, model.fingerprint, route.name, query, request.format.encode(), b""]
+        inputs = [service.code, model.fingerprint, route.name, query, request.format.encode(), b""]
         # A name may be escaped; few queries need parsing for it.
         if (b"character" in query or b"%" in query) and "character" in request.query_params:
             # The file of a character may change under the hash of a model too.
-            key, parts[-1] = key.partition("@")[0], service.characters.digest
+            key, inputs[-1] = key.partition("@")[0], service.characters.digest
         closed = service.access_policy.requires_credentials
         request.lifetime = responses.cache_control(key, service.settings.alias_seconds, closed)
     elif page := service.pages.get(operation.id):
         request.lifetime = responses.PUBLIC + responses.NO_CACHE
-        parts = [page.digest]
+        inputs = [page.digest]
     else:
         return False
-    request.tag = responses.entity_tag(*parts, coding=request.coding)
-    known = request.head.get(b"if-none-match")
-    return known is not None and responses.matches_tag(known.decode("latin-1"), request.tag)
+    request.tag = responses.entity_tag(*inputs, coding=request.coding)
+    cached = request.head.get(b"if-none-match")
+    return cached is not None and responses.matches_tag(cached.decode("latin-1"), request.tag)
 
 
 def requested_deadline(prefer: bytes | None, longest: float) -> float:

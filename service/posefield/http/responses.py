@@ -52,7 +52,7 @@ def code_digest() -> bytes:
     digest = blake2b(digest_size=16)
     root = Path(posefield.__file__).parent
     for source in sorted(
-        [each for kind in ("py", "yaml", "npz") for each in root.rglob(f"*.{kind}")]
+        [path for kind in ("py", "yaml", "npz") for path in root.rglob(f"*.{kind}")]
     ):
         digest.update(source.relative_to(root).as_posix().encode() + b"\0")
         digest.update(source.read_bytes())
@@ -62,23 +62,23 @@ def code_digest() -> bytes:
     return digest.digest()
 
 
-def entity_tag(*parts: bytes, coding: str | None = None) -> str:
+def entity_tag(*inputs: bytes, coding: str | None = None) -> str:
     """Return the strong entity tag of a response that depends only on `parts`.
 
     coding: content coding of the response, if any.
     """
-    digest = blake2b(b"\0".join(parts), digest_size=16).hexdigest()
+    digest = blake2b(b"\0".join(inputs), digest_size=16).hexdigest()
     return f'"{digest}-{coding}"' if coding else f'"{digest}"'
 
 
-def matches_tag(given: str, own: str) -> bool:
+def matches_tag(header: str, tag: str) -> bool:
     """Return True if an If-None-Match header matches an entity tag.
 
-    The comparison is weak (RFC 9110, 13.1.2). given: the header. own: the tag.
+    The comparison is weak (RFC 9110, 13.1.2). header: that of the request.
     """
-    if given == own:
+    if header == tag:
         return True
-    return given.strip() == "*" or own in (t.strip().removeprefix("W/") for t in given.split(","))
+    return header.strip() == "*" or tag in (t.strip().removeprefix("W/") for t in header.split(","))
 
 
 def cache_control(model: str, alias_seconds: int, closed: bool) -> bytes:
@@ -126,7 +126,7 @@ def parse_origins(text: str, field: str) -> frozenset[bytes]:
 
     field: name of the setting. Raises InvalidField for an invalid origin.
     """
-    origins = frozenset(filter(None, (part.strip() for part in text.split(","))))
+    origins = frozenset(filter(None, (item.strip() for item in text.split(","))))
     if origins == {"*"}:
         return ANY_ORIGIN
     for origin in sorted(origins):
@@ -166,9 +166,9 @@ def preflight_headers(allow: bytes) -> Headers:
     ]
 
 
-def is_preflight(given: Mapping[bytes, bytes]) -> bool:
+def is_preflight(headers: Mapping[bytes, bytes]) -> bool:
     """Return True if an OPTIONS request with these headers is a CORS preflight."""
-    return b"origin" in given and b"access-control-request-method" in given
+    return b"origin" in headers and b"access-control-request-method" in headers
 
 
 DATA_HEADERS = (
@@ -253,12 +253,12 @@ def clip_file(content: bytes, form: Format, trust: Trust) -> Response:
     if trust.inferred:
         chosen = {name: trust.controls[name] for name in trust.inferred}
         headers["Posefield-Inferred"] = json.dumps(chosen)
-    made = Response(content, headers=headers, media_type=form.media_type)
-    for met in trust.targets:
-        if not met.reached:
-            said = {"what": met.what, "miss": met.miss, "unit": met.unit}
-            made.headers.append("Posefield-Missed", json.dumps(said))
-    return _add_warnings(made, trust.warnings)
+    response = Response(content, headers=headers, media_type=form.media_type)
+    for result in trust.targets:
+        if not result.reached:
+            target = {"what": result.what, "miss": result.miss, "unit": result.unit}
+            response.headers.append("Posefield-Missed", json.dumps(target))
+    return _add_warnings(response, trust.warnings)
 
 
 def performance_file(content: bytes, form: Format, report: PerformanceReport) -> Response:
@@ -270,8 +270,8 @@ def performance_file(content: bytes, form: Format, report: PerformanceReport) ->
         "Posefield-Duration": repr(report.duration),
         "Posefield-Supported": "true" if report.supported else "false",
     }
-    made = Response(content, headers=headers, media_type=form.media_type)
-    return _add_warnings(made, report.warnings)
+    response = Response(content, headers=headers, media_type=form.media_type)
+    return _add_warnings(response, report.warnings)
 
 
 def _add_warnings(response: Response, warnings: Sequence[str]) -> Response:
@@ -287,15 +287,15 @@ MIN_CHUNK_SIZE = 1 << 18
 
 def merged_chunks(pieces: Iterable[bytes]) -> Iterator[bytes]:
     """Yield the same bytes in pieces of at least ENOUGH bytes, except the last; none is empty."""
-    held, size = [], 0
+    buffered, size = [], 0
     for piece in pieces:
-        held.append(piece)
+        buffered.append(piece)
         size += len(piece)
         if size >= MIN_CHUNK_SIZE:
-            yield b"".join(held)
-            held, size = [], 0
+            yield b"".join(buffered)
+            buffered, size = [], 0
     if size:
-        yield b"".join(held)
+        yield b"".join(buffered)
 
 
 async def _sent(pieces: Iterator[bytes], limiter: CapacityLimiter) -> AsyncIterator[bytes]:

@@ -116,9 +116,9 @@ class RouteTree:
     def other_formats(self, path: str) -> tuple[str, Iterable[str]] | None:
         """Return the unknown format that a path ends in and the known formats of that path."""
         unknown = path.rpartition("/")[2].partition(".")[2]
-        found = self.find(path.removesuffix(f".{unknown}"))
-        known = self._formats.get(found[0].template) if found else None
-        return (unknown, known) if unknown and known else None
+        stem = self.find(path.removesuffix(f".{unknown}"))
+        formats = self._formats.get(stem[0].template) if stem else None
+        return (unknown, formats) if unknown and formats else None
 
 
 def _child_node(node: _TreeNode, segment: str) -> _TreeNode:

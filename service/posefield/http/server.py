@@ -95,11 +95,11 @@ class CoalescingTransport:
         self._transport.close()
 
     def _flush(self) -> None:
-        held, self._buffer, self._size = self._buffer, [], 0
+        buffered, self._buffer, self._size = self._buffer, [], 0
         # A client that has reset its connection closes the transport before the next iteration;
         # uvloop raises an error for a write to a closed one.
-        if held and not self._transport.is_closing():
-            self._transport.writelines(held)
+        if buffered and not self._transport.is_closing():
+            self._transport.writelines(buffered)
 
 
 HEARTBEAT_INTERVAL = 1.0
@@ -127,12 +127,12 @@ class StartAnnouncement:
 
 @asynccontextmanager
 async def lifespan(
-    service: Service, shelf: ReloadingRegistry, announcement: StartAnnouncement
+    service: Service, models: ReloadingRegistry, announcement: StartAnnouncement
 ) -> AsyncIterator[None]:
     """Run the reload of models, the heartbeat and the SIGTERM handler during the server's life."""
     _drain_on_sigterm(service.readiness, service.settings.drain)
     beat = asyncio.create_task(_heartbeat(service, service.settings.unresponsive))
-    with shelf.watch(service.settings.reload):
+    with models.watch(service.settings.reload):
         announcement.write()
         yield
     beat.cancel()
@@ -189,7 +189,7 @@ SPAWN_TIMEOUT = 86_400
 """Timeout of a disabled health check, s."""
 
 
-def serve(places: Sequence[str | Path], settings: Settings) -> None:
+def serve(sources: Sequence[str | Path], settings: Settings) -> None:
     """Serve the models of files, folders and URLs until SIGTERM or SIGINT.
 
     Raises ModelError, before listening, for a file that cannot be served, InvalidField for an
@@ -198,10 +198,10 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
     # Also needed after uvicorn has returned: it raises the signal that ended it again.
     signal.signal(signal.SIGTERM, _exit_on_signal)
     _raise_open_files()
-    named = tuple(map(str, places))
-    shelf = open_models(named, settings)
-    shelf.check()
-    names = ", ".join(shelf.registry.models)
+    source_names = tuple(map(str, sources))
+    models = open_models(source_names, settings)
+    models.check()
+    names = ", ".join(models.registry.models)
     count = settings.workers or usable_processors(CPU_QUOTA_FILE)
     with ExitStack() as stack, suppress(KeyboardInterrupt):
         sockets = _listening_sockets(stack, settings.host, settings.port)
@@ -211,19 +211,19 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
         if count > 1:
             stack.enter_context(metrics.shared_folder())
             _set_threads()
-            tried = frozenset(name.partition("@")[2] for name in shelf.registry.identities)
+            tried = frozenset(name.partition("@")[2] for name in models.registry.identities)
             app = partial(
-                worker_application, named, settings, announcement, TrialLimits(passed=tried)
+                worker_application, source_names, settings, announcement, TrialLimits(passed=tried)
             )
             WorkerSupervisor(_config(app, settings, count), sockets).run_until_signalled()
         else:
             limit_threads()
-            app = partial(_application, shelf, settings, announcement)
+            app = partial(_application, models, settings, announcement)
             uvicorn.Server(_config(app, settings, 1)).run(sockets)
 
 
 def worker_application(
-    places: tuple[str, ...],
+    sources: tuple[str, ...],
     settings: Settings,
     announcement: StartAnnouncement,
     limits: TrialLimits,
@@ -234,24 +234,24 @@ def worker_application(
     reported by `/readyz` and the log, and the other models are served.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    return _application(open_models(places, settings, limits), settings, announcement)
+    return _application(open_models(sources, settings, limits), settings, announcement)
 
 
 def open_models(
-    places: tuple[str, ...], settings: Settings, limits: TrialLimits = DEFAULT_LIMITS
+    sources: tuple[str, ...], settings: Settings, limits: TrialLimits = DEFAULT_LIMITS
 ) -> ReloadingRegistry:
     """Open the models of files, folders and URLs; `ReloadingRegistry.check` raises their errors."""
     bounds = VersionLimits(settings.versions, settings.versions_memory)
-    return ReloadingRegistry(places, bounds, limits)
+    return ReloadingRegistry(sources, bounds, limits)
 
 
 def _application(
-    shelf: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
+    models: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
 ) -> App:
     sys.setswitchinterval(worker_threads.SWITCH_INTERVAL)
     log = telemetry.to_standard_error() if settings.log == "on" else None
-    beside = partial(lifespan, shelf=shelf, announcement=announcement)
-    return create_app(Readiness(shelf), settings, log, beside)
+    background = partial(lifespan, models=models, announcement=announcement)
+    return create_app(Readiness(models), settings, log, background)
 
 
 def _config(app: partial[App], settings: Settings, count: int) -> uvicorn.Config:
@@ -297,8 +297,8 @@ class WorkerSupervisor(Multiprocess):
         serves.
         """
         self.shutdown_requested = True
-        for own in self.sockets:
-            own.close()
+        for listener in self.sockets:
+            listener.close()
         super().handle_term()
 
     def handle_int(self) -> None:
@@ -356,8 +356,8 @@ def usable_processors(quota: Path) -> int:
     """
     allowed = len(os.sched_getaffinity(0))
     try:
-        most, period = quota.read_text().split()
-        return max(1, min(allowed, math.ceil(int(most) / int(period))))
+        quota_time, period = quota.read_text().split()
+        return max(1, min(allowed, math.ceil(int(quota_time) / int(period))))
     except (OSError, ValueError):
         # The file is missing or has the quota "max".
         return allowed
@@ -370,12 +370,12 @@ def _listening_sockets(stack: ExitStack, host: str, port: int) -> list[socket.so
     try:
         for family, *_, where in socket.getaddrinfo(host or None, port, type=kind, flags=passive):
             address = (where[0], port, *where[2:])
-            own = socket.create_server(address, family=family, backlog=BACKLOG)
-            sockets.append(stack.enter_context(own))
-            port = own.getsockname()[1]
+            listener = socket.create_server(address, family=family, backlog=BACKLOG)
+            sockets.append(stack.enter_context(listener))
+            port = listener.getsockname()[1]
     except OSError as fault:
-        said = (fault.strerror or str(fault)).lower()
-        raise InvalidField("address", f"{host}:{port}: {said}") from fault
+        reason = (fault.strerror or str(fault)).lower()
+        raise InvalidField("address", f"{host}:{port}: {reason}") from fault
     return sockets
 
 
@@ -392,8 +392,8 @@ def _set_threads() -> None:
 
 def _raise_open_files() -> None:
     """Raise the limit on open files, and so on connections, to the hard limit."""
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    _, hard_limit = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard_limit, hard_limit))
 
 
 def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:

@@ -37,8 +37,8 @@ class LogBuffer:
 
     def flush(self) -> None:
         """Write the buffer."""
-        held, self._buffer = self._buffer, []
-        for piece in _pieces(held):
+        lines, self._buffer = self._buffer, []
+        for piece in _pieces(lines):
             _write(self._target, piece)
 
 
@@ -56,7 +56,7 @@ def _pieces(lines: list[bytes]) -> list[bytes]:
             size = 0
         pieces[-1].append(line)
         size += len(line)
-    return [b"".join(own) for own in pieces if own]
+    return [b"".join(piece) for piece in pieces if piece]
 
 
 def to_standard_error() -> LogBuffer:
@@ -69,13 +69,13 @@ def timestamp(seconds: float) -> str:
 
     seconds: since 1970.
     """
-    whole = int(seconds)
-    return f"{_whole_second(whole)}.{int(1000 * (seconds - whole)):03d}Z"
+    second = int(seconds)
+    return f"{_whole_second(second)}.{int(1000 * (seconds - second)):03d}Z"
 
 
 @lru_cache(1)
-def _whole_second(whole: int) -> str:
-    return datetime.fromtimestamp(whole, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+def _whole_second(second: int) -> str:
+    return datetime.fromtimestamp(second, UTC).strftime("%Y-%m-%dT%H:%M:%S")
 
 
 # Header traceparent of the W3C Trace Context, version 00.
@@ -84,5 +84,5 @@ _PARENT = re.compile(rb"00-([0-9a-f]{32})-[0-9a-f]{16}-[0-9a-f]{2}")
 
 def trace_id(headers: Mapping[bytes, bytes]) -> str | None:
     """Return the trace id in a request's headers; None without a valid one."""
-    found = _PARENT.fullmatch(headers.get(b"traceparent", b""))
-    return found[1].decode() if found else None
+    parent = _PARENT.fullmatch(headers.get(b"traceparent", b""))
+    return parent[1].decode() if parent else None

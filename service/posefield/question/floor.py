@@ -38,13 +38,15 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
         normal = np.array([-self.slope_x, 1.0, -self.slope_z])
         normal /= np.linalg.norm(normal)
         turn = np.concatenate([[1.0 + normal @ UP], np.cross(UP, normal)])
-        found: Floats = turn / np.linalg.norm(turn)
-        return found
+        rotation: Floats = turn / np.linalg.norm(turn)
+        return rotation
 
     def heights(self, points: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:
         """Return the heights (...), m, of the floor below or above points (..., 3), m."""
-        found: Floats = self.height + self.slope_x * points[..., 0] + self.slope_z * points[..., 2]
-        return found
+        heights: Floats = (
+            self.height + self.slope_x * points[..., 0] + self.slope_z * points[..., 2]
+        )
+        return heights
 
     def tilted(self, vectors: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch 3"]:
         """Return vectors (..., 3) turned as the floor is tilted."""
@@ -70,23 +72,23 @@ class Floors:
     @property
     def sloped(self) -> Annotated[Booleans, "frames"]:
         """Return whether the floor of each frame (N,) has a slope."""
-        return np.array([not own.is_level for own in self.floors])[self.groups.group]
+        return np.array([not floor.is_level for floor in self.floors])[self.groups.group]
 
     @property
     def tilts(self) -> Annotated[Floats, "frames 4"]:
         """Return the rotation from the vertical to the floor's normal at each frame (N, 4)."""
-        return np.array([own.tilt for own in self.floors])[self.groups.group]
+        return np.array([floor.tilt for floor in self.floors])[self.groups.group]
 
     def heights(self, points: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames"]:
         """Return the heights (N,), m, of the floors below or above points (N, 3), m."""
-        if all(own == LEVEL_FLOOR for own in self.floors):
+        if all(floor == LEVEL_FLOOR for floor in self.floors):
             return np.zeros(len(points))
-        parts = zip(self.floors, self.groups.split(points), strict=True)
-        return np.concatenate([own.heights(part) for own, part in parts])
+        groups = zip(self.floors, self.groups.split(points), strict=True)
+        return np.concatenate([floor.heights(positions) for floor, positions in groups])
 
     def tilted(self, vectors: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames 3"]:
         """Return vectors (N, 3) turned as the floors are tilted; level floors turn none."""
-        if all(own.is_level for own in self.floors):
+        if all(floor.is_level for floor in self.floors):
             return vectors
         turned = quat.rotate(self.tilts, vectors)
         return np.where(self.sloped[:, None], turned, vectors)

@@ -30,8 +30,8 @@ def decode_question(form: type[Question], content: bytes) -> Question:
     """
     content = content.removeprefix(codecs.BOM_UTF8)
     try:
-        found: Question = _decoder(cast(Any, form)).decode(content)
-        return found
+        question: Question = _decoder(cast(Any, form)).decode(content)
+        return question
     except msgspec.ValidationError as fault:
         return _decode_plain(form, content, fault)
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:
@@ -53,13 +53,13 @@ def _decode_plain(form: type[Question], content: bytes, fault: msgspec.Validatio
     if len(content) > MAX_PLAIN_BYTES:
         raise _form_error(form, str(fault), None) from None
     try:
-        plain, said = json.loads(content.decode()), str(fault)
+        plain, message = json.loads(content.decode()), str(fault)
     except (RecursionError, ValueError):
         # msgspec reports a wrong type before it parses the rest, which may be invalid JSON.
         raise _form_error(form, str(fault), None) from None
-    if "out of range" not in said:
+    if "out of range" not in message:
         return convert_question(form, plain)
-    raise _form_error(form, said, plain) from None
+    raise _form_error(form, message, plain) from None
 
 
 def convert_question(form: type[Question], plain: Any) -> Question:
@@ -73,18 +73,18 @@ def convert_question(form: type[Question], plain: Any) -> Question:
         raise _form_error(form, str(fault), plain) from None
 
 
-def _form_error(form: Any, said: str, plain: Any) -> FormError:
+def _form_error(form: Any, text: str, plain: Any) -> FormError:
     """Return the error of msgspec's message about a body of a type; plain: its value, if known."""
-    path, found = list(itertools.takewhile(_ANY_KEY.__ne__, error_path(said))), dict[str, Any]()
+    path, value = list(itertools.takewhile(_ANY_KEY.__ne__, error_path(text))), dict[str, Any]()
     if plain is not None:
-        path, found = _resolve_path(error_path(said), plain)
-    message = said.rpartition(_PATH)[0] or said
-    typed = said.startswith("Expected") and not isinstance(found, dict | list)
-    shown = f" {found!r}"[:100] if typed else _accepted_names(form, path, plain, found)
-    return FormError(json_pointer(*path).removeprefix("/"), message + shown)
+        path, value = _resolve_path(error_path(text), plain)
+    message = text.rpartition(_PATH)[0] or text
+    typed = text.startswith("Expected") and not isinstance(value, dict | list)
+    detail = f" {value!r}"[:100] if typed else _accepted_names(form, path, plain, value)
+    return FormError(json_pointer(*path).removeprefix("/"), message + detail)
 
 
-def _accepted_names(form: Any, path: Sequence[str], plain: Any, found: Any) -> str:
+def _accepted_names(form: Any, path: Sequence[str], plain: Any, value: Any) -> str:
     """Return the names that a type accepts at the path of an error, to follow its message.
 
     They are the keys of the object whose unknown key ends the path, or the choices of a text. Empty
@@ -94,8 +94,8 @@ def _accepted_names(form: Any, path: Sequence[str], plain: Any, found: Any) -> s
     if path and keys and path[-1] not in keys:
         return f"{did_you_mean(path[-1], keys)}, expected some of {', '.join(keys)}"
     choices = get_args(_type_at(form, path, plain)) or _tags(form, path, plain)
-    if isinstance(found, str) and choices and all(isinstance(each, str) for each in choices):
-        return f"{did_you_mean(found, choices)}, expected one of {', '.join(choices)}"
+    if isinstance(value, str) and choices and all(isinstance(choice, str) for choice in choices):
+        return f"{did_you_mean(value, choices)}, expected one of {', '.join(choices)}"
     return ""
 
 
@@ -121,34 +121,34 @@ def _member(plain: Any, step: str) -> Any:
     """Return a member of a plain value; None if it has none of that name."""
     if isinstance(plain, dict):
         return plain.get(step)
-    found = isinstance(plain, list) and step.isdigit() and int(step) < len(plain)
-    return plain[int(step)] if found else None
+    present = isinstance(plain, list) and step.isdigit() and int(step) < len(plain)
+    return plain[int(step)] if present else None
 
 
 def _tagged(kind: Any, plain: Any) -> Any:
     """Return the member of a union of tagged structs that a plain value has; others unchanged."""
-    for each in get_args(kind):
-        config = getattr(each, "__struct_config__", None)
+    for member in get_args(kind):
+        config = getattr(member, "__struct_config__", None)
         if config and isinstance(plain, dict) and plain.get(config.tag_field) == config.tag:
-            return each
+            return member
     return kind
 
 
 def _tags(form: Any, path: Sequence[str], plain: Any) -> tuple[str, ...]:
     """Return the tags of the union at a path that ends with the name of its tag."""
     members = get_args(_type_at(form, path[:-1], plain)) if path else ()
-    configs = [getattr(each, "__struct_config__", None) for each in members]
-    return tuple(own.tag for own in configs if own and own.tag_field == path[-1])
+    configs = [getattr(member, "__struct_config__", None) for member in members]
+    return tuple(config.tag for config in configs if config and config.tag_field == path[-1])
 
 
 def _without_absence(kind: Any) -> Any:
     """Return the only member of a union besides None and UNSET; other types unchanged."""
     if get_origin(kind) not in (Union, UnionType):
         return kind
-    rest = [each for each in get_args(kind) if each not in (type(None), msgspec.UnsetType)]
-    if len(rest) != 1 and not all(hasattr(each, "__struct_fields__") for each in rest):
+    members = [member for member in get_args(kind) if member not in (type(None), msgspec.UnsetType)]
+    if len(members) != 1 and not all(hasattr(member, "__struct_fields__") for member in members):
         return None
-    return rest[0] if len(rest) == 1 else kind
+    return members[0] if len(members) == 1 else kind
 
 
 def _with_whole_numbers(node: Any) -> Any:
@@ -161,16 +161,16 @@ def _with_whole_numbers(node: Any) -> Any:
 
 def _resolve_path(path: list[str], node: Any) -> tuple[list[str], Any]:
     """Return the path with the invalid key for each placeholder, and the value at its end."""
-    named: list[str] = []
+    keys: list[str] = []
     for step in path:
         if step == _ANY_KEY and isinstance(node, dict):
-            step = _key_at_fault(node, _is_label if named[-1:] == ["labels"] else _is_numeric)
-        named.append(step)
+            step = _key_at_fault(node, _is_label if keys[-1:] == ["labels"] else _is_numeric)
+        keys.append(step)
         if isinstance(node, list):
             node = node[int(step)]
         else:
             node = node.get(step, {})
-    return named, node
+    return keys, node
 
 
 def _key_at_fault(values: dict[str, Any], is_valid: Callable[[Any], bool]) -> str:
@@ -183,19 +183,21 @@ def _key_at_fault(values: dict[str, Any], is_valid: Callable[[Any], bool]) -> st
 def _is_label(value: Any) -> bool:
     """Return whether a value is a name, weights of names, or a list of them with gaps."""
     if isinstance(value, list):
-        return all(each is None or isinstance(each, str | dict) for each in value)
+        return all(name is None or isinstance(name, str | dict) for name in value)
     weights = isinstance(value, dict) and all(map(_is_numeric, value.values()))
     return isinstance(value, str) or weights
 
 
 def _is_numeric(value: Any) -> bool:
     values = value if isinstance(value, list) else [value]
-    return all(type(each) in (int, float) and abs(each) <= sys.float_info.max for each in values)
+    return all(
+        type(number) in (int, float) and abs(number) <= sys.float_info.max for number in values
+    )
 
 
-def json_pointer(*parts: str) -> str:
+def json_pointer(*keys: str) -> str:
     """Return the JSON pointer of keys and indices, RFC 6901."""
-    return "".join("/" + part.replace("~", "~0").replace("/", "~1") for part in parts)
+    return "".join("/" + key.replace("~", "~0").replace("/", "~1") for key in keys)
 
 
 def error_path(message: str) -> list[str]:
@@ -204,16 +206,16 @@ def error_path(message: str) -> list[str]:
     The message repeats the client's input, so it is parsed from its two ends: "Object contains
     unknown field `NAME` - at `$.KEY[INDEX]`", where either part may be absent.
     """
-    rest, found = message, []
+    rest, keys = message, []
     if rest.endswith("`") and (start := rest.rfind(_PATH)) >= 0:
         path = rest[start + len(_PATH) : -1].replace("[...]", f"[{_ANY}]")
-        found = path.replace("[", ".").replace("]", "").split(".")[1:]
-        found = [_ANY_KEY if step == _ANY else step for step in found]
+        keys = path.replace("[", ".").replace("]", "").split(".")[1:]
+        keys = [_ANY_KEY if step == _ANY else step for step in keys]
         rest = rest[:start]
     for opening in _FIELD:
         if rest.startswith(opening) and rest.endswith("`"):
-            found.append(rest[len(opening) : -1])
-    return found
+            keys.append(rest[len(opening) : -1])
+    return keys
 
 
 _ANY = "\0"

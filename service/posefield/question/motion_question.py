@@ -94,8 +94,8 @@ class Target(Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if (self.time is UNSET) == (self.at is UNSET):
-            said = "neither time nor at" if self.at is UNSET else "time and at"
-            raise ValueError(f"{said}, expected one of them")
+            given_fields = "neither time nor at" if self.at is UNSET else "time and at"
+            raise ValueError(f"{given_fields}, expected one of them")
 
     @property
     def when(self) -> TargetTime:
@@ -275,20 +275,20 @@ def check_number(field: str, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InvalidField(field, f"{value!r}, expected a number")
     try:
-        found = float(value)
+        number = float(value)
     except OverflowError:
-        found = math.inf
-    if not math.isfinite(found):
-        raise InvalidField(field, f"{found}, expected a finite number")
-    return found + 0.0
+        number = math.inf
+    if not math.isfinite(number):
+        raise InvalidField(field, f"{number}, expected a finite number")
+    return number + 0.0
 
 
 def check_range(field: str, value: float, low: float, high: float, unit: str) -> None:
     """Raise InvalidField for a value outside low to high."""
     if not low <= value <= high:
         # Nine digits tell any two numbers of single precision apart.
-        shown = f"{check_number(field, value):.9g}"
-        raise InvalidField(field, f"{shown} {unit}, expected {low:.9g} to {high:.9g} {unit}")
+        digits = f"{check_number(field, value):.9g}"
+        raise InvalidField(field, f"{digits} {unit}, expected {low:.9g} to {high:.9g} {unit}")
 
 
 def check_rounded_range(field: str, value: float, low: float, high: float, unit: str) -> float:

@@ -61,8 +61,8 @@ class PlacedTarget(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     def __post_init__(self) -> None:
         if (self.time is UNSET) == (self.at is UNSET):
-            said = "neither time nor at" if self.at is UNSET else "time and at"
-            raise ValueError(f"{said}, expected one of them")
+            given_fields = "neither time nor at" if self.at is UNSET else "time and at"
+            raise ValueError(f"{given_fields}, expected one of them")
 
     @property
     def when(self) -> TargetTime:

@@ -30,7 +30,7 @@ it lie answers of that family and of a deposit on the floor for an unnamed perfo
 
 def band(sigma: float) -> Band:
     """Return the band of sigma, m."""
-    return next((name for name, most in BANDS if sigma <= most), "guess")
+    return next((name for name, largest in BANDS if sigma <= largest), "guess")
 
 
 @dataclass(frozen=True)

@@ -71,12 +71,12 @@ class Parameter:
 def parameters(form: type[Struct]) -> Mapping[str, Parameter]:
     """Return the parameters of a query by name, without the controls."""
     hints = get_type_hints(form, include_extras=True)
-    found = [
-        _parameter(each, hints[each.name])
-        for each in structs.fields(form)
-        if each.name != CONTROLS_FIELD
+    listed = [
+        _parameter(field, hints[field.name])
+        for field in structs.fields(form)
+        if field.name != CONTROLS_FIELD
     ]
-    return {each.word: each for each in found}
+    return {parameter.word: parameter for parameter in listed}
 
 
 def decode_question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Question:
@@ -85,13 +85,13 @@ def decode_question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Q
     Raises FormError for an invalid text, a name that occurs twice and one that is missing, and the
     errors of the query's own checks.
     """
-    known, said, controls = parameters(form), dict[str, Any](), dict[str, float]()
+    form_parameters, values, controls = parameters(form), dict[str, Any](), dict[str, float]()
     for name, text in pairs:
-        parameter = known.get(name)
-        where = controls if parameter is None else said
+        parameter = form_parameters.get(name)
+        where = controls if parameter is None else values
         field = name if parameter is None else parameter.field
         if parameter is not None and parameter.repeated:
-            said.setdefault(field, []).append(parse_value(parameter, text))
+            values.setdefault(field, []).append(parse_value(parameter, text))
         elif field in where:
             raise FormError(name, "given twice, expected once")
         else:
@@ -100,27 +100,27 @@ def decode_question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Q
                 if parameter is None
                 else parse_value(parameter, text)
             )
-    for parameter in known.values():
-        if parameter.required and parameter.field not in said:
+    for parameter in form_parameters.values():
+        if parameter.required and parameter.field not in values:
             expected = parameter.help or "the name of a control"
             raise FormError(parameter.word, f"missing, expected {expected}")
     if CONTROLS_FIELD in form.__struct_fields__:
-        said[CONTROLS_FIELD] = controls
-    if "targets" in said:
-        said["targets"] = tuple(said["targets"])
-    if LABELS_FIELD in said:
-        said[LABELS_FIELD] = merge_labels(said[LABELS_FIELD])
-    return form(**said)
+        values[CONTROLS_FIELD] = controls
+    if "targets" in values:
+        values["targets"] = tuple(values["targets"])
+    if LABELS_FIELD in values:
+        values[LABELS_FIELD] = merge_labels(values[LABELS_FIELD])
+    return form(**values)
 
 
 def merge_labels(pairs: Iterable[tuple[str, LabelValue]]) -> dict[str, LabelValue]:
     """Return the labels by set; FormError for a set that is given twice."""
-    found: dict[str, LabelValue] = {}
+    labels: dict[str, LabelValue] = {}
     for name, value in pairs:
-        if name in found:
+        if name in labels:
             raise FormError("label", f"{name} given twice, expected once")
-        found[name] = value
-    return found
+        labels[name] = value
+    return labels
 
 
 def parse_value(parameter: Parameter, text: str) -> Any:
@@ -143,10 +143,10 @@ def parse_number(text: str) -> float:
 
     Raises ValueError for any other text.
     """
-    found = float(text) if NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(found):
+    number = float(text) if NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(number):
         raise ValueError(f"{text!r}, expected a finite number")
-    return found
+    return number
 
 
 def parse_integer(text: str) -> int:
@@ -165,8 +165,8 @@ def choice_parser(choices: tuple[str, ...]) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         if text not in choices:
-            found = f"{text!r}{did_you_mean(text, choices)}"
-            raise ValueError(f"{found}, expected one of {', '.join(choices)}")
+            detail = f"{text!r}{did_you_mean(text, choices)}"
+            raise ValueError(f"{detail}, expected one of {', '.join(choices)}")
         return text
 
     return read
@@ -190,7 +190,7 @@ def parse_floor(text: str) -> FloorValue:
     Raises ValueError for any other text.
     """
     try:
-        numbers = [parse_number(part) for part in text.split(",")]
+        numbers = [parse_number(number) for number in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 3):
@@ -240,7 +240,7 @@ def parse_target(text: str) -> Target:
     mark = max(text.rfind(":"), text.rfind("="))
     joint, _, moment = text[: max(mark, 0)].rpartition("@")
     try:
-        place = parse_position(text[mark + 1 :])
+        position = parse_position(text[mark + 1 :])
         when = {"at": moment} if moment in MOMENTS else {"time": parse_number(moment)}
     except ValueError:
         joint = ""
@@ -249,7 +249,7 @@ def parse_target(text: str) -> Target:
             f"{text!r}, expected JOINT@MOMENT:X,Y,Z, m; a moment is seconds or one of "
             f"{', '.join(MOMENTS)}"
         )
-    return Target(joint, place, **when)
+    return Target(joint, position, **when)
 
 
 def parse_label(text: str) -> tuple[str, LabelValue]:
@@ -270,7 +270,7 @@ def parse_label_value(text: str) -> LabelValue:
     """
     if "," not in text and ":" not in text:
         return text
-    pairs = [part.rpartition(":") for part in text.split(",")]
+    pairs = [pair.rpartition(":") for pair in text.split(",")]
     try:
         weights = {name: parse_number(weight) for name, _, weight in pairs}
     except ValueError:
@@ -323,8 +323,8 @@ def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
 def _without_none(kind: Any) -> Any:
     if get_origin(kind) not in (Union, UnionType) or type(None) not in get_args(kind):
         return kind
-    rest = [part for part in get_args(kind) if part is not type(None)]
-    return rest[0] if len(rest) == 1 else Union[tuple(rest)]  # noqa: UP007  # built at run time
+    members = [member for member in get_args(kind) if member is not type(None)]
+    return members[0] if len(members) == 1 else Union[tuple(members)]  # noqa: UP007  # built at run time
 
 
 def _without_annotations(kind: Any) -> Any:

@@ -99,7 +99,7 @@ class Synthesizer(NamedModel):
         warnings = question_validation.merge_warnings(question.warnings, apart, asked.extrapolate)
         if asked.detail and not self.session.card.making.detail:
             warnings = (*warnings, NO_DETAIL)
-        named = who is not None or PERFORMER in question.named
+        named = who is not None or PERFORMER in question.named_labels
         seen = named if self.session.card.performers else None
         shares = self.session.card.joint_sigma if asked.joint_sigma else ()
         return Trust(
@@ -115,7 +115,7 @@ class Synthesizer(NamedModel):
             inferred=question.inferred,
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
             deviations=apart,
-            labels=question.named,
+            labels=question.named_labels,
             take=take_variation.facts(self.session.card, asked),
         )
 

@@ -246,7 +246,7 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
         len(others),
         *rest,
         inferred,
-        question.named,
+        question.named_labels,
     )
 
 

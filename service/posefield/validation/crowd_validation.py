@@ -100,9 +100,9 @@ class CrowdQuestion:
         return len(self.times)
 
     def _columns(self) -> dict[str, Floats | Indices]:
-        seen = isinstance(self.detail, LevelCriteria)
+        has_criteria = isinstance(self.detail, LevelCriteria)
         levels = self.detail.previous if isinstance(self.detail, LevelCriteria) else self.detail
-        own = self.blending
+        blending = self.blending
         return {
             **{f"controls/{name}": values for name, values in self.controls.items()},
             "time": self.times,
@@ -110,8 +110,12 @@ class CrowdQuestion:
             "heading": self.placement.headings,
             "performer": self.performer,
             **{f"labels/{name}": column.index for name, column in self.labels.items()},
-            **({} if levels is None else {"previous_level" if seen else "level": levels}),
-            **({} if own is None else {"from_level": own.levels, "blend": own.shares}),
+            **({} if levels is None else {"previous_level" if has_criteria else "level": levels}),
+            **(
+                {}
+                if blending is None
+                else {"from_level": blending.levels, "blend": blending.shares}
+            ),
             **({} if self.takes is None else self.takes.columns),
         }
 
@@ -135,29 +139,29 @@ def labels(question: CrowdQuestion, card: ModelCard) -> Singles:
 
     Raises InvalidField for the first character with an unknown name or invalid weights.
     """
-    found = np.zeros((len(question), sum(card.label_counts)), dtype=np.float32)
+    weights = np.zeros((len(question), sum(card.label_counts)), dtype=np.float32)
     if PERFORMER in question.labels and question.performers != (None,):
         raise InvalidField("performer", "given, and labels/performer too, expected one")
     for performer, rows in _distinct(question.performers, question.performer):
-        found[rows] += _checked(card, rows, performer, {})
+        weights[rows] += _checked(card, rows, performer, {})
     for name, column in question.labels.items():
-        for given, rows in _distinct(column.values, column.index):
-            found[rows] += _checked(card, rows, None, {} if given is None else {name: given})
-    return found
+        for value, rows in _distinct(column.values, column.index):
+            weights[rows] += _checked(card, rows, None, {} if value is None else {name: value})
+    return weights
 
 
 def _distinct(values: Sequence[Value], index: Indices) -> Iterator[tuple[Value, Indices]]:
     """Yield each of distinct values with the indices of its characters."""
-    for place, value in enumerate(values):
-        yield value, np.flatnonzero(index == place)
+    for number, value in enumerate(values):
+        yield value, np.flatnonzero(index == number)
 
 
 def _checked(
-    card: ModelCard, rows: Indices, performer: str | None, named: Mapping[str, LabelValue]
+    card: ModelCard, rows: Indices, performer: str | None, label_values: Mapping[str, LabelValue]
 ) -> Floats:
     """Return weights (p,); InvalidField with the first of the rows for invalid ones."""
     try:
-        return label_weights(card, performer, named)[0]
+        return label_weights(card, performer, label_values)[0]
     except InvalidField as fault:
         raise InvalidField(fault.field, fault.message, int(rows[0])) from fault
 
@@ -187,12 +191,12 @@ def check_controls(
     points = np.stack(columns, axis=1)
     supported = support.supported(points)
     pairs = zip(card.controls, columns, strict=True)
-    found = [_range_warning(question, *pair) for pair in pairs]
-    found.append(
+    range_texts = [_range_warning(question, *pair) for pair in pairs]
+    range_texts.append(
         _gap_warning(card, support, question, points[~supported], np.flatnonzero(~supported))
     )
-    said = tuple(filter(None, found)) if question.extrapolate == "warn" else ()
-    return points, supported, said
+    warnings = tuple(filter(None, range_texts)) if question.extrapolate == "warn" else ()
+    return points, supported, warnings
 
 
 def _column(control: Control, question: CrowdQuestion) -> Floats:
@@ -204,9 +208,9 @@ def _column(control: Control, question: CrowdQuestion) -> Floats:
             f"missing; give numbers in {control.unit}, sampled from {low:g} to {high:g}",
         )
     values = question.controls[control.name]
-    least, most = question_validation.accepted_range(control)
-    far = (values < least) | (values > most)
-    expected = f"{control.unit}, expected {least:g} to {most:g} {control.unit}"
+    lowest, highest = question_validation.accepted_range(control)
+    far = (values < lowest) | (values > highest)
+    expected = f"{control.unit}, expected {lowest:g} to {highest:g} {control.unit}"
     raise_for_first(field, values, far, expected)
     return values
 
@@ -221,31 +225,35 @@ def _range_warning(question: CrowdQuestion, control: Control, values: Floats) ->
     if not beyond.any():
         return None
     first = int(np.argmax(beyond))
-    said = (
+    text = (
         f"{control.name} of {np.count_nonzero(beyond)} characters lies outside what was sampled, "
         f"{control.minimum:g} to {control.maximum:g} {control.unit}; "
         f"the first is character {first}, {values[first]:g} {control.unit}"
         f"{_limited_part(control, values)}"
     )
     if question.extrapolate == "refuse":
-        raise OutsideSamples(f"controls/{control.name}", said, first)
-    return said
+        raise OutsideSamples(f"controls/{control.name}", text, first)
+    return text
 
 
 def _limited_part(control: Control, values: Floats) -> str:
     """Return the part of a warning that tells at which value the farthest values act."""
-    ends = float(values.min()), float(values.max())
-    acting = [answer_bounds.limit_control(control, value) for value in ends]
-    limited = [f"{own:.4g}" for own, value in zip(acting, ends, strict=True) if own != value]
+    extremes = float(values.min()), float(values.max())
+    acting = [answer_bounds.limit_control(control, value) for value in extremes]
+    limited = [
+        f"{acting_value:.4g}"
+        for acting_value, value in zip(acting, extremes, strict=True)
+        if acting_value != value
+    ]
     return f"; values further out act as {' or '.join(limited)} {control.unit}" if limited else ""
 
 
 def _gap_warning(
-    card: ModelCard, support: Support, question: CrowdQuestion, points: Floats, who: Indices
+    card: ModelCard, support: Support, question: CrowdQuestion, points: Floats, characters: Indices
 ) -> str | None:
     """Return the warning for unsupported points (U, d) within the sampled ranges, or None.
 
-    who: their characters' indices (U,). Raises OutsideSamples instead where `extrapolate` is
+    characters: their indices (U,). Raises OutsideSamples instead where `extrapolate` is
     "refuse".
     """
     low, high = np.transpose(
@@ -254,13 +262,13 @@ def _gap_warning(
     inside = np.all((points >= low) & (points <= high), axis=1)
     if not inside.any():
         return None
-    first = int(who[inside][0])
+    first = int(characters[inside][0])
     variance = float(support.variance(points[inside][:1])[0])
     count = f"{np.count_nonzero(inside)} characters; the first, character {first}, lies"
-    said = question_validation.gap_warning(count, variance, support.limit)
+    text = question_validation.gap_warning(count, variance, support.limit)
     if question.extrapolate == "refuse":
-        raise OutsideSamples("controls", said, first)
-    return said
+        raise OutsideSamples("controls", text, first)
+    return text
 
 
 def raise_for_first(field: str, values: Floats, bad: Booleans, expected: str) -> None:
@@ -278,18 +286,18 @@ def check_takes(card: ModelCard, question: CrowdQuestion) -> CharacterTakes:
     """
     count = len(question)
     none = CharacterTakes(np.zeros(count, np.int64), np.zeros(count), np.zeros(count, dtype=bool))
-    found = question.takes or none
-    seeds, variety = found.seeds, found.variety
+    takes = question.takes or none
+    seeds, variety = takes.seeds, takes.variety
     outside = (seeds < 0) | (seeds > MAX_TAKE)
     raise_for_first("take", seeds.astype(float), outside, f"expected 0 to {MAX_TAKE}")
     raise_for_first("variety", variety, (variety < 0.0) | (variety > 1.0), "expected 0 to 1")
-    taken = int(np.count_nonzero(seeds))
-    if taken > MAX_TAKES:
-        raise InvalidField("take", f"{taken} characters with takes, expected at most {MAX_TAKES}")
-    if taken and not random_field.has_features(card.kriging):
+    varied = int(np.count_nonzero(seeds))
+    if varied > MAX_TAKES:
+        raise InvalidField("take", f"{varied} characters with takes, expected at most {MAX_TAKES}")
+    if varied and not random_field.has_features(card.kriging):
         name = card.kriging.covariance
         raise InvalidField("take", f"given, but no takes can be drawn of {name} kriging")
-    return CharacterTakes(seeds, variety, found.detail & bool(card.making.detail))
+    return CharacterTakes(seeds, variety, takes.detail & bool(card.making.detail))
 
 
 def check_times(times: Floats, durations: Singles, slack: Floats) -> None:

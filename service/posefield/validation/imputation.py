@@ -38,15 +38,15 @@ class ConditionalGaussian:
     deviation: Floats
     correlation: Floats
 
-    def __call__(self, given: Mapping[int, float]) -> Floats:
+    def __call__(self, known_values: Mapping[int, float]) -> Floats:
         """Return the conditional mean row (k,), with the given columns unchanged."""
-        known = sorted(given)
-        values = np.array([given[column] for column in known])
-        away = (values - self.mean[known]) / self.deviation[known]
-        among = self.correlation[np.ix_(known, known)]
-        apart = self.correlation[:, known] @ np.linalg.solve(among, away)
-        row = self.mean + self.deviation * apart
-        row[known] = values
+        indices = sorted(known_values)
+        values = np.array([known_values[column] for column in indices])
+        away = (values - self.mean[indices]) / self.deviation[indices]
+        among = self.correlation[np.ix_(indices, indices)]
+        shift = self.correlation[:, indices] @ np.linalg.solve(among, away)
+        row = self.mean + self.deviation * shift
+        row[indices] = values
         return row
 
 
@@ -62,8 +62,8 @@ def fit_gaussian(
     mean = share @ samples
     deviation = np.sqrt(share @ np.square(samples - mean))
     deviation[deviation == 0.0] = 1.0
-    apart = (samples - mean) / deviation
-    correlation = (1.0 - shrunk) * (apart.T * share) @ apart
+    deviations = (samples - mean) / deviation
+    correlation = (1.0 - shrunk) * (deviations.T * share) @ deviations
     # A constant column must neither inform other columns nor make the matrix singular.
     np.fill_diagonal(correlation, 1.0)
     return ConditionalGaussian(mean, deviation, correlation)
@@ -79,71 +79,75 @@ class ControlImputer:
         self._low, self._high = card.sampled_ranges
         self._scaled = kriging_model.half_ranges(self._examples, self._low, self._high)
 
-    def impute(self, given: Mapping[str, float], labels: Floats) -> dict[str, float]:
+    def impute(self, controls: Mapping[str, float], labels: Floats) -> dict[str, float]:
         """Return all controls in the card's order, those not given as in a typical captured clip.
 
         That is the medoid, in the open controls, of the clips near the given ones. labels (1, p):
         weights of names, whose own clips come first; all zero in label sets that are left open.
         """
-        open_ = self._open(given)
-        row = typical_clip.typical_row(self._scaled[:, open_], self._costs(given, labels))
-        return self._complete(given, self._examples[row])
+        open_ = self._open(controls)
+        row = typical_clip.typical_row(self._scaled[:, open_], self._costs(controls, labels))
+        return self._complete(controls, self._examples[row])
 
     def near_measures(
-        self, given: Mapping[str, float], labels: Floats, seen: Floats, wanted: Floats
+        self, controls: Mapping[str, float], labels: Floats, measures: Floats, targets: Floats
     ) -> "LocalImputer":
         """Return the choice of open controls about the captured clip typical for measures too.
 
-        seen (n, m): measured quantities of the captured clips. wanted (m,): their target values.
+        measures (n, m): quantities of the captured clips. targets (m,): their target values.
         """
-        open_, deviation = self._open(given), seen.std(axis=0)
+        open_, deviation = self._open(controls), measures.std(axis=0)
         deviation[deviation == 0.0] = 1.0
-        away = (seen - wanted) / (NEAR * deviation)
-        costs = self._costs(given, labels) + np.sum(np.square(away), axis=1)
+        away = (measures - targets) / (NEAR * deviation)
+        costs = self._costs(controls, labels) + np.sum(np.square(away), axis=1)
         row = typical_clip.typical_row(self._scaled[:, open_], costs)
         near = np.sum(np.square(self._scaled - self._scaled[row])[:, open_], axis=1) / REACH**2
-        samples = np.hstack([self._examples, self._labels, seen])
-        known = {i: given[c.name] for i, c in enumerate(self._controls) if c.name in given}
-        who, first = np.ravel(labels), len(self._controls)
-        named = [own for own in self._label_columns if who[own].any()]
-        beside = {first + i: float(who[i]) for own in named for i in range(own.start, own.stop)}
+        samples = np.hstack([self._examples, self._labels, measures])
+        values = {i: controls[c.name] for i, c in enumerate(self._controls) if c.name in controls}
+        weights, first = np.ravel(labels), len(self._controls)
+        label_columns = [columns for columns in self._label_columns if weights[columns].any()]
+        label_values = {
+            first + i: float(weights[i])
+            for columns in label_columns
+            for i in range(columns.start, columns.stop)
+        }
         return LocalImputer(
             self._controls,
             self._examples[row],
             fit_gaussian(samples, weights=np.exp(-0.5 * near)),
-            known | beside,
+            values | label_values,
             open_,
             (self._low[open_], self._high[open_]),
             typical_clip.neighbourhood(self._scaled[:, open_]),
         )
 
-    def _open(self, given: Mapping[str, float]) -> Booleans:
-        return np.array([control.name not in given for control in self._controls])
+    def _open(self, controls: Mapping[str, float]) -> Booleans:
+        return np.array([control.name not in controls for control in self._controls])
 
-    def _costs(self, given: Mapping[str, float], labels: Floats) -> Floats:
+    def _costs(self, controls: Mapping[str, float], labels: Floats) -> Floats:
         """Return the squared distances (n,) of the clips from the given controls, in `NEAR`.
 
         A control acts as if it were within its limits, so it is near the same clips.
         """
-        known = [i for i, control in enumerate(self._controls) if control.name in given]
+        indices = [i for i, control in enumerate(self._controls) if control.name in controls]
         acting = np.array(
             [
-                answer_bounds.limit_control(self._controls[i], given[self._controls[i].name])
-                for i in known
+                answer_bounds.limit_control(self._controls[i], controls[self._controls[i].name])
+                for i in indices
             ]
         )
-        place = kriging_model.half_ranges(acting, self._low[known], self._high[known])
-        costs = np.sum(np.square((self._scaled[:, known] - place) / NEAR), axis=1)
+        scaled = kriging_model.half_ranges(acting, self._low[indices], self._high[indices])
+        costs = np.sum(np.square((self._scaled[:, indices] - scaled) / NEAR), axis=1)
         weights = np.ravel(labels)
-        for own in self._label_columns:
-            if weights[own].any():
-                costs = costs + OTHER_LABEL * (1.0 - self._labels[:, own] @ weights[own])
+        for columns in self._label_columns:
+            if weights[columns].any():
+                costs = costs + OTHER_LABEL * (1.0 - self._labels[:, columns] @ weights[columns])
         return np.asarray(costs, np.float64)
 
-    def _complete(self, given: Mapping[str, float], row: Floats) -> dict[str, float]:
+    def _complete(self, controls: Mapping[str, float], row: Floats) -> dict[str, float]:
         """Return all controls: the given ones, the others from a row (d,)."""
         return {
-            control.name: given.get(control.name, float(value))
+            control.name: controls.get(control.name, float(value))
             for control, value in zip(self._controls, row, strict=True)
         }
 
@@ -153,7 +157,7 @@ class LocalImputer:
     """Choice of open controls about one captured clip, for measured quantities.
 
     clip: controls (d,) of the captured clip. gaussian: of the clips about it: controls, labels and
-    measured quantities. known: values of the given columns. open: controls that are not given (d,).
+    measured quantities. values: of the given columns. open: controls that are not given (d,).
     ranges: smallest and largest sampled value of each open control. surroundings: of the captured
     clips, in the open controls in half-ranges.
     """
@@ -161,7 +165,7 @@ class LocalImputer:
     controls: tuple[Control, ...]
     clip: Floats
     gaussian: ConditionalGaussian
-    known: Mapping[int, float]
+    values: Mapping[int, float]
     open: Booleans
     ranges: tuple[Floats, Floats]
     surroundings: Neighbourhood
@@ -170,21 +174,21 @@ class LocalImputer:
         """Return all controls, the open ones as in the captured clip."""
         return self._complete(self.clip)
 
-    def __call__(self, wanted: Floats) -> dict[str, float]:
+    def __call__(self, targets: Floats) -> dict[str, float]:
         """Return all controls, the open ones near the clip for measured quantities (m,).
 
         The conditional mean of the clips about the typical one, as far as it stays near captured
         clips; a control with few sampled values takes the nearest of them.
         """
-        first = len(self.gaussian.mean) - len(wanted)
-        beside = {first + i: float(value) for i, value in enumerate(wanted)}
-        row = self.gaussian(dict(self.known) | beside)[: len(self.controls)]
+        first = len(self.gaussian.mean) - len(targets)
+        measures = {first + i: float(value) for i, value in enumerate(targets)}
+        row = self.gaussian(dict(self.values) | measures)[: len(self.controls)]
         for i, control in enumerate(self.controls):
             if self.open[i] and control.values:
                 row[i] = min(control.values, key=lambda value: abs(value - row[i]))
         low, high = self.ranges
         start, end = (
-            kriging_model.half_ranges(place[self.open], low, high) for place in (self.clip, row)
+            kriging_model.half_ranges(point[self.open], low, high) for point in (self.clip, row)
         )
         inside = self.surroundings.pull_in(start, end)
         row[self.open] = 0.5 * (inside * (high - low) + low + high)
@@ -193,7 +197,7 @@ class LocalImputer:
     def _complete(self, row: Floats) -> dict[str, float]:
         """Return all controls: the given ones, the others from a row (d,), rounded."""
         return {
-            control.name: self.known[i] if i in self.known else _round_and_clip(control, row[i])
+            control.name: self.values[i] if i in self.values else _round_and_clip(control, row[i])
             for i, control in enumerate(self.controls)
         }
 

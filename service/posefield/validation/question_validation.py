@@ -34,10 +34,11 @@ def check_names(card: ModelCard, names: Iterable[str]) -> None:
     """Raise InvalidField for the first name that is not a control of the model."""
     for name in names:
         if card.control(name) is None:
-            own = [c.name for c in card.controls]
-            hint = did_you_mean(name, own) or _option_hint(name)
+            known_names = [c.name for c in card.controls]
+            hint = did_you_mean(name, known_names) or _option_hint(name)
             raise InvalidField(
-                f"controls/{name}", f"no such control{hint}; this model has {', '.join(own)}"
+                f"controls/{name}",
+                f"no such control{hint}; this model has {', '.join(known_names)}",
             )
 
 
@@ -47,8 +48,8 @@ def _option_hint(name: str) -> str:
     In a query string each name that is no option is taken for a control.
     """
     forms = (PoseQuestion, FileQuestion)
-    found = similar_name(name, [word for form in forms for word in parameters(form)])
-    return "" if found is None else f" (did you mean the option {found!r}?)"
+    similar = similar_name(name, [word for form in forms for word in parameters(form)])
+    return "" if similar is None else f" (did you mean the option {similar!r}?)"
 
 
 def accepted_range(control: Control) -> tuple[float, float]:
@@ -95,63 +96,65 @@ ROUNDING = 1e-6
 
 
 def label_weights(
-    card: ModelCard, performer: str | None, named: Mapping[str, LabelValue]
+    card: ModelCard, performer: str | None, values: Mapping[str, LabelValue]
 ) -> Floats:
     """Return the weights (1, p) of the names of all label sets, for the graph.
 
     Those of a set are zero if it is left open. performer: short for the name in the label set
-    `performer`. named: name or weights by label set. Raises InvalidField for an unknown set or
+    `performer`. values: name or weights by label set. Raises InvalidField for an unknown set or
     name, for invalid weights, and for a performer given in both ways.
     """
     if performer is not None:
-        if PERFORMER in named:
+        if PERFORMER in values:
             raise InvalidField("performer", f"{performer!r} and labels/performer, expected one")
         check_name("performer", performer, card.performers)
-    for name in named:
+    for name in values:
         _check_set(card, name)
     short = {} if performer is None else {PERFORMER: performer}
-    asked: Mapping[str, LabelValue] = {**named, **short}
-    rows = [_set_weights(own, asked.get(own.name)) for own in card.labels]
+    values_by_set: Mapping[str, LabelValue] = {**values, **short}
+    rows = [_set_weights(label_set, values_by_set.get(label_set.name)) for label_set in card.labels]
     return np.array([[weight for row in rows for weight in row]], dtype=np.float64)
 
 
-def check_name(field: str, name: str, known: tuple[str, ...]) -> None:
+def check_name(field: str, name: str, names: tuple[str, ...]) -> None:
     """Raise InvalidField for a name that is not among the known ones of its label set."""
-    if name not in known:
-        expected = f"expected {accepted_names(known)}"
-        raise InvalidField(field, f"{name!r}{did_you_mean(name, known)}, {expected}")
+    if name not in names:
+        expected = f"expected {accepted_names(names)}"
+        raise InvalidField(field, f"{name!r}{did_you_mean(name, names)}, {expected}")
 
 
 def _check_set(card: ModelCard, name: str) -> None:
-    known = tuple(own.name for own in card.labels)
-    if name not in known:
-        found = f"{name!r}{did_you_mean(name, known)}"
+    set_names = tuple(label_set.name for label_set in card.labels)
+    if name not in set_names:
+        detail = f"{name!r}{did_you_mean(name, set_names)}"
         expected = (
-            f"one of the label sets {', '.join(known)}" if known else "none: this model has none"
+            f"one of the label sets {', '.join(set_names)}"
+            if set_names
+            else "none: this model has none"
         )
-        raise InvalidField(f"labels/{name}", f"{found}, expected {expected}")
+        raise InvalidField(f"labels/{name}", f"{detail}, expected {expected}")
 
 
-def _set_weights(own: LabelSet, asked: LabelValue | None) -> list[float]:
+def _set_weights(label_set: LabelSet, value: LabelValue | None) -> list[float]:
     """Return the weight of each name of a set; zeros for None."""
-    if asked is None:
-        return [0.0] * len(own.names)
-    field = f"labels/{own.name}"
-    if isinstance(asked, str):
-        check_name(field, asked, own.names)
-        return [float(name == asked) for name in own.names]
-    for name, weight in asked.items():
-        check_name(field, name, own.names)
+    if value is None:
+        return [0.0] * len(label_set.names)
+    field = f"labels/{label_set.name}"
+    if isinstance(value, str):
+        check_name(field, value, label_set.names)
+        return [float(name == value) for name in label_set.names]
+    for name, weight in value.items():
+        check_name(field, name, label_set.names)
         if check_number(f"{field}/{name}", weight) < 0.0:
             raise InvalidField(f"{field}/{name}", f"{weight:g}, expected a weight of 0 to 1")
-    total = sum(asked.values())
+    total = sum(value.values())
     if not 0.0 < total <= 1.0 + ROUNDING:
         raise InvalidField(
             field,
             f"weights with a sum of {total:.6g}, expected one above 0 and at most 1; what is left "
             "to 1 stays open",
         )
-    return [float(asked.get(name, 0.0)) for name in own.names]
+    return [float(value.get(name, 0.0)) for name in label_set.names]
 
 
 DEVIATION_SHARE = 1e-3
@@ -165,11 +168,11 @@ class ValidatedQuestion:
     """A validated question.
 
     controls: all controls in the card's order. performer: name, None for an unseen performer.
-    named: requested labels besides the performer, by label set. point: the controls as the graph's
-    input, (1, d). labels: the weights of all labels as the graph's input, (1, p). warnings: of
-    extrapolation. supported: true if similar clips were captured. inferred: names of the controls
-    that were not given and were chosen. deviations: controls that act at another value than the
-    requested one, which is too far outside the samples.
+    named_labels: requested labels besides the performer, by label set. point: the controls as the
+    graph's input, (1, d). labels: the weights of all labels as the graph's input, (1, p). warnings:
+    of extrapolation. supported: true if similar clips were captured. inferred: names of the
+    controls that were not given and were chosen. deviations: controls that act at another value
+    than the requested one, which is too far outside the samples.
     """
 
     controls: dict[str, float]
@@ -181,7 +184,7 @@ class ValidatedQuestion:
     supported: bool
     inferred: tuple[str, ...] = ()
     deviations: tuple[Deviation, ...] = ()
-    named: Mapping[str, LabelValue] = field(default_factory=dict)
+    named_labels: Mapping[str, LabelValue] = field(default_factory=dict)
 
 
 class QuestionValidator:
@@ -200,41 +203,50 @@ class QuestionValidator:
         extrapolate: ExtrapolationPolicy,
         performer: str | None,
         level: int,
-        named: Mapping[str, LabelValue] | None = None,
+        label_values: Mapping[str, LabelValue] | None = None,
     ) -> ValidatedQuestion:
         """Return the validated question; controls that are not given are the conditional mean.
 
-        The mean is conditional on the given controls and labels; named: labels besides the
+        The mean is conditional on the given controls and labels; label_values: labels besides the
         performer. Raises InvalidField for a control, label or level that cannot be used, and
         OutsideSamples where `extrapolate` is "refuse" and no similar clips were captured.
         """
         if not controls.keys() <= self._names:
             check_names(self._card, controls)
-        named = named or {}
-        if performer is None and not named:
-            own = self._open_labels
+        label_values = label_values or {}
+        if performer is None and not label_values:
+            labels = self._open_labels
         else:
-            own = label_weights(self._card, performer, named)
+            labels = label_weights(self._card, performer, label_values)
         coarsest = len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         plain = self._is_within_ranges(controls)
-        every = controls if plain else self._complete_controls(controls, own)
+        complete = controls if plain else self._complete_controls(controls, labels)
         # Equal questions have equal bytes: controls in the card's order, and 0 for -0.
-        given = {name: float(every[name]) + 0.0 for name, _, _ in self._ranges}
-        point = list(given.values())
-        found = () if plain else range_warnings(self._card.controls, point)
+        values = {name: float(complete[name]) + 0.0 for name, _, _ in self._ranges}
+        point = list(values.values())
+        outside = () if plain else range_warnings(self._card.controls, point)
         supported = self.support.is_supported(point)
         warnings = (
             ()
-            if supported and not found
-            else self._extrapolation_warnings(extrapolate, found, point)
+            if supported and not outside
+            else self._extrapolation_warnings(extrapolate, outside, point)
         )
-        inferred = tuple(name for name in given if name not in controls)
+        inferred = tuple(name for name in values if name not in controls)
         array = np.array([point])
         limited = () if plain else limited_controls(self._card.controls, point)
         return ValidatedQuestion(
-            given, performer, level, array, own, warnings, supported, inferred, limited, named
+            values,
+            performer,
+            level,
+            array,
+            labels,
+            warnings,
+            supported,
+            inferred,
+            limited,
+            label_values,
         )
 
     def _is_within_ranges(self, controls: Mapping[str, float]) -> bool:
@@ -244,14 +256,16 @@ class QuestionValidator:
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
-    def _complete_controls(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
+    def _complete_controls(
+        self, controls: Mapping[str, float], labels: Floats
+    ) -> Mapping[str, float]:
         """Return all controls: the given ones checked, the others as conditional means."""
-        given = {
+        checked = {
             control.name: check_control(control, controls[control.name])
             for control in self._card.controls
             if control.name in controls
         }
-        return given if len(given) == len(self._names) else self.imputer.impute(given, own)
+        return checked if len(checked) == len(self._names) else self.imputer.impute(checked, labels)
 
     @cached_property
     def imputer(self) -> ControlImputer:
@@ -259,26 +273,26 @@ class QuestionValidator:
         return ControlImputer(self._card)
 
     def _extrapolation_warnings(
-        self, extrapolate: ExtrapolationPolicy, found: tuple[str, ...], point: Sequence[float]
+        self, extrapolate: ExtrapolationPolicy, outside: tuple[str, ...], point: Sequence[float]
     ) -> tuple[str, ...]:
         """Return warnings for controls outside the sampled ranges or in a gap between samples.
 
-        found: warnings for the ranges. Raises OutsideSamples where `extrapolate` is "refuse".
+        outside: warnings for the ranges. Raises OutsideSamples where `extrapolate` is "refuse".
         """
-        said = found or (self._gap_warning(point),)
+        warnings = outside or (self._gap_warning(point),)
         if extrapolate == "refuse":
-            raise OutsideSamples("controls", "; ".join(said))
-        return said if extrapolate == "warn" else ()
+            raise OutsideSamples("controls", "; ".join(warnings))
+        return warnings if extrapolate == "warn" else ()
 
     def _gap_warning(self, point: Sequence[float]) -> str:
         variance = float(self.support.variance(np.array([point]))[0])
         return gap_warning("these controls lie", variance, self.support.limit)
 
 
-def check_control(control: Control, given: float) -> float:
+def check_control(control: Control, number: float) -> float:
     """Return the value of a control; InvalidField if it is not a number or out of range."""
     field = f"controls/{control.name}"
-    value = motion_question.check_number(field, given)
+    value = motion_question.check_number(field, number)
     motion_question.check_range(field, value, *accepted_range(control), control.unit)
     return value
 
@@ -288,8 +302,8 @@ def range_warnings(controls: Sequence[Control], point: Sequence[float]) -> tuple
 
     point: values (d,) in the order of the controls.
     """
-    found = (_range_warning(control, value) for control, value in zip(controls, point, strict=True))
-    return tuple(filter(None, found))
+    texts = (_range_warning(control, value) for control, value in zip(controls, point, strict=True))
+    return tuple(filter(None, texts))
 
 
 def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tuple[Deviation, ...]:
@@ -297,12 +311,12 @@ def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tup
 
     point: values (d,) in the order of the controls.
     """
-    found = []
+    deviations = []
     for control, value in zip(controls, point, strict=True):
         acting = answer_bounds.limit_control(control, value)
         if abs(acting - value) > DEVIATION_SHARE * (control.maximum - control.minimum):
-            found.append(deviation(control, value, acting))
-    return tuple(found)
+            deviations.append(deviation(control, value, acting))
+    return tuple(deviations)
 
 
 def merge_warnings(
@@ -314,26 +328,26 @@ def merge_warnings(
     """
     if extrapolate == "ok":
         return tuple(warnings)
-    told = {f"{each.control} =": each.sentence for each in deviations}
+    sentences = {f"{change.control} =": change.sentence for change in deviations}
     # A range warning begins with the control's name, an equals sign and the value.
-    merged = [told.pop(" ".join(text.split()[:2]), text) for text in warnings]
-    return (*merged, *told.values())
+    merged = [sentences.pop(" ".join(text.split()[:2]), text) for text in warnings]
+    return (*merged, *sentences.values())
 
 
-def deviation(control: Control, asked: float, given: float) -> Deviation:
+def deviation(control: Control, requested: float, acting: float) -> Deviation:
     """Return the deviation of a control's given value from the requested one."""
     captured = control.minimum, control.maximum
-    return Deviation(control.name, asked, given, control.unit, captured)
+    return Deviation(control.name, requested, acting, control.unit, captured)
 
 
-def gap_warning(who: str, variance: float, limit: float) -> str:
+def gap_warning(subject: str, variance: float, limit: float) -> str:
     """Return the warning for controls in a gap between the captured clips.
 
-    who: subject of the sentence. variance, limit: kriging variance there, and its largest value
+    subject: of the sentence. variance, limit: kriging variance there, and its largest value
     with support.
     """
     return (
-        f"{who} in a gap of what was sampled: nothing like it was captured "
+        f"{subject} in a gap of what was sampled: nothing like it was captured "
         f"(variance {variance:.2g}, expected at most {limit:.2g})"
     )
 

@@ -71,9 +71,9 @@ NO_ACCESS = Principal("nobody", frozenset(), False)
 
 def from_scopes(name: str, scopes: Iterable[str]) -> Principal:
     """Return the principal of scopes `read:*`, `read:MODEL` and `metrics`; ignore others."""
-    given = frozenset(scopes)
-    models = frozenset(s.removeprefix(f"{READ}:") for s in given if s.startswith(f"{READ}:"))
-    return Principal(name, None if _ALL in given else models, METRICS in given)
+    scope_set = frozenset(scopes)
+    models = frozenset(s.removeprefix(f"{READ}:") for s in scope_set if s.startswith(f"{READ}:"))
+    return Principal(name, None if _ALL in scope_set else models, METRICS in scope_set)
 
 
 def _is_scope(text: str) -> bool:
@@ -85,10 +85,10 @@ def _is_scope(text: str) -> bool:
 class ApiKeys:
     """Registered keys.
 
-    known: their digests and principals, by the first 8 bytes of the digest.
+    principals: digests and principals, by the first 8 bytes of the digest.
     """
 
-    known: Mapping[bytes, tuple[bytes, Principal]]
+    principals: Mapping[bytes, tuple[bytes, Principal]]
 
     def find(self, key: str) -> Principal | None:
         """Return the principal of a key; None for an unknown key.
@@ -97,7 +97,7 @@ class ApiKeys:
         which no key follows, and the whole digest is compared in constant time.
         """
         digest = hashlib.sha256(key.encode()).digest()
-        registered, principal = self.known.get(digest[:8], (b"", None))
+        registered, principal = self.principals.get(digest[:8], (b"", None))
         return principal if hmac.compare_digest(registered, digest) else None
 
 
@@ -124,7 +124,7 @@ def parse_keys(text: str, field: str) -> ApiKeys:
     field: name of the source in messages. Raises InvalidField for an invalid line and for two keys
     of one name; the message gives the line's number and quotes at most the key's name.
     """
-    known: dict[bytes, tuple[bytes, Principal]] = {}
+    principals: dict[bytes, tuple[bytes, Principal]] = {}
     names: set[str] = set()
     for number, words in enumerate(re.split(r"[\n;]", text), start=1):
         if not words.partition("#")[0].strip():
@@ -133,8 +133,8 @@ def parse_keys(text: str, field: str) -> ApiKeys:
         if principal.name in names:
             raise InvalidField(f"{field}:{number}", f"a second key named {principal.name!r}")
         names.add(principal.name)
-        known[digest[:8]] = digest, principal
-    return ApiKeys(known)
+        principals[digest[:8]] = digest, principal
+    return ApiKeys(principals)
 
 
 def _parse_line(text: str, where: str) -> tuple[bytes, Principal]:
@@ -179,7 +179,7 @@ class AccessPolicy:
     @property
     def requires_credentials(self) -> bool:
         """True if requests need credentials."""
-        return bool(self.keys.known) or self.tokens is not None
+        return bool(self.keys.principals) or self.tokens is not None
 
 
 class AuditedRequest(NamedTuple):
@@ -208,8 +208,8 @@ def from_settings(settings: Settings) -> AccessPolicy:
             text = f"{Path(source).read_text('utf-8')}\n{text}"
         except (OSError, UnicodeDecodeError) as fault:
             raise FileError(source, f"no file of keys: {fault}") from fault
-    known = parse_keys(text, source)
-    policy = AccessPolicy(known, _token_verifier(settings), settings.metrics_open)
+    keys = parse_keys(text, source)
+    policy = AccessPolicy(keys, _token_verifier(settings), settings.metrics_open)
     if not (policy.requires_credentials or settings.open or _is_loopback(settings.host)):
         raise InvalidField(
             f"{PREFIX}HOST",
@@ -292,8 +292,8 @@ def readable_library(
     if principal.models is None:
         return library
     if key is not None and not principal.may_read(name := key.partition("@")[0]):
-        known = name if name in library.models else "unknown"
-        _log_refusal(call, 404, principal, f"may not read model {known}")
+        logged_name = name if name in library.models else "unknown"
+        _log_refusal(call, 404, principal, f"may not read model {logged_name}")
     return library.restricted_to(principal.may_read)
 
 
@@ -307,10 +307,10 @@ def _authenticate(policy: AccessPolicy, credentials: str) -> Principal:
 
 
 def _credentials(headers: Headers) -> str:
-    given = [value for name, value in headers if name == b"authorization"]
-    if len(given) != 1:
-        raise InvalidCredentials("more than one Authorization" if given else "no Authorization")
-    text = given[0].decode("latin-1")
+    values = [value for name, value in headers if name == b"authorization"]
+    if len(values) != 1:
+        raise InvalidCredentials("more than one Authorization" if values else "no Authorization")
+    text = values[0].decode("latin-1")
     if text[: len(_SCHEME)].lower() != _SCHEME:
         raise InvalidCredentials("Authorization of another scheme, expected Bearer")
     return text[len(_SCHEME) :].strip()

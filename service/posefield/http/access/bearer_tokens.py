@@ -122,11 +122,11 @@ class KeySet:
 
 
 def _read_document(source: str) -> _Document:
-    parts = urlsplit(source)
-    if not parts.scheme:
+    url = urlsplit(source)
+    if not url.scheme:
         return msgspec.json.decode(Path(source).read_bytes(), type=_Document)
-    if parts.scheme != "https" and not (parts.scheme == "http" and parts.hostname in _LOOPBACK):
-        raise ValueError(f"{parts.scheme}://{parts.hostname}, expected https")
+    if url.scheme != "https" and not (url.scheme == "http" and url.hostname in _LOOPBACK):
+        raise ValueError(f"{url.scheme}://{url.hostname}, expected https")
     # The client follows no redirect: the operator has approved this address only.
     client = jwt.PyJWKClient(source, cache_jwk_set=False, timeout=_TIMEOUT)
     return msgspec.convert(client.fetch_data(), _Document)

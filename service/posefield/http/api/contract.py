@@ -81,8 +81,8 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
     for path, item in document["paths"].items():
         for method in (m for m in item if m in METHODS):
             listed = [*item.get("parameters", []), *item[method].get("parameters", [])]
-            given = [resolve(document, node) for node in listed]
-            query = [p for p in given if p["in"] == "query"]
+            parameters = [resolve(document, node) for node in listed]
+            query = [p for p in parameters if p["in"] == "query"]
             exploded = [p["name"] for p in query if p["schema"].get("type") == "object"]
             yield Operation(
                 id=item[method]["operationId"],
@@ -91,7 +91,7 @@ def _operations(document: Mapping[str, Any]) -> Iterator[Operation]:
                 query=frozenset(p["name"] for p in query) - set(exploded),
                 open_query=bool(exploded),
                 media_types=_media_types(document, item[method]["responses"]),
-                formats=_formats(path, given),
+                formats=_formats(path, parameters),
                 responses=frozenset(item[method]["responses"]),
                 scope=scope_of(item[method].get("security", document.get("security", []))),
             )
@@ -107,8 +107,8 @@ def _formats(path: str, parameters: Sequence[Mapping[str, Any]]) -> Mapping[str,
 
     Raises ValueError if `enum` and `x-media-types` list different formats.
     """
-    for given in (p for p in parameters if (p["in"], p["name"]) == ("path", "format")):
-        listed, media_types = given["schema"]["enum"], given["x-media-types"]
+    for parameter in (p for p in parameters if (p["in"], p["name"]) == ("path", "format")):
+        listed, media_types = parameter["schema"]["enum"], parameter["x-media-types"]
         if listed != [*media_types]:
             raise ValueError(f"{path}: formats {listed}, x-media-types of {[*media_types]}")
         return dict(media_types)
@@ -128,12 +128,12 @@ def scope_of(security: Sequence[Mapping[str, Sequence[str]]]) -> str | None:
 
 def resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return a node with its local $ref resolved."""
-    found: Any = node
-    while "$ref" in found:
-        target, found = found["$ref"], document
-        for part in target.removeprefix("#/").split("/"):
-            found = found[part]
-    return found  # type: ignore[no-any-return]
+    target_node: Any = node
+    while "$ref" in target_node:
+        target, target_node = target_node["$ref"], document
+        for key in target.removeprefix("#/").split("/"):
+            target_node = target_node[key]
+    return target_node  # type: ignore[no-any-return]
 
 
 def script_schema() -> dict[str, Any]:
@@ -158,9 +158,9 @@ def _standalone(document: Mapping[str, Any], node: Mapping[str, Any]) -> dict[st
         if key == "example":
             schema["examples"] = [value]
         elif key == "properties":
-            schema[key] = {name: _standalone(document, part) for name, part in value.items()}
+            schema[key] = {name: _standalone(document, child) for name, child in value.items()}
         elif key in LISTS:
-            schema[key] = [_standalone(document, part) for part in value]
+            schema[key] = [_standalone(document, child) for child in value]
         elif key in PARTS and isinstance(value, Mapping):
             schema[key] = _standalone(document, value)
         elif key != "discriminator":

@@ -109,7 +109,7 @@ _REPEATED_PARAMETERS = {"times": "time", "targets": "target", "labels": "label"}
 class RequestError(Exception):
     """Error of a request, with its kind of problem.
 
-    kind: of the problem. detail: text for the client. place: location of the error, as
+    kind: of the problem. detail: text for the client. location: of the error, as
     {"pointer": ...} or {"parameter": ...}. headers: of the response.
     """
 
@@ -117,27 +117,27 @@ class RequestError(Exception):
         self,
         kind: ProblemKind,
         detail: str,
-        place: Mapping[str, str] | None = None,
+        location: Mapping[str, str] | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(detail)
         self.kind = kind
         self.detail = detail
-        self.place = place
+        self.location = location
         self.headers = headers
 
 
 def request_error_response(request: Request, fault: RequestError) -> Response:
     """Return the response to a RequestError."""
     detail = _shortened(fault.detail)
-    errors = [{**fault.place, "detail": detail}] if fault.place else []
+    errors = [{**fault.location, "detail": detail}] if fault.location else []
     return _problem_response(request, fault.kind, detail, errors, fault.headers)
 
 
 def query_error_response(request: Request, error: QueryError) -> Response:
     """Return the response to a QueryError."""
-    place = _error_location(error, in_body=request.method == "POST")
-    errors = [{**place, "detail": _shortened(error.message)}]
+    location = _error_location(error, in_body=request.method == "POST")
+    errors = [{**location, "detail": _shortened(error.message)}]
     return _problem_response(
         request, _problem_kind(error, request.method), _shortened(str(error)), errors
     )
@@ -154,9 +154,9 @@ def nested_error(error: QueryError, where: str) -> RequestError:
 
     where: JSON pointer to that question in the body.
     """
-    place = where + _error_location(error, in_body=True)["pointer"]
-    detail = f"{place.removeprefix('/')}: {error.message}"
-    return RequestError(QUERY_ERROR_PROBLEMS[type(error)], detail, {"pointer": place})
+    pointer = where + _error_location(error, in_body=True)["pointer"]
+    detail = f"{pointer.removeprefix('/')}: {error.message}"
+    return RequestError(QUERY_ERROR_PROBLEMS[type(error)], detail, {"pointer": pointer})
 
 
 def parameter_error(error: QueryError) -> RequestError:

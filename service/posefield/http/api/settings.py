@@ -168,10 +168,10 @@ def read_settings(
 
     Raises InvalidField for an invalid value.
     """
-    found = {f.name: (f.default, environ.get(PREFIX + f.name.upper())) for f in fields(Settings)}
+    texts = {f.name: (f.default, environ.get(PREFIX + f.name.upper())) for f in fields(Settings)}
     values = {
         name: _parse_value(name, default, text)
-        for name, (default, text) in found.items()
+        for name, (default, text) in texts.items()
         if text is not None
     }
     settings = Settings(**values)  # type: ignore[arg-type]  # each name has its own type

@@ -46,8 +46,10 @@ def test_what_is_nearly_a_key_is_none():
 
 def test_comments_semicolons_and_empty_lines():
     text = f"# two\n\n  a {DIGEST} read:*  # first\n;b {DIGEST[:-1]}1 metrics;\n"
-    assert {who.name for _, who in access_control.parse_keys(text, "KEYS").known.values()} >= {"b"}
-    assert access_control.parse_keys("# none\n\n", "KEYS").known == {}
+    assert {who.name for _, who in access_control.parse_keys(text, "KEYS").principals.values()} >= {
+        "b"
+    }
+    assert access_control.parse_keys("# none\n\n", "KEYS").principals == {}
 
 
 @pytest.mark.parametrize(
