@@ -52,13 +52,13 @@ class Delivery:
         roles: joint of the model by role. Raises InvalidField for a model without legs.
         """
         trust = answer.trust
-        hands, others = _hand_goals(answer.clip, question.targets, self._hands(roles))
+        hands, left_out = _hand_goals(answer.clip, question.targets, self._hands(roles))
         travel: Travel = "kept" if question.targets else "scaled"
         stances = _stances(trust.feet, question)
-        clip, facts, told = self._retargeted(answer.clip, roles, stances, hands, travel)
+        clip, facts, warnings = self._retargeted(answer.clip, roles, stances, hands, travel)
         if question.loop:
-            others += _loop_note(clip)
-        notes = (*told, *others, *self.character.target.notes(self.form, clip))
+            left_out += _loop_note(clip)
+        notes = (*warnings, *left_out, *self.character.target.notes(self.form, clip))
         told_trust = replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
         return ClipAnswer(clip, told_trust)
 
@@ -70,14 +70,14 @@ class Delivery:
         """
         report = answer.trust
         stances = None if report.feet is None else report.feet.stances
-        hands, others = _held_hands(answer.held, self._hands(roles))
-        clip, facts, told = self._retargeted(answer.clip, roles, stances, hands, "kept")
-        notes = (*told, *others, *self.character.target.notes(self.form, clip))
+        hands, left_out = _held_hands(answer.held, self._hands(roles))
+        clip, facts, new_warnings = self._retargeted(answer.clip, roles, stances, hands, "kept")
+        notes = (*new_warnings, *left_out, *self.character.target.notes(self.form, clip))
         warnings = tuple(ScriptWarning(POINTER, sentence) for sentence in notes)
-        own = replace(
+        delivered = replace(
             report, script_warnings=(*report.script_warnings, *warnings), retargeting=facts
         )
-        return PerformanceAnswer(clip, own)
+        return PerformanceAnswer(clip, delivered)
 
     def check(
         self,
@@ -103,10 +103,12 @@ class Delivery:
 
     def _hands(self, roles: Mapping[str, str]) -> dict[str, str]:
         """Return the role of each joint of the model that is a hand which the character has."""
-        own = self.character.rig.joints
-        arms = {side + "Hand": {side + part for part in ARM} for side in role_map.SIDES}
+        joints = self.character.rig.joints
+        arms = {side + "Hand": {side + segment for segment in ARM} for side in role_map.SIDES}
         return {
-            roles[hand]: hand for hand, arm in arms.items() if hand in roles and arm <= own.keys()
+            roles[hand]: hand
+            for hand, arm in arms.items()
+            if hand in roles and arm <= joints.keys()
         }
 
     def _retargeted(
@@ -119,20 +121,20 @@ class Delivery:
     ) -> tuple[Clip, dict[str, Any], tuple[str, ...]]:
         """Return the motion of the character, the facts of the report, and its warnings."""
         character = self.character
-        made, report = retarget(
+        retargeted, report = retarget(
             clip, character.rig, roles, stances=stances, hands=hands, travel=travel
         )
         facts = {"character": character.name, "file": character.target.file, **report.facts()}
         bone = clip.root_bone or character.target.has_floor_root
-        return replace(made, root_bone=bone), facts, tuple(facts.pop("warnings"))
+        return replace(retargeted, root_bone=bone), facts, tuple(facts.pop("warnings"))
 
 
-def deliver(character: UserCharacter, form: ClipEncoder, asked: FileAxes) -> Delivery:
+def deliver(character: UserCharacter, form: ClipEncoder, axes: FileAxes) -> Delivery:
     """Return the delivery of answers in files of a format.
 
     Raises InvalidField for what the files of a character cannot hold.
     """
-    return Delivery(character, form, character.target.convention(form, asked))
+    return Delivery(character, form, character.target.convention(form, axes))
 
 
 def _stances(feet: FeetResult | None, question: ClipQuestion) -> Sequence[StanceResult] | None:
@@ -142,27 +144,37 @@ def _stances(feet: FeetResult | None, question: ClipQuestion) -> Sequence[Stance
     if feet is None:
         return None
     start = question.start
-    return [replace(own, begin=own.begin - start, end=own.end - start) for own in feet.stances]
+    return [
+        replace(stance, begin=stance.begin - start, end=stance.end - start)
+        for stance in feet.stances
+    ]
 
 
 def _held_hands(
-    held: Sequence[HeldJoint], named: Mapping[str, str]
+    held_joints: Sequence[HeldJoint], hand_roles: Mapping[str, str]
 ) -> tuple[list[HandGoal], list[str]]:
     """Return the targets of hands as goals while they are held, and sentences on others.
 
     named: role of each joint that is a hand.
     """
     goals = [
-        HandGoal(named[own.joint], own.begins, np.array(own.position), own.ends)
-        for own in held
-        if own.joint in named
+        HandGoal(
+            hand_roles[held_joint.joint],
+            held_joint.begins,
+            np.array(held_joint.position),
+            held_joint.ends,
+        )
+        for held_joint in held_joints
+        if held_joint.joint in hand_roles
     ]
-    others = dict.fromkeys(own.joint for own in held if own.joint not in named)
-    return goals, [NO_GOAL.format(joint) for joint in others]
+    left_out = dict.fromkeys(
+        held_joint.joint for held_joint in held_joints if held_joint.joint not in hand_roles
+    )
+    return goals, [NO_GOAL.format(joint) for joint in left_out]
 
 
 def _hand_goals(
-    clip: Clip, targets: Sequence[Target], named: Mapping[str, str]
+    clip: Clip, targets: Sequence[Target], hand_roles: Mapping[str, str]
 ) -> tuple[list[HandGoal], list[str]]:
     """Return the targets of hands as goals, and a sentence for each other target.
 
@@ -171,27 +183,31 @@ def _hand_goals(
     A goal is at the frame in which the joint of the model is nearest to the target, its moment.
     """
     goals, notes = [], []
-    places = clip.positions() if targets else None
-    for own in targets:
-        if own.joint not in named or places is None:
-            notes.append(NO_GOAL.format(own.joint))
+    positions = clip.positions() if targets else None
+    for target in targets:
+        if target.joint not in hand_roles or positions is None:
+            notes.append(NO_GOAL.format(target.joint))
             continue
-        position = np.array(own.position)
-        apart = np.linalg.norm(places[:, clip.skeleton.names.index(own.joint)] - position, axis=-1)
-        goals.append(HandGoal(named[own.joint], float(np.argmin(apart)) / clip.rate, position))
+        position = np.array(target.position)
+        distances = np.linalg.norm(
+            positions[:, clip.skeleton.names.index(target.joint)] - position, axis=-1
+        )
+        goals.append(
+            HandGoal(hand_roles[target.joint], float(np.argmin(distances)) / clip.rate, position)
+        )
     return goals, notes
 
 
 def _loop_note(clip: Clip) -> list[str]:
     """Return a sentence if the last pose of a loop is not the first, as seen from the root."""
-    ends = replace(
+    boundary = replace(
         clip,
         rotations=clip.rotations[[0, -1]].copy(),
         translations=clip.translations[[0, -1]].copy(),
     )
-    ends.rotations[:, 0], ends.translations[:, 0] = quat.IDENTITY, 0.0
-    first, last = ends.positions()
-    apart = float(np.linalg.norm(last - first, axis=-1).max())
-    if apart <= CLOSED:
+    boundary.rotations[:, 0], boundary.translations[:, 0] = quat.IDENTITY, 0.0
+    first, last = boundary.positions()
+    distance = float(np.linalg.norm(last - first, axis=-1).max())
+    if distance <= CLOSED:
         return []
-    return [f"the last pose of the loop differs from the first by {1000.0 * apart:.1f} mm"]
+    return [f"the last pose of the loop differs from the first by {1000.0 * distance:.1f} mm"]

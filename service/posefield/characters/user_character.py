@@ -86,11 +86,11 @@ def _content(path: Path) -> bytes:
 def relative_reference(path: Path, folder: Path) -> str:
     """Return the path by which files in a folder refer to a file."""
     try:
-        found = Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+        relative = Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
     except ValueError:  # Another drive of Windows.
         return path.absolute().as_posix()
     # USD searches for paths that do not begin with a dot in other places too.
-    return found if found.startswith(".") else f"./{found}"
+    return relative if relative.startswith(".") else f"./{relative}"
 
 
 def read_roles(path: Path) -> dict[str, str]:
@@ -105,10 +105,10 @@ def read_roles(path: Path) -> dict[str, str]:
     if len(content) > MOST_ROLES_BYTES:
         raise FileError(path, f"{len(content)} bytes, expected at most {MOST_ROLES_BYTES}")
     try:
-        found = tomllib.loads(content.decode("utf-8-sig"))
+        content_roles = tomllib.loads(content.decode("utf-8-sig"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as fault:
         raise FileError(path, f"no TOML: {fault}") from fault
-    roles = found.get("roles")
+    roles = content_roles.get("roles")
     if not isinstance(roles, dict) or not all(isinstance(one, str) for one in roles.values()):
         raise FileError(path, "no table [roles] of joints by role")
     return roles
@@ -137,10 +137,10 @@ class CharacterFolder:
     @property
     def digest(self) -> bytes:
         """Return a digest of all characters, by which answers with them are cached."""
-        found = hashlib.sha256()
-        for name, own in self.characters.items():
-            found.update(f"{name} {own.digest} {own.target.reference}\n".encode())
-        return found.digest()
+        checksum = hashlib.sha256()
+        for name, character in self.characters.items():
+            checksum.update(f"{name} {character.digest} {character.target.reference}\n".encode())
+        return checksum.digest()
 
     def find(self, name: str) -> UserCharacter:
         """Return the character of a name; InvalidField with the nearest name for an unknown one."""
@@ -151,15 +151,17 @@ class CharacterFolder:
                 FIELD, f"{name!r}, expected none given: this service has no characters"
             )
         hint = did_you_mean(name, self.characters)
-        known = ", ".join(list(self.characters)[:10])
+        names = ", ".join(list(self.characters)[:10])
         more = ", ..." if len(self.characters) > 10 else ""
-        raise InvalidField(FIELD, f"no character {name!r}{hint}, expected one of {known}{more}")
+        raise InvalidField(FIELD, f"no character {name!r}{hint}, expected one of {names}{more}")
 
     def document(self) -> dict[str, Any]:
         """Return the CharacterList (schema of the contract)."""
         return {
-            "characters": [_facts(own) for own in self.characters.values()],
-            "faults": [{"file": own.file, "reason": own.reason} for own in self.faults],
+            "characters": [_facts(character) for character in self.characters.values()],
+            "faults": [
+                {"file": character.file, "reason": character.reason} for character in self.faults
+            ],
         }
 
 
@@ -174,42 +176,42 @@ def read_folder(folder: Path, prefix: str) -> CharacterFolder:
     folder that cannot be read or has too many files.
     """
     try:
-        files = sorted(own for own in folder.iterdir() if own.suffix.lower() in ENDINGS)
+        files = sorted(child for child in folder.iterdir() if child.suffix.lower() in ENDINGS)
     except OSError as error:
         raise FileError(folder, f"{error.strerror}, expected a folder of characters") from error
     if len(files) > MOST_CHARACTERS:
         raise FileError(folder, f"{len(files)} files, expected at most {MOST_CHARACTERS}")
-    found: dict[str, UserCharacter] = {}
+    characters: dict[str, UserCharacter] = {}
     faults = []
     for file in files:
         try:
-            found[file.stem] = _read(file, prefix, found)
+            characters[file.stem] = _read(file, prefix, characters)
         except FileError as error:
             # Clients read the reasons: they do not tell where the folder is.
             reason = error.message.replace(f"{folder.resolve()}{os.sep}", "")
             faults.append(CharacterFault(file.name, reason))
-    return CharacterFolder(found, tuple(faults))
+    return CharacterFolder(characters, tuple(faults))
 
 
-def _read(file: Path, prefix: str, found: Mapping[str, UserCharacter]) -> UserCharacter:
+def _read(file: Path, prefix: str, characters: Mapping[str, UserCharacter]) -> UserCharacter:
     if not LEGAL_NAME.fullmatch(file.stem):
         raise FileError(file, f"the name {file.stem!r}, expected letters, digits, '.', '_', '-'")
-    if file.stem in found:
+    if file.stem in characters:
         raise FileError(file, f"another file with the name {file.stem!r}, expected one")
     table = file.with_suffix(".toml")
     roles = read_roles(table) if table.exists() else {}
     return open_character(file, f"{prefix}{file.name}", roles)
 
 
-def _facts(own: UserCharacter) -> dict[str, Any]:
-    rig = own.rig
+def _facts(character: UserCharacter) -> dict[str, Any]:
+    rig = character.rig
     return {
-        "name": own.name,
-        "file": own.target.file,
+        "name": character.name,
+        "file": character.target.file,
         "format": rig.format,
-        "digest": own.digest,
+        "digest": character.digest,
         "joints": len(rig.skeleton),
-        "height": own.height,
+        "height": character.height,
         "roles": [
             {"role": role, "joint": guess.joint, "confidence": guess.confidence}
             for role, guess in rig.roles.items()

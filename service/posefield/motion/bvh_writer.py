@@ -144,15 +144,15 @@ def format_numbers(values: Annotated[Floats, "rows columns"], decimals: int) -> 
     if scaled.max() > MAX_STEPS:
         raise ValueError(f"numbers of up to {np.abs(values).max():g}, expected fewer digits")
     steps = scaled.astype(np.int64)
-    places = max(len(str(steps.max())), decimals + 1)
-    text = np.zeros((*values.shape, places + 3), np.uint8)
+    digits = max(len(str(steps.max())), decimals + 1)
+    text = np.zeros((*values.shape, digits + 3), np.uint8)
     text[..., 0] = np.where((values < 0.0) & (steps > 0), ord("-"), 0)
     text[..., -decimals - 2], text[..., -1], text[:, -1, -1] = b". \n"
     rest = steps
-    for place in range(places):
-        column = -2 - place - (place >= decimals)
+    for digit in range(digits):
+        column = -2 - digit - (digit >= decimals)
         tenth = rest // 10
-        needed = True if place <= decimals else rest > 0
+        needed = True if digit <= decimals else rest > 0
         text[..., column] = np.where(needed, rest - 10 * tenth + ord("0"), 0)
         rest = tenth
     return text.tobytes().translate(None, b"\0")
@@ -163,11 +163,11 @@ def depth_first(skeleton: Skeleton) -> list[tuple[int, int]]:
     children: list[list[int]] = [[] for _ in skeleton.names]
     for joint in range(len(skeleton) - 1, 0, -1):
         children[skeleton.parents[joint]].append(joint)
-    order, ahead = [], [(0, 0)]
-    while ahead:
-        joint, level = ahead.pop()
+    order, pending = [], [(0, 0)]
+    while pending:
+        joint, level = pending.pop()
         order.append((joint, level))
-        ahead += [(child, level + 1) for child in children[joint]]
+        pending += [(child, level + 1) for child in children[joint]]
     return order
 
 
@@ -189,7 +189,7 @@ def unwrap_euler(
     return chosen - 2.0 * np.pi * np.cumsum(turns, axis=0)
 
 
-def _squared_wrapped(apart: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:
+def _squared_wrapped(differences: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:
     """Return squared lengths (...) of differences of angles (..., 3), rad, each wrapped to pi."""
-    nearest = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+    nearest = differences - 2.0 * np.pi * np.round(differences / (2.0 * np.pi))
     return np.einsum("...k,...k->...", nearest, nearest)

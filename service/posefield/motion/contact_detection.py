@@ -78,8 +78,8 @@ def detect_contacts(
         heights = heights[:-1]
     possible = (speeds < thresholds.grown_speed) & (heights < thresholds.grown_height)
     certain = (speeds < thresholds.speed) & (heights < thresholds.height)
-    found = tidy_contacts(_grow(certain, possible, cyclic), rate, cyclic, thresholds)
-    return np.append(found, found[0]) if cyclic else found
+    contacts = tidy_contacts(_grow(certain, possible, cyclic), rate, cyclic, thresholds)
+    return np.append(contacts, contacts[0]) if cyclic else contacts
 
 
 def tidy_contacts(
@@ -92,15 +92,15 @@ def tidy_contacts(
 
     A cycle is given without its last frame.
     """
-    kept = contacts.copy()
+    tidied = contacts.copy()
     for run in runs(contacts, cyclic):
         if len(run) < thresholds.shortest * rate:
-            kept[run] = False
-    for run in runs(~kept, cyclic):
-        inside = kept.any() and (cyclic or (run[0] > 0 and run[-1] < len(kept) - 1))
+            tidied[run] = False
+    for run in runs(~tidied, cyclic):
+        inside = tidied.any() and (cyclic or (run[0] > 0 and run[-1] < len(tidied) - 1))
         if inside and len(run) < thresholds.shortest_gap * rate:
-            kept[run] = True
-    return kept
+            tidied[run] = True
+    return tidied
 
 
 def runs(mask: Annotated[Booleans, "frames"], cyclic: bool) -> list[Annotated[Indices, "_"]]:
@@ -192,13 +192,13 @@ def mean_skate_speeds(
 
     Each has the bytes that it has alone. Motions with equally many feet are measured at once.
     """
-    found: dict[int, float] = {}
-    counts = [own.shape[1] for own in feet]
+    means: dict[int, float] = {}
+    counts = [paths.shape[1] for paths in feet]
     for count in dict.fromkeys(counts):
-        places = [place for place, own in enumerate(counts) if own == count]
-        speeds = _mean_speeds([feet[at] for at in places], np.array([rates[at] for at in places]))
-        found |= zip(places, speeds.tolist(), strict=True)
-    return [found[place] for place in range(len(feet))]
+        clips = [clip for clip, joints in enumerate(counts) if joints == count]
+        speeds = _mean_speeds([feet[at] for at in clips], np.array([rates[at] for at in clips]))
+        means |= zip(clips, speeds.tolist(), strict=True)
+    return [means[clip] for clip in range(len(feet))]
 
 
 def _mean_speeds(
@@ -206,16 +206,16 @@ def _mean_speeds(
 ) -> Annotated[Floats, "motions"]:
     """Return the mean speeds (M,) of planted feet (F, K, 3), m/s; K feet in each motion."""
     groups = frame_groups.of_lengths(feet)
-    whole = np.concatenate(feet)
-    heights = whole @ UP
+    paths = np.concatenate(feet)
+    heights = paths @ UP
     lowest = np.minimum.reduceat(heights, groups.starts, axis=0)[groups.group]
     down = heights < lowest + PLANTED_HEIGHT
     planted = np.zeros(down.shape, bool)
     planted[:-1] = down[1:] & down[:-1]
     # The step from the last frame of a motion to the first of the next is none.
     planted[groups.starts + groups.counts - 1] = False
-    moved = np.diff(whole, axis=0, append=whole[-1:])
-    speeds = rates[groups.group, None] * np.hypot(moved[..., 0], moved[..., 2])
+    steps = np.diff(paths, axis=0, append=paths[-1:])
+    speeds = rates[groups.group, None] * np.hypot(steps[..., 0], steps[..., 2])
     counts = groups.sums(planted.astype(float)).sum(axis=1)
-    found: Floats = groups.sums(speeds * planted).sum(axis=1) / np.maximum(counts, 1.0)
-    return found
+    means: Floats = groups.sums(speeds * planted).sum(axis=1) / np.maximum(counts, 1.0)
+    return means

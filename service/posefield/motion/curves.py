@@ -49,8 +49,8 @@ def limits(
     curves: Sequence[Curve],
 ) -> tuple[Annotated[Floats, "curves"], Annotated[Floats, "curves"]]:
     """Return the smallest and the largest value (C,) of each curve."""
-    ends = np.array([(curve.minimum, curve.maximum) for curve in curves]).reshape(-1, 2)
-    return ends[:, 0], ends[:, 1]
+    ranges = np.array([(curve.minimum, curve.maximum) for curve in curves]).reshape(-1, 2)
+    return ranges[:, 0], ranges[:, 1]
 
 
 def distances(curves: Sequence[Curve]) -> Annotated[Floats, "curves"]:

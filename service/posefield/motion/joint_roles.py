@@ -91,12 +91,14 @@ def rename_joints(
         raise InvalidField(
             "names", f"{names!r}, expected 'own': this model's recipe gives its joints no [roles]"
         )
-    said = {joint: NAMES_BY_CONVENTION[names][role] for role, joint in roles.items()}
-    taken, counts = set(said.values()), Counter[str]()
+    new_names = {joint: NAMES_BY_CONVENTION[names][role] for role, joint in roles.items()}
+    used, counts = set(new_names.values()), Counter[str]()
     # Names that are not taken are kept first, so that no ending of another joint takes them.
-    taken |= (kept := {name for name in skeleton.names if name not in said and name not in taken})
+    used |= (
+        unchanged := {name for name in skeleton.names if name not in new_names and name not in used}
+    )
     renamed = (
-        said.get(name) or (name if name in kept else free_name(name, taken, counts))
+        new_names.get(name) or (name if name in unchanged else free_name(name, used, counts))
         for name in skeleton.names
     )
     return replace(skeleton, names=tuple(renamed))
@@ -107,18 +109,18 @@ def clean_names(names: Iterable[str], clean: Callable[[str], str]) -> tuple[str,
 
     Of several names that become equal, the later ones get the endings _2, _3, and so on.
     """
-    given = list(names)
-    taken = {name for name in given if clean(name) == name}
+    originals = list(names)
+    used = {name for name in originals if clean(name) == name}
     counts = Counter[str]()
-    return tuple(n if n in taken else free_name(clean(n), taken, counts) for n in given)
+    return tuple(n if n in used else free_name(clean(n), used, counts) for n in originals)
 
 
-def free_name(name: str, taken: set[str], counts: Counter[str] | None = None) -> str:
+def free_name(name: str, used: set[str], counts: Counter[str] | None = None) -> str:
     """Return a name that is not taken; counts: the last ending tried, by name."""
     counts = Counter() if counts is None else counts
     while True:
         counts[name] += 1
-        found = name if counts[name] == 1 else f"{name}_{counts[name]}"
-        if found not in taken:
-            taken.add(found)
-            return found
+        candidate = name if counts[name] == 1 else f"{name}_{counts[name]}"
+        if candidate not in used:
+            used.add(candidate)
+            return candidate

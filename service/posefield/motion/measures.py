@@ -83,22 +83,24 @@ class MeasuredMotion:
     landmark: float = 0.0
 
 
-def evaluate(measure: Measure, seen: MeasuredMotion) -> float:
+def evaluate(measure: Measure, motion: MeasuredMotion) -> float:
     """Return the value of a quantity, in its unit."""
     match measure.quantity:
         case "stride_length" | "speed" | "turn":
-            way, taken = seen.travel[None], np.array([seen.duration])
-            return float(travel_values(measure.quantity, way, taken)[0])
+            path, seconds = motion.travel[None], np.array([motion.duration])
+            return float(travel_values(measure.quantity, path, seconds)[0])
         case "leg_length":
-            return float(np.linalg.norm(seen.offsets[list(measure.joints)], axis=-1).sum())
+            return float(np.linalg.norm(motion.offsets[list(measure.joints)], axis=-1).sum())
         case "stature":
-            return _stature(seen)
+            return _stature(motion)
         case "step_length":
-            return float(np.abs(_foot_separation(measure, seen.positions)).max())
+            return float(np.abs(_foot_separation(measure, motion.positions)).max())
         case _:
-            at = moment_frame(measure, seen.positions, seen.landmark)
-            place = quat.interpolate_rows(_mean_positions(measure, seen.positions), np.array(at))
-            return float(place[POSITION_AXES[measure.quantity]])
+            at = moment_frame(measure, motion.positions, motion.landmark)
+            position = quat.interpolate_rows(
+                _mean_positions(measure, motion.positions), np.array(at)
+            )
+            return float(position[POSITION_AXES[measure.quantity]])
 
 
 def travel_values(
@@ -148,18 +150,18 @@ def _foot_separation(measure: Measure, positions: Positions) -> Frames:
     return positions[:, first, 2] - positions[:, second, 2]
 
 
-def _stature(seen: MeasuredMotion) -> float:
+def _stature(motion: MeasuredMotion) -> float:
     """Return the height of the highest joint above the lowest in the rest pose, m."""
-    still = np.zeros((len(seen.parents), 4))
+    still = np.zeros((len(motion.parents), 4))
     still[:, 0] = 1.0
-    positions = skeleton.positions(seen.parents, still, seen.offsets)
+    positions = skeleton.positions(motion.parents, still, motion.offsets)
     return float(np.ptp(positions[:, 1]))
 
 
 def describe(measure: Measure, names: Sequence[str]) -> str:
     """Return a measure as text: "height of rhand at end". names: of all joints."""
-    own = " and ".join(names[joint] for joint in measure.joints)
-    of = f" of {own}" if own else ""
+    joints = " and ".join(names[joint] for joint in measure.joints)
+    of = f" of {joints}" if joints else ""
     at = f" at {measure.at}" if measure.at else ""
     when = "" if measure.share is None else f" ({measure.share:.0%})"
     return f"{measure.quantity.replace('_', ' ')}{of}{at}{when}"
@@ -167,10 +169,13 @@ def describe(measure: Measure, names: Sequence[str]) -> str:
 
 def to_dict(measure: Measure) -> dict[str, Any]:
     """Return a measure as plain values for JSON, without empty fields."""
-    known = {"joints": list(measure.joints), "at": measure.at, "share": measure.share}
-    return {"quantity": measure.quantity, **{k: v for k, v in known.items() if v not in (None, [])}}
+    values = {"joints": list(measure.joints), "at": measure.at, "share": measure.share}
+    return {
+        "quantity": measure.quantity,
+        **{k: v for k, v in values.items() if v not in (None, [])},
+    }
 
 
-def from_dict(found: Mapping[str, Any]) -> Measure:
+def from_dict(values: Mapping[str, Any]) -> Measure:
     """Return the measure of the plain values of `to_dict`."""
-    return Measure(**{**found, "joints": tuple(found.get("joints", ()))})
+    return Measure(**{**values, "joints": tuple(values.get("joints", ()))})

@@ -16,12 +16,12 @@ def mul(a: Quaternions, b: Quaternions) -> Quaternions:
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     real = aw * bw - ax * bx - ay * by - az * bz
-    found = np.empty((*real.shape, 4), real.dtype)
-    found[..., 0] = real
-    found[..., 1] = aw * bx + ax * bw + ay * bz - az * by
-    found[..., 2] = aw * by - ax * bz + ay * bw + az * bx
-    found[..., 3] = aw * bz + ax * by - ay * bx + az * bw
-    return found
+    product = np.empty((*real.shape, 4), real.dtype)
+    product[..., 0] = real
+    product[..., 1] = aw * bx + ax * bw + ay * bz - az * by
+    product[..., 2] = aw * by - ax * bz + ay * bw + az * bx
+    product[..., 3] = aw * bz + ax * by - ay * bx + az * bw
+    return product
 
 
 def conj(q: Quaternions) -> Quaternions:
@@ -49,11 +49,11 @@ def cross(a: Vectors, b: Vectors) -> Vectors:
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     first = ay * bz - az * by
-    found = np.empty((*first.shape, 3), first.dtype)
-    found[..., 0] = first
-    found[..., 1] = az * bx - ax * bz
-    found[..., 2] = ax * by - ay * bx
-    return found
+    product = np.empty((*first.shape, 3), first.dtype)
+    product[..., 0] = first
+    product[..., 1] = az * bx - ax * bz
+    product[..., 2] = ax * by - ay * bx
+    return product
 
 
 def exp(v: Vectors) -> Quaternions:
@@ -212,14 +212,14 @@ Numbers = npt.NDArray[Any]
 
 
 def interpolate_rows(
-    rows: Annotated[Floats, "frames values"], places: Annotated[Floats, "*places"]
+    rows: Annotated[Floats, "frames values"], indices: Annotated[Floats, "*places"]
 ) -> Annotated[Floats, "*places values"]:
     """Return rows (F, k) interpolated linearly at fractional indices (...) from 0 to F - 1.
 
     Shape of the result: (..., k).
     """
-    before = np.minimum(places.astype(np.int64), len(rows) - 2)
-    share = (places - before)[..., None]
+    before = np.minimum(indices.astype(np.int64), len(rows) - 2)
+    share = (indices - before)[..., None]
     return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
@@ -229,8 +229,8 @@ def lerp(
     shares: Annotated[Numbers, "rows"],
 ) -> Annotated[Numbers, "rows *values"]:
     """Return linear interpolations (N, ...) from `before` to `after` by shares (N,), 0 to 1."""
-    way = shares.reshape(-1, *(1 for _ in before.shape[1:]))
-    return before + way * (after - before)
+    weights = shares.reshape(-1, *(1 for _ in before.shape[1:]))
+    return before + weights * (after - before)
 
 
 def nlerp(

@@ -47,13 +47,13 @@ def move_root(clip: Clip, hips: int) -> Clip:
     other children, such as joints for inverse kinematics, follow it.
     """
     parents = clip.skeleton.parents
-    places, turns = skeleton.forward_kinematics(parents, clip.rotations, clip.translations)
+    positions, turns = skeleton.forward_kinematics(parents, clip.rotations, clip.translations)
     headings = np.unwrap(quat.twist(turns[:, hips], UP))
     chain = skeleton.joint_chain(parents, hips)
-    others = [joint for joint in range(len(parents)) if joint not in chain]
-    same = np.abs(np.sum(clip.rotations[0, others] * clip.rotations[-1, others], axis=-1))
+    rest = [joint for joint in range(len(parents)) if joint not in chain]
+    same = np.abs(np.sum(clip.rotations[0, rest] * clip.rotations[-1, rest], axis=-1))
     is_loop = len(clip) > 2 and bool(np.all(same > 1.0 - SAME_POSE))
-    path = _smooth(np.column_stack([places[:, hips, [0, 2]], headings]), clip.rate, is_loop)
+    path = _smooth(np.column_stack([positions[:, hips, [0, 2]], headings]), clip.rate, is_loop)
     heading = quat.from_axis_angle(UP, path[:, 2])
     root = quat.rotate(heading, clip.skeleton.offsets[0])
     root[:, [0, 2]] += path[:, :2]
@@ -61,7 +61,7 @@ def move_root(clip: Clip, hips: int) -> Clip:
     rotations, translations = clip.rotations.copy(), clip.translations.copy()
     rotations[:, 0], translations[:, 0] = heading, root
     rotations[:, child] = quat.mul(quat.conj(heading), turns[:, child])
-    translations[:, child] = quat.rotate(quat.conj(heading), places[:, child] - root)
+    translations[:, child] = quat.rotate(quat.conj(heading), positions[:, child] - root)
     return replace(clip, rotations=rotations, translations=translations, root_bone=False)
 
 
@@ -72,6 +72,6 @@ def _smooth(path: Floats, rate: float, is_loop: bool) -> Floats:
     cycle = sway[:-1] if is_loop else np.concatenate([sway, -sway[-2:0:-1]])
     frequencies = np.fft.rfftfreq(len(cycle), 1.0 / rate)
     gains = np.exp(-0.5 * np.square(2.0 * np.pi * SMOOTHING * frequencies))
-    kept = np.fft.irfft(gains[:, None] * np.fft.rfft(cycle, axis=0), len(cycle), axis=0)
-    found: Floats = line + np.concatenate([kept, kept[:1]])[: len(path)]
-    return found
+    smoothed = np.fft.irfft(gains[:, None] * np.fft.rfft(cycle, axis=0), len(cycle), axis=0)
+    whole_path: Floats = line + np.concatenate([smoothed, smoothed[:1]])[: len(path)]
+    return whole_path

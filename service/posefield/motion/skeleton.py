@@ -100,12 +100,12 @@ def forward_kinematics(
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     if math.prod(lead) <= FEW_POSES:
         return _at_once(parents, lead, rotations, translations)
-    places, turns = np.empty((*lead, len(parents), 3)), np.empty((*lead, len(parents), 4))
+    world, turns = np.empty((*lead, len(parents), 3)), np.empty((*lead, len(parents), 4))
     turning = frozenset(range(len(parents)))
     for block, own_turns, own_arms in _blocks(lead, rotations, translations):
         placed, turned = _accumulate(parents, own_turns, own_arms, turning)
-        _rows(places)[block], _rows(turns)[block] = _from_planes(placed), _from_planes(turned)
-    return places, turns
+        _rows(world)[block], _rows(turns)[block] = _from_planes(placed), _from_planes(turned)
+    return world, turns
 
 
 def positions(
@@ -117,10 +117,10 @@ def positions(
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     if math.prod(lead) <= FEW_POSES:
         return _at_once(parents, lead, rotations, translations)[0]
-    places = np.empty((*lead, len(parents), 3))
+    world = np.empty((*lead, len(parents), 3))
     for block, own_turns, own_arms in _blocks(lead, rotations, translations):
-        _rows(places)[block] = _from_planes(position_planes(parents, own_turns, own_arms))
-    return places
+        _rows(world)[block] = _from_planes(position_planes(parents, own_turns, own_arms))
+    return world
 
 
 def _at_once(
@@ -187,14 +187,14 @@ def _accumulate(
 ) -> tuple[Annotated[Floats, "joints 3 *poses"], Annotated[Floats, "joints 4 *poses"]]:
     """Return joint positions (J, 3, ...), and orientations (J, 4, ...) of the joints `turning`."""
     lead = rotations.shape[2:]
-    places, turns = np.empty((len(parents), 3, *lead)), np.empty((len(parents), 4, *lead))
-    places[0], turns[0] = translations[0], rotations[0]
+    world, turns = np.empty((len(parents), 3, *lead)), np.empty((len(parents), 4, *lead))
+    world[0], turns[0] = translations[0], rotations[0]
     for joint, parent in enumerate(parents[1:], start=1):
-        quat.rotate_planes(turns[parent], translations[joint], out=places[joint])
-        places[joint] += places[parent]
+        quat.rotate_planes(turns[parent], translations[joint], out=world[joint])
+        world[joint] += world[parent]
         if joint in turning:
             quat.product_planes(turns[parent], rotations[joint], out=turns[joint])
-    return places, turns
+    return world, turns
 
 
 @dataclass(frozen=True)
@@ -221,13 +221,13 @@ def tree_levels(parents: tuple[int, ...]) -> TreeLevels:
     for joint, parent in enumerate(parents[1:], start=1):
         depths[joint] = depths[parent] + 1
     order = np.argsort(depths, kind="stable")
-    places = np.argsort(order)
-    ends = np.cumsum(np.bincount(depths))
+    ranks = np.argsort(order)
+    level_ends = np.cumsum(np.bincount(depths))
     levels = [
-        TreeLevel(slice(int(begin), int(end)), places[np.array(parents)[order[begin:end]]])
-        for begin, end in pairwise(ends)
+        TreeLevel(slice(int(begin), int(end)), ranks[np.array(parents)[order[begin:end]]])
+        for begin, end in pairwise(level_ends)
     ]
-    return TreeLevels(tuple(levels), order, places)
+    return TreeLevels(tuple(levels), order, ranks)
 
 
 def _accumulate_levels(
@@ -241,23 +241,27 @@ def _accumulate_levels(
     quaternion has x and y once more at its end, so that its cyclic permutations are slices.
     """
     tree, count = tree_levels(parents), len(rotations)
-    own = rotations.transpose(2, 1, 0)[:, tree.order]
+    sorted_rotations = rotations.transpose(2, 1, 0)[:, tree.order]
     arms = translations.transpose(2, 1, 0)[:, tree.order]
     arms = np.concatenate([arms, arms[:2]])
-    terms = np.concatenate([own, -own])[TERMS]
-    places, turns = np.empty((3, len(parents), count)), np.empty((6, len(parents), count))
-    places[:, 0], turns[:4, 0], turns[4:, 0] = arms[:3, 0], own[:, 0], own[1:3, 0]
+    terms = np.concatenate([sorted_rotations, -sorted_rotations])[TERMS]
+    world, turns = np.empty((3, len(parents), count)), np.empty((6, len(parents), count))
+    world[:, 0], turns[:4, 0], turns[4:, 0] = (
+        arms[:3, 0],
+        sorted_rotations[:, 0],
+        sorted_rotations[1:3, 0],
+    )
     for level in tree.levels:
         rows, above = level.rows, turns[:, level.parents]
         placed = _rotated(above, arms[:, rows])
-        placed += places[:, level.parents]
-        places[:, rows] = placed
+        placed += world[:, level.parents]
+        world[:, rows] = placed
         turned = above[0] * terms[0, :, rows]
         for component in (1, 2, 3):
             turned += above[component] * terms[component, :, rows]
         turns[:4, rows], turns[4:, rows] = turned, turned[1:3]
     # Sums over an array depend on its layout, which is therefore that of larger numbers of poses.
-    placed = np.ascontiguousarray(places[:, tree.places].T)
+    placed = np.ascontiguousarray(world[:, tree.places].T)
     return placed, np.ascontiguousarray(turns[:4, tree.places].T)
 
 
@@ -269,18 +273,18 @@ def _rotated(
     across = np.empty(v.shape)
     np.multiply(2.0, yzx * v[2:] - zxy * v[1:4], out=across[:3])
     across[3:] = across[:2]
-    found = v[:3] + q[0] * across[:3]
-    found += yzx * across[2:] - zxy * across[1:4]
-    return np.asarray(found)
+    rotated = v[:3] + q[0] * across[:3]
+    rotated += yzx * across[2:] - zxy * across[1:4]
+    return np.asarray(rotated)
 
 
 @lru_cache(1024)
 def joint_chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:
     """Return the joints from the root to a joint, each the parent of the next."""
-    found = [joint]
-    while parents[found[-1]] >= 0:
-        found.append(parents[found[-1]])
-    return tuple(reversed(found))
+    chain = [joint]
+    while parents[chain[-1]] >= 0:
+        chain.append(parents[chain[-1]])
+    return tuple(reversed(chain))
 
 
 def descendant_matrix(parents: tuple[int, ...]) -> Annotated[Floats, "joints joints"]:
@@ -309,6 +313,6 @@ def moved_roots(
     roots: Annotated[Floats, "*poses 3"], gone: Annotated[Floats, "*poses 3"]
 ) -> Annotated[Floats, "*poses 3"]:
     """Return root positions (..., 3), m, moved by the travel over the floor in (..., 3)."""
-    moved = roots.copy()
-    moved[..., [0, 2]] += gone[..., :2]
-    return moved
+    paths = roots.copy()
+    paths[..., [0, 2]] += gone[..., :2]
+    return paths

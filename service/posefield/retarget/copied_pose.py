@@ -38,9 +38,9 @@ def with_upright_rest(motion: PosedRig) -> PosedRig:
     feet = 0.5 * (motion.of_role("leftFoot") + motion.of_role("rightFoot"))
     top = motion.of_role(next(role for role in ("neck", "head", "hips") if role in joints))
     frame = int(np.argmax(np.round((top - feet) @ UP, 4)))
-    places = motion.places[frame]
-    bones = places - places[list(motion.body.parents)]
-    bones[0] = places[0]
+    positions = motion.places[frame]
+    bones = positions - positions[list(motion.body.parents)]
+    bones[0] = positions[0]
     turns = quat.mul(motion.turns, quat.conj(motion.turns[frame]))
     return replace(motion, body=replace(motion.body, bones=bones), turns=turns)
 
@@ -51,7 +51,10 @@ def is_upright(body: Body) -> bool:
     top = next((role for role in ("neck", "head") if role in body.joints), None)
     ways += [] if top is None else [body.direction("hips", top)]
     across = body.direction("rightUpperLeg", "leftUpperLeg") * FLOOR
-    return min(way @ UP for way in ways) > UPRIGHT and float(np.linalg.norm(across)) > UPRIGHT
+    return (
+        min(direction @ UP for direction in ways) > UPRIGHT
+        and float(np.linalg.norm(across)) > UPRIGHT
+    )
 
 
 @dataclass(frozen=True)
@@ -73,14 +76,14 @@ class Sole:
     @property
     def flattening(self) -> Floats:
         """Return the rotation (4,) that makes the sole flat."""
-        ahead = self.toes * FLOOR / max(float(np.linalg.norm(self.toes * FLOOR)), 1e-9)
-        return quat.from_axis_angle(quat.cross(ahead, UP), np.array(self.pitch))
+        forward = self.toes * FLOOR / max(float(np.linalg.norm(self.toes * FLOOR)), 1e-9)
+        return quat.from_axis_angle(quat.cross(forward, UP), np.array(self.pitch))
 
     @property
     def flat_toes(self) -> Vector:
         """Return the vector (3,), m, from the ankle to the toes of the flat foot."""
-        found: Vector = quat.rotate(self.flattening, self.toes)
-        return found
+        flattened: Vector = quat.rotate(self.flattening, self.toes)
+        return flattened
 
 
 def sole_at_rest(body: Body, side: str) -> Sole:
@@ -97,16 +100,16 @@ def sole_of_motion(
     standing (F,): whether the foot stands. rig: the sole to be compared; one of the same slope at
     rest is flat at rest too, as is a foot that never stands or has no toes.
     """
-    found = sole_at_rest(motion.body, side)
-    is_same = abs(found.slope - rig.slope) <= SAME_SLOPE
-    if not standing.any() or not found.toes.any() or not rig.toes.any() or is_same:
-        return found
+    sole = sole_at_rest(motion.body, side)
+    is_same = abs(sole.slope - rig.slope) <= SAME_SLOPE
+    if not standing.any() or not sole.toes.any() or not rig.toes.any() or is_same:
+        return sole
     ankles, toes = motion.of_role(side + "Foot")[standing], motion.of_role(side + "Toes")[standing]
     heights = ankles @ UP
     low = heights <= np.percentile(heights, FLAT_SHARE)
-    apart = (toes - ankles)[low]
-    slopes = np.arctan2(apart @ UP, np.linalg.norm(apart * FLOOR, axis=-1))
-    return replace(found, pitch=float(np.median(slopes)) - found.slope)
+    soles = (toes - ankles)[low]
+    slopes = np.arctan2(soles @ UP, np.linalg.norm(soles * FLOOR, axis=-1))
+    return replace(sole, pitch=float(np.median(slopes)) - sole.slope)
 
 
 SHORTEST = 0.01
@@ -127,28 +130,28 @@ def align_rests(source: Body, rig: Body, soles: Soles) -> dict[str, Floats]:
 
     soles: of the motion's left and right foot, then of the rig's.
     """
-    whole = quat.from_axis_angle(UP, np.array(source.facing - rig.facing))
-    found = {role: whole for role in rig.joints if role in source.joints}
+    heading = quat.from_axis_angle(UP, np.array(source.facing - rig.facing))
+    turns = {role: heading for role in rig.joints if role in source.joints}
     for side, (theirs, ours) in zip(SIDES, soles, strict=True):
         for upper, lower in BONES:
-            ends = (side + upper, side + lower)
-            if {*ends} <= found.keys():
-                old = quat.rotate(whole, rig.direction(*ends))
-                found[ends[0]] = quat.mul(shortest_turn(old, source.direction(*ends)), whole)
-        found[side + "Foot"] = _foot_turn(theirs, ours, whole)
+            bone = (side + upper, side + lower)
+            if {*bone} <= turns.keys():
+                old = quat.rotate(heading, rig.direction(*bone))
+                turns[bone[0]] = quat.mul(shortest_turn(old, source.direction(*bone)), heading)
+        turns[side + "Foot"] = _foot_turn(theirs, ours, heading)
         for end, before in FOLLOWERS.items():
-            if {side + end, side + before} <= found.keys():
-                found[side + end] = found[side + before]
-    return found
+            if {side + end, side + before} <= turns.keys():
+                turns[side + end] = turns[side + before]
+    return turns
 
 
-def _foot_turn(theirs: Sole, ours: Sole, whole: Floats) -> Floats:
+def _foot_turn(theirs: Sole, ours: Sole, heading: Floats) -> Floats:
     """Return the rotation (4,) of a foot that is flat where the motion's is, and points alike."""
-    old, new = quat.rotate(whole, ours.toes), theirs.flat_toes
+    old, new = quat.rotate(heading, ours.toes), theirs.flat_toes
     if min(np.hypot(old[0], old[2]), np.hypot(new[0], new[2])) < SHORTEST:
-        return whole
+        return heading
     angle = np.arctan2(new[0], new[2]) - np.arctan2(old[0], old[2])
-    turned = quat.mul(quat.from_axis_angle(UP, np.array(angle)), whole)
+    turned = quat.mul(quat.from_axis_angle(UP, np.array(angle)), heading)
     return quat.mul(quat.conj(theirs.flattening), turned)
 
 
@@ -164,56 +167,58 @@ def copy_orientations(
     """
     aligned = align_rests(source, rig, soles)
     world: dict[int, Floats] = {
-        rig.joints[role]: quat.mul(turns[:, source.joints[role]], own)
-        for role, own in aligned.items()
+        rig.joints[role]: quat.mul(turns[:, source.joints[role]], turn)
+        for role, turn in aligned.items()
     }
-    aligned_joints = {rig.joints[role]: own for role, own in aligned.items()}
-    whole = aligned["hips"]
+    aligned_joints = {rig.joints[role]: turn for role, turn in aligned.items()}
+    heading = aligned["hips"]
     for mine, theirs in ((rig.spine, source.spine), (rig.neck, source.neck)):
         if mine.joints and theirs.joints:
-            for joint, place in zip(mine.joints, mine.places.tolist(), strict=True):
-                world[joint] = quat.mul(_along(theirs, turns, place), whole)
+            for joint, share in zip(mine.joints, mine.places.tolist(), strict=True):
+                world[joint] = quat.mul(_along(theirs, turns, share), heading)
     for joint, namesake in _namesakes(source, rig, set(world)).items():
         chain = joint_chain(rig.parents, joint)[-2::-1]
-        above = next((own for own in chain if own in aligned_joints), None)
+        above = next((turn for turn in chain if turn in aligned_joints), None)
         if above is not None:
             world[joint] = quat.mul(turns[:, namesake], aligned_joints[above])
     return _local(rig.parents, world, len(turns))
 
 
-def _namesakes(source: Body, rig: Body, known: set[int]) -> dict[int, int]:
+def _namesakes(source: Body, rig: Body, mapped: set[int]) -> dict[int, int]:
     """Return the joints without a role whose names both skeletons have, by joint of the rig."""
-    taken = set(source.joints.values())
-    free = {name: joint for joint, name in enumerate(source.names) if joint not in taken}
+    used = set(source.joints.values())
+    free = {name: joint for joint, name in enumerate(source.names) if joint not in used}
     return {
         joint: free[name]
         for joint, name in enumerate(rig.names)
-        if joint not in known and name in free
+        if joint not in mapped and name in free
     }
 
 
-def _along(chain: Chain, turns: Annotated[Floats, "frames _ 4"], place: float) -> Floats:
+def _along(chain: Chain, turns: Annotated[Floats, "frames _ 4"], share_of_chain: float) -> Floats:
     """Return the orientation (F, 4) at a place, 0 to 1, of a chain."""
-    after = min(int(np.searchsorted(chain.places, place - 1e-9)), len(chain.joints) - 1)
+    after = min(int(np.searchsorted(chain.places, share_of_chain - 1e-9)), len(chain.joints) - 1)
     before = max(after - 1, 0)
     first, last = chain.places[before], chain.places[after]
-    if last - place < 1e-9 or last <= first:
+    if last - share_of_chain < 1e-9 or last <= first:
         return turns[:, chain.joints[after]]
-    share = np.array((place - first) / (last - first))
-    found: Floats = quat.slerp(turns[:, chain.joints[before]], turns[:, chain.joints[after]], share)
-    return found
+    share = np.array((share_of_chain - first) / (last - first))
+    interpolated: Floats = quat.slerp(
+        turns[:, chain.joints[before]], turns[:, chain.joints[after]], share
+    )
+    return interpolated
 
 
 def _local(parents: tuple[int, ...], world: dict[int, Floats], frames: int) -> Rotations:
     """Return local rotations (F, J, 4) of joints of which some have a known orientation."""
-    found = np.empty((frames, len(parents), 4))
-    found[:] = quat.IDENTITY
+    local = np.empty((frames, len(parents), 4))
+    local[:] = quat.IDENTITY
     turns: list[Floats] = []
     for joint, parent in enumerate(parents):
         above = turns[parent] if parent >= 0 else np.broadcast_to(quat.IDENTITY, (frames, 4))
         if joint in world:
-            found[:, joint] = quat.mul(quat.conj(above), world[joint])
+            local[:, joint] = quat.mul(quat.conj(above), world[joint])
             turns.append(world[joint])
         else:
             turns.append(above)
-    return found
+    return local

@@ -44,8 +44,8 @@ class SourceFeet:
     @property
     def standing(self) -> Annotated[Booleans, "frames feet"]:
         """Return whether each foot stands in each frame (F, 2)."""
-        found = [stances.mask(own, len(self.paths)) for own in self.stances]
-        return np.stack(found, axis=1)
+        masks = [stances.mask(intervals, len(self.paths)) for intervals in self.stances]
+        return np.stack(masks, axis=1)
 
     @property
     def floors(self) -> Annotated[Floats, "frames feet"]:
@@ -53,18 +53,18 @@ class SourceFeet:
 
         As each stance has it; between two the lower one, so that feet may step up and down.
         """
-        found = np.empty(self.paths.shape[:2])
-        for foot, own in enumerate(self.stances):
+        floors = np.empty(self.paths.shape[:2])
+        for foot, intervals in enumerate(self.stances):
             heights = self.paths[:, foot] @ UP
-            level = [float(np.median(heights[s.begin : s.end])) for s in own]
+            level = [float(np.median(heights[s.begin : s.end])) for s in intervals]
             level = level or [float(self.heights[foot])]
-            edges = [0, *(s.end for s in own[:-1]), len(heights)]
-            begins = [s.begin for s in own] or [0]
+            edges = [0, *(s.end for s in intervals[:-1]), len(heights)]
+            begins = [s.begin for s in intervals] or [0]
             for index, (first, last) in enumerate(pairwise(edges)):
-                found[first:last, foot] = level[index]
+                floors[first:last, foot] = level[index]
                 swing = slice(first, begins[index])
-                found[swing, foot] = min(level[max(index - 1, 0)], level[index])
-        return found - self.heights
+                floors[swing, foot] = min(level[max(index - 1, 0)], level[index])
+        return floors - self.heights
 
 
 def contact_roles(source: Body, rig: Body) -> tuple[str, str]:
@@ -79,34 +79,36 @@ def feet_of(
     rate: float,
     roles: tuple[str, str],
     names: tuple[str, str],
-    told: Sequence[StanceResult] | None,
+    stance_results: Sequence[StanceResult] | None,
 ) -> SourceFeet:
     """Return the feet of a motion.
 
     paths: of the joints that contact, in proportion to the rig. names: of these joints. told: their
     stances; None to detect them.
     """
-    own = [FootPath(paths[:, foot], rate) for foot in range(2)]
-    if told is None:
+    foot_paths = [FootPath(paths[:, foot], rate) for foot in range(2)]
+    if stance_results is None:
         # A single pose has no speeds.
-        found = stance_rows.from_motion(own) if len(paths) > 1 else [[], []]
+        intervals = stance_rows.from_motion(foot_paths) if len(paths) > 1 else [[], []]
     else:
-        found = [_stances(told, name, rate, len(paths)) for name in names]
+        intervals = [_stances(stance_results, name, rate, len(paths)) for name in names]
     heights = [
         stance_rows.statistics(foot, path, down).height
-        for foot, (path, down) in enumerate(zip(own, found, strict=True))
+        for foot, (path, down) in enumerate(zip(foot_paths, intervals, strict=True))
     ]
-    return SourceFeet(roles, paths, tuple(map(tuple, found)), np.array(heights))
+    return SourceFeet(roles, paths, tuple(map(tuple, intervals)), np.array(heights))
 
 
-def _stances(told: Sequence[StanceResult], name: str, rate: float, frames: int) -> list[Interval]:
+def _stances(
+    results: Sequence[StanceResult], name: str, rate: float, frames: int
+) -> list[Interval]:
     """Return the frames of the stances of a joint."""
-    found = []
-    for own in told:
-        begin, end = round(own.begin * rate), min(round(own.end * rate) + 1, frames)
-        if own.joint == name and begin < end:
-            found.append(Interval(begin, end))
-    return found
+    intervals = []
+    for stance in results:
+        begin, end = round(stance.begin * rate), min(round(stance.end * rate) + 1, frames)
+        if stance.joint == name and begin < end:
+            intervals.append(Interval(begin, end))
+    return intervals
 
 
 def standing_heights(feet: SourceFeet, rig: Body) -> Annotated[Floats, "feet"]:
@@ -116,9 +118,9 @@ def standing_heights(feet: SourceFeet, rig: Body) -> Annotated[Floats, "feet"]:
     Differences as between the soles of captured performers are left as they are.
     """
     rest = np.array([rig.rest[rig.joints[role]][1] for role in feet.roles])
-    known = 0.0 <= rest.min() and rest.max() <= HIGHEST_FOOT * rig.leg_length
+    is_plausible = 0.0 <= rest.min() and rest.max() <= HIGHEST_FOOT * rig.leg_length
     same = abs(float(np.mean(rest - feet.heights))) <= UNEVEN
-    return feet.heights if same or not known or np.ptp(rest) > UNEVEN else rest
+    return feet.heights if same or not is_plausible or np.ptp(rest) > UNEVEN else rest
 
 
 def plan_paths(
@@ -131,51 +133,51 @@ def plan_paths(
 
     copied: those of copied orientations. heights (2,): while the rig's feet stand, m.
     """
-    found = feet.paths + (heights - feet.heights)[:, None] * UP
-    for foot, own in enumerate(feet.stances):
-        apart = (copied[:, foot] - feet.paths[:, foot]) * FLOOR
-        found[:, foot] += apart + _correction(apart, own, rate)
-    return found
+    planned = feet.paths + (heights - feet.heights)[:, None] * UP
+    for foot, intervals in enumerate(feet.stances):
+        offsets = (copied[:, foot] - feet.paths[:, foot]) * FLOOR
+        planned[:, foot] += offsets + _correction(offsets, intervals, rate)
+    return planned
 
 
-def _correction(apart: RootPath, found: Sequence[Interval], rate: float) -> RootPath:
+def _correction(offsets: RootPath, intervals: Sequence[Interval], rate: float) -> RootPath:
     """Return the change (F, 3) of a distance with which it is constant in each stance.
 
     Between stances it is a cubic with the values and slopes at their ends, before the first and
     after the last it settles at a constant.
     """
-    change = np.zeros(apart.shape)
-    if not found:
+    change = np.zeros(offsets.shape)
+    if not intervals:
         return change
-    slopes = np.gradient(apart, axis=0) if len(apart) > 1 else np.zeros(apart.shape)
-    for own in found:
-        inside = slice(own.begin, own.end)
-        change[inside] = apart[inside].mean(axis=0) - apart[inside]
-    for before, after in pairwise(found):
+    slopes = np.gradient(offsets, axis=0) if len(offsets) > 1 else np.zeros(offsets.shape)
+    for interval in intervals:
+        inside = slice(interval.begin, interval.end)
+        change[inside] = offsets[inside].mean(axis=0) - offsets[inside]
+    for before, after in pairwise(intervals):
         last, first = before.end - 1, after.begin
         shares = np.arange(1, first - last)[:, None] / (first - last)
-        ends = (change[last], change[first])
+        boundary = (change[last], change[first])
         ways = (-(first - last) * slopes[last], -(first - last) * slopes[first])
-        change[last + 1 : first] = _cubic(ends, ways, shares)
-    begin, end = found[0].begin, found[-1].end
+        change[last + 1 : first] = _cubic(boundary, ways, shares)
+    begin, end = intervals[0].begin, intervals[-1].end
     change[:begin] = _settled(change[begin], slopes[begin], np.arange(begin, 0, -1), rate)
-    steps = np.arange(1, len(apart) - end + 1)
+    steps = np.arange(1, len(offsets) - end + 1)
     change[end:] = _settled(change[end - 1], -slopes[end - 1], steps, rate)
     return change
 
 
 def _cubic(
-    ends: tuple[Floats, Floats], ways: tuple[Floats, Floats], share: Floats
+    values: tuple[Floats, Floats], ways: tuple[Floats, Floats], share: Floats
 ) -> Annotated[Floats, "some 3"]:
     """Return the cubic (S, 3) between two values with slopes, at shares (S, 1)."""
     s = share
-    found: Floats = (
-        (2 * s**3 - 3 * s**2 + 1) * ends[0]
+    cubic: Floats = (
+        (2 * s**3 - 3 * s**2 + 1) * values[0]
         + (s**3 - 2 * s**2 + s) * ways[0]
-        + (3 * s**2 - 2 * s**3) * ends[1]
+        + (3 * s**2 - 2 * s**3) * values[1]
         + (s**3 - s**2) * ways[1]
     )
-    return found
+    return cubic
 
 
 def _settled(
@@ -183,8 +185,8 @@ def _settled(
 ) -> Annotated[Floats, "some 3"]:
     """Return values (S, 3) some steps away from one with a slope by step, which fades."""
     fade = FADE * rate
-    found: Floats = value + slope * (fade * -np.expm1(-steps / fade))[:, None]
-    return found
+    settled: Floats = value + slope * (fade * -np.expm1(-steps / fade))[:, None]
+    return settled
 
 
 SMOOTHING = 0.12
@@ -213,31 +215,31 @@ class PosedRig:
 
     def limb(self, roles: tuple[str, ...]) -> tuple[Limb, LimbPoses]:
         """Return the limb of joints of roles, and its poses; joints between them do not turn."""
-        own = [self.body.joints[role] for role in roles]
-        joints = (self.body.parents[own[0]], *own)
+        role_joints = [self.body.joints[role] for role in roles]
+        joints = (self.body.parents[role_joints[0]], *role_joints)
         rest = self.body.rest[list(joints)]
         bones = np.diff(rest, axis=0, prepend=rest[:1])
         parents = tuple(range(-1, len(joints) - 1))
-        places, turns = self.places[:, list(joints)], self.turns[:, list(joints)]
-        limb = Limb(own[0], own[1], own[2], own[-1])
-        return limb, LimbPoses(joints, parents, bones, places, turns)
+        limb_positions, turns = self.places[:, list(joints)], self.turns[:, list(joints)]
+        limb = Limb(role_joints[0], role_joints[1], role_joints[2], role_joints[-1])
+        return limb, LimbPoses(joints, parents, bones, limb_positions, turns)
 
 
 def posed(body: Body, rotations: Rotations, roots: RootPath) -> PosedRig:
     """Return poses with the positions and orientations of their joints."""
-    moved = skeleton.translations(body.bones, roots)
+    translations = skeleton.translations(body.bones, roots)
     return PosedRig(
         body,
         rotations,
         roots,
-        *skeleton.forward_kinematics(body.parents, rotations, moved),
+        *skeleton.forward_kinematics(body.parents, rotations, translations),
     )
 
 
 def moved(rig: PosedRig, shift: RootPath) -> PosedRig:
     """Return poses whose root is moved by (F, 3), m."""
-    places = rig.places + shift[:, None]
-    return PosedRig(rig.body, rig.rotations, rig.roots + shift, places, rig.turns)
+    positions = rig.places + shift[:, None]
+    return PosedRig(rig.body, rig.rotations, rig.roots + shift, positions, rig.turns)
 
 
 @dataclass(frozen=True)
@@ -269,8 +271,10 @@ class RigSoles:
 def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> PlantedLegs:
     """Return the poses with the feet on their paths. feet: of the motion, in proportion."""
     copied = _at(rig, feet.roles)
-    wanted = feet.paths @ UP + soles.heights - feet.heights
-    rig = moved(rig, _pelvis_height(wanted - copied @ UP, feet.standing, rate)[:, None] * UP)
+    target_heights = feet.paths @ UP + soles.heights - feet.heights
+    rig = moved(
+        rig, _pelvis_height(target_heights - copied @ UP, feet.standing, rate)[:, None] * UP
+    )
     copied = _at(rig, feet.roles)
     paths = plan_paths(feet, copied, soles.heights, rate)
     depths = sole_depths(rig, soles, feet.floors, paths, paths - copied)
@@ -290,16 +294,16 @@ def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> Plan
         two_bone.need(poses, leg, target, np.zeros(len(target)))
         for (leg, poses), target in zip(legs, targets, strict=True)
     ]
-    most = np.full(len(paths), DEEPEST * rig.body.leg_length)
-    lowered = two_bone.lower(needs, most, frame_groups.one_row(len(most), rate))
+    largest = np.full(len(paths), DEEPEST * rig.body.leg_length)
+    lowered = two_bone.lower(needs, largest, frame_groups.one_row(len(largest), rate))
     rotations = rig.rotations.copy()
     shift = -lowered[:, None] * UP
     for (leg, poses), target in zip(legs, targets, strict=True):
         turn_limb(rotations, leg, poses, shift, target)
-    made = posed(rig.body, rotations, rig.roots + shift)
+    planted = posed(rig.body, rotations, rig.roots + shift)
     still = np.zeros(paths.shape)
-    depths = sole_depths(made, soles, feet.floors, _at(made, feet.roles), still)
-    return PlantedLegs(made, rig, depths, lowered)
+    depths = sole_depths(planted, soles, feet.floors, _at(planted, feet.roles), still)
+    return PlantedLegs(planted, rig, depths, lowered)
 
 
 def turn_limb(
@@ -309,14 +313,14 @@ def turn_limb(
 
     shift (F, 3): movement of its upper joint, m. Frames in which it is there stay as they are.
     """
-    apart = np.linalg.norm(target - shift - poses.position(limb.lower), axis=-1)
-    moved = apart > SAME
-    if not moved.any():
+    distances = np.linalg.norm(target - shift - poses.position(limb.lower), axis=-1)
+    changed = distances > SAME
+    if not changed.any():
         return
     before = rotations.copy()
-    found = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
-    found.apply(limb, rotations)
-    rotations[~moved] = before[~moved]
+    turns = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
+    turns.apply(limb, rotations)
+    rotations[~changed] = before[~changed]
 
 
 def _at(rig: PosedRig, roles: tuple[str, str]) -> Annotated[Floats, "frames feet 3"]:
@@ -325,23 +329,23 @@ def _at(rig: PosedRig, roles: tuple[str, str]) -> Annotated[Floats, "frames feet
 
 
 def _pelvis_height(
-    apart: Annotated[Floats, "frames feet"],
+    offsets: Annotated[Floats, "frames feet"],
     standing: Annotated[Booleans, "frames feet"],
     rate: float,
 ) -> Frames:
     """Return how much higher the pelvis has to be (F,), m, for the feet that stand, smoothly."""
     weights = standing.sum(axis=1).astype(float)
     if not weights.any():
-        return np.full(len(apart), float(np.median(apart)))
+        return np.full(len(offsets), float(np.median(offsets)))
     half = max(1, round(4.0 * SMOOTHING * rate))
     kernel = np.exp(-0.5 * np.square(np.arange(-half, half + 1) / (SMOOTHING * rate)))
-    wanted, known = (
+    sums, totals = (
         np.convolve(np.pad(values, half), kernel, mode="valid")
-        for values in ((apart * standing).sum(axis=1), weights)
+        for values in ((offsets * standing).sum(axis=1), weights)
     )
-    near = np.flatnonzero(known > 0.0)
+    near = np.flatnonzero(totals > 0.0)
     # Far from all stances those before and after count.
-    return np.asarray(np.interp(np.arange(len(apart)), near, wanted[near] / known[near]))
+    return np.asarray(np.interp(np.arange(len(offsets)), near, sums[near] / totals[near]))
 
 
 def sole_depths(
@@ -356,13 +360,13 @@ def sole_depths(
     The deeper of ball and heel. floors (F, 2): heights, m. paths: of the joints that stand, m.
     shift: of the ankles against the poses (F, 2, 3), m.
     """
-    found = floors + soles.heights - paths @ UP
+    depths = floors + soles.heights - paths @ UP
     for foot, side in enumerate(SIDES):
         ankle = rig.body.joints[side + "Foot"]
         heel = rig.places[:, ankle] + quat.rotate(rig.turns[:, ankle], soles.heels[foot])
         below = floors[:, foot] - (heel + shift[:, foot]) @ UP
-        found[:, foot] = np.maximum(found[:, foot], below)
-    return found
+        depths[:, foot] = np.maximum(depths[:, foot], below)
+    return depths
 
 
 def limited_lifts(depths: Floats) -> Floats:
@@ -372,5 +376,5 @@ def limited_lifts(depths: Floats) -> Floats:
     """
     soft = MOST_DEPTH - FREE_DEPTH
     beyond = np.maximum(depths - FREE_DEPTH, 0.0)
-    found: Floats = beyond - soft * -np.expm1(-beyond / soft)
-    return found
+    limited: Floats = beyond - soft * -np.expm1(-beyond / soft)
+    return limited

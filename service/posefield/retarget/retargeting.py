@@ -68,34 +68,34 @@ class RetargetReport:
 
     def facts(self) -> dict[str, Any]:
         """Return the fields as plain values, lengths rounded to micrometres."""
-        found = asdict(self)
-        for name, value in found.items():
+        facts = asdict(self)
+        for name, value in facts.items():
             if isinstance(value, float):
-                found[name] = round_micrometres(value)
+                facts[name] = round_micrometres(value)
             elif isinstance(value, tuple):
-                found[name] = list(value)
-        found["hands_missed"] = list(map(round_micrometres, self.hands_missed))
-        return found
+                facts[name] = list(value)
+        facts["hands_missed"] = list(map(round_micrometres, self.hands_missed))
+        return facts
 
 
-def measure(feet: SourceFeet, made: PlantedLegs, scale: float, rate: float) -> RetargetReport:
+def measure(feet: SourceFeet, planted: PlantedLegs, scale: float, rate: float) -> RetargetReport:
     """Return the report on a motion with planted feet, without its roles, hands and warnings.
 
     feet: of the motion, in proportion. scale: length of the rig's legs over the motion's.
     """
     paths = [
-        np.stack([own.of_role(role) for role in feet.roles], axis=1)
-        for own in (made.copied, made.rig)
+        np.stack([rig.of_role(role) for role in feet.roles], axis=1)
+        for rig in (planted.copied, planted.rig)
     ]
-    before, copied, after = (skate(own, feet.standing, rate) for own in (feet.paths, *paths))
+    before, copied, after = (skate(rig, feet.standing, rate) for rig in (feet.paths, *paths))
     return RetargetReport(
         scale=scale,
         skate_source=before,
         skate_copied=copied,
         skate=after,
-        legs_turned=legs_turned(made.copied, made.rig),
-        lowered=float(made.lowered.max()),
-        penetration=float(np.percentile(np.maximum(made.depths, 0.0), 99.0)),
+        legs_turned=legs_turned(planted.copied, planted.rig),
+        lowered=float(planted.lowered.max()),
+        penetration=float(np.percentile(np.maximum(planted.depths, 0.0), 99.0)),
     )
 
 
@@ -113,13 +113,15 @@ def skate(
     return float(np.sum(speeds * both) / max(int(both.sum()), 1))
 
 
-def legs_turned(copied: PosedRig, made: PosedRig) -> float:
+def legs_turned(copied: PosedRig, planted: PosedRig) -> float:
     """Return the mean angle between the bones of legs in two poses, rad."""
     angles = []
     for side in SIDES:
         for upper, lower in (("UpperLeg", "LowerLeg"), ("LowerLeg", "Foot")):
-            ends = [own.of_role(side + lower) - own.of_role(side + upper) for own in (copied, made)]
-            angles.append(np.linalg.norm(quat.log(shortest_turn(*ends)), axis=-1))
+            bones = [
+                rig.of_role(side + lower) - rig.of_role(side + upper) for rig in (copied, planted)
+            ]
+            angles.append(np.linalg.norm(quat.log(shortest_turn(*bones)), axis=-1))
     return float(np.mean(angles))
 
 
@@ -137,9 +139,9 @@ def check_goals(goals: Sequence[HandGoal], rig: PosedRig, rate: float) -> None:
     for goal in goals:
         lacking = [role for role in ARMS.get(goal.role, ()) if role not in rig.body.joints]
         if goal.role not in ARMS or lacking:
-            said = f", but the character has no {', '.join(lacking)}" if lacking else ""
+            note = f", but the character has no {', '.join(lacking)}" if lacking else ""
             raise InvalidField(
-                "character", f"with a goal of {goal.role!r}{said}; expected a hand of it"
+                "character", f"with a goal of {goal.role!r}{note}; expected a hand of it"
             )
         if not -1e-6 <= goal.time <= goal.end <= last + 1e-6:
             raise InvalidField(
@@ -159,24 +161,24 @@ def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRi
     rotations = rig.rotations.copy()
     times = np.arange(len(rotations)) / rate
     for role, roles in ARMS.items():
-        own = [goal for goal in goals if goal.role == role]
-        if not own:
+        goals_of_role = [goal for goal in goals if goal.role == role]
+        if not goals_of_role:
             continue
-        hand, moved = rig.of_role(role), np.zeros(rig.roots.shape)
-        for goal in own:
+        hand, shift = rig.of_role(role), np.zeros(rig.roots.shape)
+        for goal in goals_of_role:
             there = np.clip(times, goal.time, goal.end)
-            apart = np.asarray(goal.position) - _at(hand + moved, there * rate)
-            moved += _shares(times - there, goal, own)[:, None] * apart
+            offset = np.asarray(goal.position) - _at(hand + shift, there * rate)
+            shift += _shares(times - there, goal, goals_of_role)[:, None] * offset
         limb, poses = rig.limb(roles)
-        planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + moved)
+        planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + shift)
     return planted_legs.posed(rig.body, rotations, rig.roots)
 
 
-def _at(path: RootPath, places: Annotated[Floats, "places"]) -> Annotated[Floats, "places 3"]:
+def _at(path: RootPath, frames: Annotated[Floats, "places"]) -> Annotated[Floats, "places 3"]:
     """Return the points (N, 3) of a path (F, 3) at fractional frames (N,)."""
     if len(path) < 2:
-        return path[[0] * len(places)]
-    return quat.interpolate_rows(path, np.clip(places, 0, len(path) - 1))
+        return path[[0] * len(frames)]
+    return quat.interpolate_rows(path, np.clip(frames, 0, len(path) - 1))
 
 
 def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
@@ -184,24 +186,24 @@ def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
 
     away (F,): time since the goal, negative before it, s.
     """
-    before = min([FADE, *(gap for own in goals if (gap := goal.time - own.end) > 0.0)])
-    after = min([FADE, *(gap for own in goals if (gap := own.time - goal.end) > 0.0)])
-    found: Frames = quat.smoothstep(
+    before = min([FADE, *(gap for other in goals if (gap := goal.time - other.end) > 0.0)])
+    after = min([FADE, *(gap for other in goals if (gap := other.time - goal.end) > 0.0)])
+    shares: Frames = quat.smoothstep(
         np.clip(1.0 - np.where(away < 0.0, -away / before, away / after), 0.0, 1.0)
     )
-    return found
+    return shares
 
 
 def misses(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> tuple[float, ...]:
     """Return the largest distance of each hand from its goal, m."""
-    found = []
+    distances = []
     for goal in goals:
         # Its first and last frame, which may be fractional, and all between them.
         first, last = goal.time * rate, goal.end * rate
         between = np.arange(np.floor(first) + 1.0, np.ceil(last))
         path = _at(rig.of_role(goal.role), np.concatenate([[first], between, [last]]))
-        found.append(float(np.linalg.norm(goal.position - path, axis=-1).max()))
-    return tuple(found)
+        distances.append(float(np.linalg.norm(goal.position - path, axis=-1).max()))
+    return tuple(distances)
 
 
 SAME_BONE = 1e-4
@@ -245,18 +247,18 @@ def retarget(
     rotations = copied_pose.copy_orientations(motion.body, body, motion.turns, soles)
     still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
     copied = planted_legs.moved(still, _hips(motion) + higher * UP - _hips(still))
-    made = planted_legs.plant(copied, feet, below, clip.rate)
-    check_goals(hands, made.rig, clip.rate)
-    final = meet_goals(made.rig, hands, clip.rate)
-    found = clips.assemble(joints, final.rotations, final.roots, joints.offsets, clip.rate)
-    report = measure(feet, made, scale, clip.rate)
+    planted = planted_legs.plant(copied, feet, below, clip.rate)
+    check_goals(hands, planted.rig, clip.rate)
+    final = meet_goals(planted.rig, hands, clip.rate)
+    retargeted = clips.assemble(joints, final.rotations, final.roots, joints.offsets, clip.rate)
+    report = measure(feet, planted, scale, clip.rate)
     mapped = tuple(role for role in source.joints if role in body.joints)
     missing = tuple(role for role in source.joints if role not in body.joints)
-    missed = misses(final, hands, clip.rate)
-    warnings = (*rig.notes, *_warnings(missing, hands, missed))
+    distances = misses(final, hands, clip.rate)
+    warnings = (*rig.notes, *_warnings(missing, hands, distances))
     return (
-        replace(found, curves=clip.curves),
-        replace(report, mapped=mapped, missing=missing, hands_missed=missed, warnings=warnings),
+        replace(retargeted, curves=clip.curves),
+        replace(report, mapped=mapped, missing=missing, hands_missed=distances, warnings=warnings),
     )
 
 
@@ -267,9 +269,9 @@ def _scaled(motion: PosedRig, scale: float, travel: float) -> PosedRig:
     """
     hips = _hips(motion)
     level = hips * FLOOR
-    moved = level[:1] + travel * (level - level[:1])
-    places = moved[:, None] + scale * (motion.places - level[:, None])
-    return replace(motion, places=places)
+    roots = level[:1] + travel * (level - level[:1])
+    positions = roots[:, None] + scale * (motion.places - level[:, None])
+    return replace(motion, places=positions)
 
 
 def _hips(rig: PosedRig) -> RootPath:
@@ -318,11 +320,11 @@ def _ground(
 
 
 def _warnings(
-    missing: Sequence[str], goals: Sequence[HandGoal], missed: Sequence[float]
+    missing: Sequence[str], goals: Sequence[HandGoal], distances: Sequence[float]
 ) -> Iterator[str]:
     """Yield sentences on what the character lacks or does not reach."""
     if missing:
         yield f"the character has no joint for {', '.join(missing)}: they do not move"
-    for goal, miss in zip(goals, missed, strict=True):
+    for goal, miss in zip(goals, distances, strict=True):
         if miss > MISSED:
             yield f"{goal.role} at {goal.time:g} s: {miss:.3f} m from its target, out of reach"

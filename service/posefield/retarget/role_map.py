@@ -32,20 +32,20 @@ class Body:
     @cached_property
     def rest(self) -> Bones:
         """Return the positions (J, 3) at rest, m."""
-        found = self.bones.copy()
+        bones = self.bones.copy()
         for joint, parent in enumerate(self.parents[1:], start=1):
-            found[joint] += found[parent]
-        return found
+            bones[joint] += bones[parent]
+        return bones
 
     def direction(self, upper: str, lower: str) -> Floats:
         """Return the unit vector (3,) at rest from the joint of a role to that of another."""
-        apart = self.rest[self.joints[lower]] - self.rest[self.joints[upper]]
-        return apart / max(float(np.linalg.norm(apart)), 1e-9)
+        bone = self.rest[self.joints[lower]] - self.rest[self.joints[upper]]
+        return bone / max(float(np.linalg.norm(bone)), 1e-9)
 
     def length(self, upper: str, lower: str) -> float:
         """Return the distance at rest of the joints of two roles, m."""
-        apart = self.rest[self.joints[lower]] - self.rest[self.joints[upper]]
-        return float(np.linalg.norm(apart))
+        bone = self.rest[self.joints[lower]] - self.rest[self.joints[upper]]
+        return float(np.linalg.norm(bone))
 
     @property
     def leg_length(self) -> float:
@@ -59,7 +59,9 @@ class Body:
     @property
     def leg_bones(self) -> list[float]:
         """Return the lengths of the bones of both legs and feet, m."""
-        chains = [[side + part for part in LEG if side + part in self.joints] for side in SIDES]
+        chains = [
+            [side + segment for segment in LEG if side + segment in self.joints] for side in SIDES
+        ]
         return [self.length(*pair) for chain in chains for pair in pairwise(chain)]
 
     @property
@@ -73,9 +75,9 @@ class Body:
         """Return the joints of the trunk above the hips, up to those that carry arms or neck."""
         start = self.joints["hips"]
         top = self._parent("neck") or self._parent("head")
-        named = [self.joints.get(role) for role in ("spine", "chest", "upperChest")]
-        ends = [joint for joint in (*named, top) if joint is not None]
-        paths = [self._between(start, joint) for joint in ends]
+        spine_joints = [self.joints.get(role) for role in ("spine", "chest", "upperChest")]
+        marks = [joint for joint in (*spine_joints, top) if joint is not None]
+        paths = [self._between(start, joint) for joint in marks]
         longest = max(paths, key=len, default=())
         return Chain(longest, _places(self.bones, longest))
 
@@ -86,8 +88,8 @@ class Body:
         if first is None:
             return Chain((), np.zeros(0))
         inner = () if head is None else self._between(first, self.parents[head])
-        own = (first, *inner)
-        return Chain(own, _places(self.bones, own))
+        chain = (first, *inner)
+        return Chain(chain, _places(self.bones, chain))
 
     def _parent(self, role: str) -> int | None:
         joint = self.joints.get(role)
@@ -123,8 +125,8 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
     roles: joint by role; recognised by the names without any. Raises InvalidField for a body
     without hips and two legs.
     """
-    named = roles or joint_recognition.roles_of(skeleton.names, skeleton.parents)
-    joints = {role: skeleton.names.index(own) for role, own in named.items()}
+    joint_roles = roles or joint_recognition.roles_of(skeleton.names, skeleton.parents)
+    joints = {role: skeleton.names.index(body_bones) for role, body_bones in joint_roles.items()}
     missing = [role for role in NEEDED if role not in joints]
     if missing:
         raise InvalidField(
@@ -132,6 +134,6 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
             f"given, but this model has no joint for {', '.join(missing)}: expected a body with "
             "hips and two legs, by [roles] of its recipe or by the names of its joints",
         )
-    own = bones.copy()
-    own[0] = 0.0
-    return Body(skeleton.names, skeleton.parents, own, joints)
+    body_bones = bones.copy()
+    body_bones[0] = 0.0
+    return Body(skeleton.names, skeleton.parents, body_bones, joints)

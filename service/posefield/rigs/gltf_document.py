@@ -47,10 +47,10 @@ class GltfDocument:
         """Return an error that names the file."""
         return MotionFileError(self.source, message)
 
-    def expect_plain(self, name: str, *parts: Any) -> None:
+    def expect_plain(self, name: str, *objects: Any) -> None:
         """Raise MotionFileError if a required extension may change parts that are needed."""
-        for part in parts:
-            for extension in sorted(self.unread & (part.extensions or {}).keys()):
+        for item in objects:
+            for extension in sorted(self.unread & (item.extensions or {}).keys()):
                 raise self.error(
                     f"{name} requires the extension {extension}, which may change the skeleton or "
                     "its animation: export without it"
@@ -59,48 +59,48 @@ class GltfDocument:
     @cached_property
     def above(self) -> dict[int, int]:
         """Return the parent of each node that has one; MotionFileError unless they are trees."""
-        found: dict[int, int] = {}
+        parents: dict[int, int] = {}
         count = len(self.parts.nodes)
         for parent, node in enumerate(self.parts.nodes):
             for child in node.children or ():
-                if child in found or not 0 <= child < count:
+                if child in parents or not 0 <= child < count:
                     raise self.error(f"node {child} is no child of one node, expected a tree")
-                found[child] = parent
+                parents[child] = parent
         ended: set[int] = set()
         for node in range(count):
-            path, own = {node}, node
-            while own in found and own not in ended:
-                own = found[own]
-                if own in path:
-                    raise self.error(f"node {own} is its own ancestor, expected a tree")
-                path.add(own)
+            path, ancestor = {node}, node
+            while ancestor in parents and ancestor not in ended:
+                ancestor = parents[ancestor]
+                if ancestor in path:
+                    raise self.error(f"node {ancestor} is its own ancestor, expected a tree")
+                path.add(ancestor)
             ended |= path
-        return found
+        return parents
 
     def ancestors(self, node: int) -> list[int]:
         """Return a node and its ancestors, the scene's root last."""
-        found = [node]
-        while found[-1] in self.above:
-            found.append(self.above[found[-1]])
-            if len(found) > MAX_DEPTH:
+        path = [node]
+        while path[-1] in self.above:
+            path.append(self.above[path[-1]])
+            if len(path) > MAX_DEPTH:
                 raise self.error(f"node {node} lies below more than {MAX_DEPTH} others")
-        return found
+        return path
 
     def below(self, root: int) -> list[int]:
         """Return a node and its descendants, parents first, in the order of the file."""
-        found, ahead = [], [root]
-        while ahead:
-            node = ahead.pop()
-            found.append(node)
-            ahead += reversed(self.parts.nodes[node].children or [])
-        return found
+        nodes, pending = [], [root]
+        while pending:
+            node = pending.pop()
+            nodes.append(node)
+            pending += reversed(self.parts.nodes[node].children or [])
+        return nodes
 
     def common_ancestor(self, nodes: Iterable[int]) -> int | None:
         """Return the last node that is each of the nodes or an ancestor of it, if there is one."""
         shared: list[int] | None = None
-        for own in map(self.ancestors, nodes):
-            among = set(own)
-            shared = own if shared is None else [node for node in shared if node in among]
+        for path in map(self.ancestors, nodes):
+            among = set(path)
+            shared = path if shared is None else [node for node in shared if node in among]
         return shared[0] if shared else None
 
     def node_name(self, node: int) -> str:
@@ -109,15 +109,15 @@ class GltfDocument:
 
     def buffer(self, index: int) -> bytes:
         """Return the bytes of a buffer; MotionFileError if they are missing or too few."""
-        own = self.parts.buffers[index]
-        if own.uri is None and index > 0:
+        buffer = self.parts.buffers[index]
+        if buffer.uri is None and index > 0:
             raise self.error(f"buffer {index} has no content, expected a URI: export uncompressed")
-        content = self.parts.binary_blob() if own.uri is None else self._resource(own.uri)
+        content = self.parts.binary_blob() if buffer.uri is None else self._resource(buffer.uri)
         content = content or b""
-        if len(content) < own.byteLength:
+        if len(content) < buffer.byteLength:
             raise self.error(
-                f"buffer {index} has {len(content)} bytes, expected {own.byteLength}: the file is "
-                "not whole"
+                f"buffer {index} has {len(content)} bytes, expected {buffer.byteLength}: "
+                "the file is not whole"
             )
         return content
 
@@ -129,7 +129,7 @@ class GltfDocument:
             return content
 
 
-def load(content: bytes, source: str, beside: Beside) -> GltfDocument:
+def load(content: bytes, source: str, neighbour: Beside) -> GltfDocument:
     """Return the document of a .glb or .gltf file.
 
     Raises MotionFileError for a broken container, and for JSON that is no glTF 2.0.
@@ -141,15 +141,15 @@ def load(content: bytes, source: str, beside: Beside) -> GltfDocument:
         try:
             is_binary = content[:4] == b"glTF"
             read = form.load_from_bytes if is_binary else form.gltf_from_json
-            parts = read(content if is_binary else content.decode())
+            document = read(content if is_binary else content.decode())
         except (ValueError, RecursionError, OSError, ArithmeticError, struct.error) as fault:
             raise MotionFileError(source, f"not glTF: {fault}") from fault
-    version = str(parts.asset.version)
+    version = str(document.asset.version)
     if version.partition(".")[0] != "2":
         raise MotionFileError(source, f"found version {version!r} of glTF, expected 2.0")
-    required = map(str, parts.extensionsRequired or ())
+    required = map(str, document.extensionsRequired or ())
     unread = frozenset(name for name in required if not name.startswith(IGNORED_EXTENSIONS))
-    return GltfDocument(source, parts, beside, unread)
+    return GltfDocument(source, document, neighbour, unread)
 
 
 COMPONENTS: dict[int, npt.DTypeLike] = {
@@ -217,10 +217,10 @@ def _view(
     stride = view.byteStride or size
     start = (view.byteOffset or 0) + offset
     end = start + (count - 1) * stride + size
-    most = min(len(content), (view.byteOffset or 0) + view.byteLength)
-    if start < 0 or stride < size or end > most:
+    last = min(len(content), (view.byteOffset or 0) + view.byteLength)
+    if start < 0 or stride < size or end > last:
         raise document.error(
-            f"buffer view {index} ends at byte {most}, expected {count} values up to byte {end}"
+            f"buffer view {index} ends at byte {last}, expected {count} values up to byte {end}"
         )
     return np.ndarray(shape, dtype, content, start, (stride, dtype.itemsize))
 
@@ -235,8 +235,10 @@ def _with_sparse(
     where = sparse.indices
     rows = _view(document, where.bufferView, where.byteOffset or 0, kind, (sparse.count, 1))[:, 0]
     shape = (sparse.count, raw.shape[1])
-    own = sparse.values
-    values = _view(document, own.bufferView, own.byteOffset or 0, raw.dtype, shape)
+    sparse_values = sparse.values
+    values = _view(
+        document, sparse_values.bufferView, sparse_values.byteOffset or 0, raw.dtype, shape
+    )
     if rows.max() >= len(raw):
         raise document.error(f"accessor {index} replaces value {rows.max()} of {len(raw)}")
     replaced = raw.copy()
@@ -248,5 +250,5 @@ def _shares(raw: npt.NDArray[Any]) -> Floats:
     """Return normalized integers as numbers from -1 or 0 to 1."""
     if raw.dtype.kind == "f":
         return raw.astype(np.float64)
-    most = float(np.iinfo(raw.dtype).max)
-    return np.maximum(raw.astype(np.float64) / most, -1.0)
+    largest = float(np.iinfo(raw.dtype).max)
+    return np.maximum(raw.astype(np.float64) / largest, -1.0)

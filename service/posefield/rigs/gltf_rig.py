@@ -33,7 +33,7 @@ def node_transform(document: GltfDocument, index: int) -> Transform:
     """Return the transform of a node; MotionFileError for a matrix that skews or mirrors."""
     node = document.parts.nodes[index]
     stated = (node.matrix, node.rotation, node.translation, node.scale)
-    if not np.all(np.isfinite([number for own in stated for number in own or ()])):
+    if not np.all(np.isfinite([number for numbers in stated for number in numbers or ()])):
         raise document.error(f"node {index} has numbers that are not finite")
     if node.matrix is not None and list(node.matrix) != np.eye(4).ravel().tolist():
         return rest_joints.of_matrix(np.array(node.matrix, float).reshape(4, 4), f"node {index}")
@@ -41,20 +41,20 @@ def node_transform(document: GltfDocument, index: int) -> Transform:
     turn = np.array([w, x, y, z])
     if not np.linalg.norm(turn) > 0.0:
         raise document.error(f"node {index} has rotation 0, expected a unit quaternion")
-    place = np.array(node.translation or (0, 0, 0), float)
+    translation = np.array(node.translation or (0, 0, 0), float)
     size = np.array(node.scale or (1, 1, 1), float)
-    return Transform(quat.normalize(turn), place, size).unmirrored()
+    return Transform(quat.normalize(turn), translation, size).unmirrored()
 
 
 def joints_of(
-    document: GltfDocument, order: Sequence[int], others: Sequence[Sequence[int]] = ()
+    document: GltfDocument, order: Sequence[int], alternatives: Sequence[Sequence[int]] = ()
 ) -> GltfJoints:
     """Return nodes, parents first, as joints. others: skeletons that are left out."""
     if len(order) > MAX_JOINTS:
         raise document.error(f"found {len(order)} joints, expected at most {MAX_JOINTS}")
     tree, notes = joint_tree(document, order), list[str]()
-    if others:
-        listed = ", ".join(document.node_name(other[0]) for other in others)
+    if alternatives:
+        listed = ", ".join(document.node_name(other[0]) for other in alternatives)
         notes.append(f"skeleton {tree.label} was read: {listed} left out")
     unnamed = len({*tree.names} - {document.parts.nodes[node].name for node in order})
     if unnamed:
@@ -73,10 +73,10 @@ def joints_of(
 
 def outer_transform(document: GltfDocument, outer: Sequence[int]) -> Transform:
     """Return the transform of nodes, the scene's root first, from the last one to the world."""
-    found = rest_joints.WORLD
+    transform = rest_joints.WORLD
     for node in reversed(outer):
-        found = found.inside(node_transform(document, node))
-    return found
+        transform = transform.inside(node_transform(document, node))
+    return transform
 
 
 def skeletons(document: GltfDocument) -> list[list[int]]:
@@ -85,17 +85,17 @@ def skeletons(document: GltfDocument) -> list[list[int]]:
     if len(document.parts.skins) > MAX_JOINTS:
         raise document.error(f"found {len(document.parts.skins)} skins, expected {MAX_JOINTS}")
     for skin in document.parts.skins:
-        own = set(skin.joints or ())
-        if not 0 < len(own) <= MAX_JOINTS or not own <= set(range(len(document.parts.nodes))):
+        joints = set(skin.joints or ())
+        if not 0 < len(joints) <= MAX_JOINTS or not joints <= set(range(len(document.parts.nodes))):
             raise document.error(
-                f"found a skin of {len(own)} joints, expected 1 to {MAX_JOINTS} of its nodes"
+                f"found a skin of {len(joints)} joints, expected 1 to {MAX_JOINTS} of its nodes"
             )
-        tree = _between(document, own)
+        tree = _between(document, joints)
         joined = [group for group in groups if group & tree]
         groups = [group for group in groups if not group & tree] + [tree.union(*joined)]
     trees = [_between(document, group) for group in groups]
     roots = [[node for node in tree if document.above.get(node) not in tree] for tree in trees]
-    if any(len(found) > 1 for found in roots):
+    if any(len(root_nodes) > 1 for root_nodes in roots):
         raise document.error("found joints without a common root, expected one tree")
     return [
         [node for node in document.below(root) if node in tree]
@@ -105,26 +105,26 @@ def skeletons(document: GltfDocument) -> list[list[int]]:
 
 def joint_tree(document: GltfDocument, order: Sequence[int]) -> JointTree:
     """Return names and parents of nodes, parents first; names are those of nodes or unique ones."""
-    places = {node: joint for joint, node in enumerate(order)}
+    joint_of_node = {node: joint for joint, node in enumerate(order)}
     names: dict[str, int] = {}
     for node in order:
         name = document.parts.nodes[node].name
         names.setdefault(f"{name or 'joint'}_{node}" if not name or name in names else name, node)
     if len(names) < len(order):
         raise document.error("found joints of one name, expected a name for each")
-    parents = (-1, *(places[document.above[node]] for node in order[1:]))
+    parents = (-1, *(joint_of_node[document.above[node]] for node in order[1:]))
     return JointTree(document.node_name(order[0]), tuple(names), parents)
 
 
 def _between(document: GltfDocument, nodes: set[int]) -> set[int]:
     """Return nodes with all nodes between them and the last one above all, if there is one."""
     root = document.common_ancestor(sorted(nodes))
-    found = set(nodes if root is None else [root])
+    between = set(nodes if root is None else [root])
     for node in nodes:
-        while node not in found:
-            found.add(node)
+        while node not in between:
+            between.add(node)
             node = document.above[node]
-    return found
+    return between
 
 
 def _bind_pose(document: GltfDocument, joints: Mapping[int, int]) -> dict[int, Transform]:
@@ -132,7 +132,7 @@ def _bind_pose(document: GltfDocument, joints: Mapping[int, int]) -> dict[int, T
 
     joints: by node.
     """
-    found: dict[int, Transform] = {}
+    binds: dict[int, Transform] = {}
     for skin in document.parts.skins:
         if skin.inverseBindMatrices is None or not joints.keys() & skin.joints:
             continue
@@ -142,13 +142,13 @@ def _bind_pose(document: GltfDocument, joints: Mapping[int, int]) -> dict[int, T
             raise document.error(f"found {len(inverse)} bind matrices of {len(skin.joints)} joints")
         for node, matrix in zip(skin.joints, inverse.reshape(-1, 4, 4), strict=False):
             with suppress(ValueError):
-                own = rest_joints.of_matrix(matrix, node, skew=1e-2)
-                found.setdefault(joints.get(node, -1), rest_joints.WORLD.below(own))
-    return found
+                transform = rest_joints.of_matrix(matrix, node, skew=1e-2)
+                binds.setdefault(joints.get(node, -1), rest_joints.WORLD.below(transform))
+    return binds
 
 
 def read(
-    path: Path, source: str, named: Set[str]
+    path: Path, source: str, joint_names: Set[str]
 ) -> tuple[RestJoints, tuple[str, ...], tuple[str, ...]]:
     """Return the joints of the skin of a .glb or .gltf file, their nodes, and notes.
 
@@ -170,10 +170,10 @@ def read(
     if not document.parts.skins:
         raise document.error("found no skin, expected a character whose mesh is bound to joints")
     groups = skeletons(document)
-    trees = [joint_tree(document, own) for own in groups]
-    own = groups[rest_joints.one_skeleton(source, trees, named)]
-    joints = joints_of(document, own, [other for other in groups if other is not own])
+    trees = [joint_tree(document, group) for group in groups]
+    group = groups[rest_joints.one_skeleton(source, trees, joint_names)]
+    joints = joints_of(document, group, [other for other in groups if other is not group])
     outer = outer_transform(document, joints.outer)
-    parts = *joints.tree[1:], *joints.rest
-    rest = RestJoints(source, *parts, outer, 1.0, "y")
+    arrays = *joints.tree[1:], *joints.rest
+    rest = RestJoints(source, *arrays, outer, 1.0, "y")
     return rest, tuple(map(str, joints.nodes)), joints.notes

@@ -36,8 +36,8 @@ def naming_faults(source: str, *faults: type[Exception]) -> Iterator[None]:
     try:
         yield
     except faults as fault:
-        said = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
-        raise MotionFileError(source, f"breaks its format: {said}") from fault
+        message = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        raise MotionFileError(source, f"breaks its format: {message}") from fault
 
 
 class Transform(NamedTuple):
@@ -61,16 +61,16 @@ class Transform(NamedTuple):
     def below(self, other: "Transform") -> "Transform":
         """Return the transform that is this one when followed by another one."""
         back = quat.conj(other.rotation)
-        place = quat.rotate(back, self.translation - other.translation) / other.scale
-        return Transform(quat.mul(back, self.rotation), place, self.scale / other.scale)
+        translation = quat.rotate(back, self.translation - other.translation) / other.scale
+        return Transform(quat.mul(back, self.rotation), translation, self.scale / other.scale)
 
     def root_inside(self, other: "Transform") -> "Transform":
         """Return transforms of joints of which the first one is followed by another one."""
-        found = Transform(*(own.copy() for own in self))
-        root = Transform(*(own[..., 0, :] for own in self)).inside(other)
-        for own, value in zip(found, root, strict=True):
-            own[..., 0, :] = value
-        return found
+        inside = Transform(*(values.copy() for values in self))
+        root = Transform(*(values[..., 0, :] for values in self)).inside(other)
+        for values, value in zip(inside, root, strict=True):
+            values[..., 0, :] = value
+        return inside
 
     def unmirrored(self) -> "Transform":
         """Return the transform with half a turn in place of two negative scales."""
@@ -130,18 +130,18 @@ def bound_rest(
         if parent >= 0:
             world[joint] = quat.mul(world[parent], local.rotation[joint])
         world[joint] = bind[joint].rotation if joint in bind else world[joint]
-    turns, places = local.rotation.copy(), local.translation.copy()
+    turns, positions = local.rotation.copy(), local.translation.copy()
     turns[1:] = quat.mul(quat.conj(world[list(parents[1:])]), world[1:])
     roots = [bind[0].below(outer), bind[0]] if 0 in bind else []
-    root = max(roots, key=lambda own: abs(float(own.rotation @ turns[0])), default=None)
+    root = max(roots, key=lambda candidate: abs(float(candidate.rotation @ turns[0])), default=None)
     if root is not None and abs(float(root.rotation @ turns[0])) >= nearest:
         # A file that was exported in a pose of its motion has the root of that pose.
         is_posed = np.abs(np.sum(turns * local.rotation, axis=-1)).min() < POSED
-        bones = np.linalg.norm(places[1:], axis=-1).sum()
+        bones = np.linalg.norm(positions[1:], axis=-1).sum()
         turns[0] = root.rotation
-        if is_posed and np.linalg.norm(root.translation - places[0]) <= NEAR * bones:
-            places[0] = root.translation
-    return Transform(turns, places, local.scale)
+        if is_posed and np.linalg.norm(root.translation - positions[0]) <= NEAR * bones:
+            positions[0] = root.translation
+    return Transform(turns, positions, local.scale)
 
 
 SCALE_TOLERANCE = 2e-3
@@ -165,7 +165,7 @@ def plain_motion(
     Raises MotionFileError for a scale that is animated, uneven or mirrored, but at the end of a
     chain, where no joint follows it.
     """
-    if not all(np.all(np.isfinite(own)) for own in (*rest, *motion)):
+    if not all(np.all(np.isfinite(array)) for array in (*rest, *motion)):
         raise MotionFileError(source, "has transforms that are not finite, expected numbers")
     sizes, notes = _constant_scales(source, joints, motion.scale)
     # Products (J,) of the scales of each joint's ancestors.
@@ -184,10 +184,10 @@ def plain_motion(
 
 def _in_world(turns: JointRotations, parents: Sequence[int]) -> JointRotations:
     """Return orientations (J, 4) in the world of joints with rotations local to the parent."""
-    found = quat.normalize(turns)
+    world = quat.normalize(turns)
     for joint, parent in enumerate(parents[1:], start=1):
-        found[joint] = quat.normalize(quat.mul(found[parent], found[joint]))
-    return found
+        world[joint] = quat.normalize(quat.mul(world[parent], world[joint]))
+    return world
 
 
 def _constant_scales(
@@ -197,9 +197,9 @@ def _constant_scales(
 
     Raises MotionFileError for one that is not constant and even, unless no joint is below it.
     """
-    usual = scales[0].mean(axis=-1)
-    apart = np.abs(scales - usual[:, None]).max(axis=(0, 2))
-    odd = ~(apart <= SCALE_TOLERANCE * np.abs(usual)) | (usual <= 0.0)
+    uniform = scales[0].mean(axis=-1)
+    deviations = np.abs(scales - uniform[:, None]).max(axis=(0, 2))
+    odd = ~(deviations <= SCALE_TOLERANCE * np.abs(uniform)) | (uniform <= 0.0)
     inner = np.isin(np.arange(len(odd)), joints.parents)
     for joint in np.flatnonzero(odd & inner)[:1].tolist():
         low, high = scales[:, joint].min(), scales[:, joint].max()
@@ -208,10 +208,10 @@ def _constant_scales(
             f"joint {joints.names[joint]!r} has scales from {low:.4g} to {high:.4g}, expected one "
             "positive scale along all axes in all frames: bake the scale into the bones",
         )
-    ends = ", ".join(joints.names[joint] for joint in np.flatnonzero(odd)[:10])
-    notes = (f"the scale of {ends} left out: no joint follows it",) if ends else ()
+    listed = ", ".join(joints.names[joint] for joint in np.flatnonzero(odd)[:10])
+    notes = (f"the scale of {listed} left out: no joint follows it",) if listed else ()
     # Scales of 1 in half precision, or of rounded matrices, are 1.
-    return np.where(odd | (np.abs(usual - 1.0) <= SCALE_TOLERANCE), 1.0, usual), notes
+    return np.where(odd | (np.abs(uniform - 1.0) <= SCALE_TOLERANCE), 1.0, uniform), notes
 
 
 Z_UP = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(-0.5 * np.pi))
@@ -221,22 +221,28 @@ MAX_JOINTS = 1000
 """Limit of joints, several times those of any character."""
 
 
-def one_skeleton(source: str, trees: Sequence[JointTree], named: Set[str]) -> int:
+def one_skeleton(source: str, trees: Sequence[JointTree], joint_names: Set[str]) -> int:
     """Return the index of the skeleton with named joints or legs; MotionFileError for several."""
-    found = list(range(len(trees)))
-    if len(found) > 1:
-        found = [own for own in found if named & {trees[own].label, *trees[own].names}] or found
-    if len(found) > 1:
+    candidates = list(range(len(trees)))
+    if len(candidates) > 1:
+        candidates = [
+            candidate
+            for candidate in candidates
+            if joint_names & {trees[candidate].label, *trees[candidate].names}
+        ] or candidates
+    if len(candidates) > 1:
         is_person = joint_recognition.is_person
-        found = [own for own in found if is_person(*trees[own][1:])] or found
-    if len(found) > 1:
-        labels = ", ".join(trees[index].label for index in found[:20])
+        candidates = [
+            candidate for candidate in candidates if is_person(*trees[candidate][1:])
+        ] or candidates
+    if len(candidates) > 1:
+        labels = ", ".join(trees[index].label for index in candidates[:20])
         raise MotionFileError(
             source,
-            f"found {len(found)} skeletons ({labels}), expected one: export each character alone, "
-            "or name one by --skeleton of convert, its joints by --roles for --character",
+            f"found {len(candidates)} skeletons ({labels}), expected one: export each character "
+            "alone, or name one by --skeleton of convert, its joints by --roles for --character",
         )
-    return found[0]
+    return candidates[0]
 
 
 @dataclass(frozen=True)
@@ -270,14 +276,16 @@ class RestJoints:
         Raises MotionFileError for a scale that is uneven or mirrored.
         """
         rest = Transform(self.rotations, self.translations, self.scales).root_inside(self._upright)
-        still = Transform(*(part[None] for part in rest))
+        still = Transform(*(array[None] for array in rest))
         return plain_motion(self.source, JointTree("", self.names, self.parents), rest, still)[0]
 
     @cached_property
     def orientations(self) -> JointRotations:
         """Return the orientations (J, 4) at rest in the world with Y up."""
-        own = Transform(self.rotations, self.translations, self.scales).root_inside(self._upright)
-        return _in_world(own.rotation, self.parents)
+        transform = Transform(self.rotations, self.translations, self.scales).root_inside(
+            self._upright
+        )
+        return _in_world(transform.rotation, self.parents)
 
     @cached_property
     def _outer_orientations(self) -> JointRotations:
@@ -290,11 +298,11 @@ class RestJoints:
     def unit_lengths(self) -> JointWeights:
         """Return the metres (J,) of a unit of each joint's translation."""
         sizes = self.scales.mean(axis=-1)
-        found = np.empty(len(sizes))
-        found[0] = self._upright.scale.mean()
+        lengths = np.empty(len(sizes))
+        lengths[0] = self._upright.scale.mean()
         for joint, parent in enumerate(self.parents[1:], start=1):
-            found[joint] = found[parent] * sizes[parent]
-        return found
+            lengths[joint] = lengths[parent] * sizes[parent]
+        return lengths
 
     def file_rotations(self, rotations: Rotations) -> Rotations:
         """Return rotations (F, J, 4) of the plain skeleton as local rotations of the file."""
@@ -303,7 +311,7 @@ class RestJoints:
 
     def file_translations(self, translations: Positions) -> Positions:
         """Return translations (F, J, 3), m, of the plain skeleton in the file's axes and unit."""
-        own = translations.copy()
-        own[:, 0] -= self._upright.translation
-        turned = quat.rotate(quat.conj(self._outer_orientations), own)
+        in_file = translations.copy()
+        in_file[:, 0] -= self._upright.translation
+        turned = quat.rotate(quat.conj(self._outer_orientations), in_file)
         return turned / self.unit_lengths[:, None]

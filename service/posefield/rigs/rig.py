@@ -43,35 +43,45 @@ def find_roles(
     unknown roles and joints, for a body without hips and two legs, and for roles of limbs that are
     not sure.
     """
-    told = _stated(source, skeleton, paths, stated)
-    seen = joint_recognition.recognise(skeleton.names, skeleton.parents)
-    taken = {guess.joint for guess in told.values()}
-    seen = {role: own for role, own in seen.items() if own.joint not in taken or role in told}
-    guesses = {role: (seen | told)[role] for role in ROLES if role in seen | told}
+    stated_guesses = _stated(source, skeleton, paths, stated)
+    recognised = joint_recognition.recognise(skeleton.names, skeleton.parents)
+    used_joints = {guess.joint for guess in stated_guesses.values()}
+    recognised = {
+        role: role_guess
+        for role, role_guess in recognised.items()
+        if role_guess.joint not in used_joints or role in stated_guesses
+    }
+    guesses = {
+        role: (recognised | stated_guesses)[role]
+        for role in ROLES
+        if role in recognised | stated_guesses
+    }
     positions = skeleton.at_rest(skeleton.offsets)[None]
     checked = joint_recognition.check_shape(guesses, skeleton.names, positions)
-    checked |= told
-    if told:
+    checked |= stated_guesses
+    if stated_guesses:
         _check_order(source, skeleton, checked)
     _refuse_unsure(source, checked, skeleton.names)
-    unsure = {role: own for role, own in checked.items() if not own.is_sure}
-    found = {role: own for role, own in checked.items() if own.is_sure}
-    _check_order(source, skeleton, found)
+    unsure = {role: role_guess for role, role_guess in checked.items() if not role_guess.is_sure}
+    sure = {role: role_guess for role, role_guess in checked.items() if role_guess.is_sure}
+    _check_order(source, skeleton, sure)
     notes = tuple(
-        f"{role} may be {own.joint!r}, but it is not sure ({own.confidence:.2f} of "
+        f"{role} may be {role_guess.joint!r}, but it is not sure ({role_guess.confidence:.2f} of "
         f"{LOWEST_CONFIDENCE}): left out, {HOW}"
-        for role, own in unsure.items()
+        for role, role_guess in unsure.items()
     )
-    left, right = (_position(skeleton, found[side + "UpperLeg"]) for side in SIDES)
-    return found, facing_of(left - right), notes + _notes_on_size(skeleton, found)
+    left, right = (_position(skeleton, sure[side + "UpperLeg"]) for side in SIDES)
+    return sure, facing_of(left - right), notes + _notes_on_size(skeleton, sure)
 
 
 def _stated(
     source: str, skeleton: Skeleton, paths: Sequence[str], stated: Mapping[str, str]
 ) -> dict[str, RoleGuess]:
     """Return stated roles with full confidence."""
-    found: dict[str, RoleGuess] = {}
-    places = dict(zip(paths, skeleton.names, strict=True)) | {own: own for own in skeleton.names}
+    guesses: dict[str, RoleGuess] = {}
+    names_of = dict(zip(paths, skeleton.names, strict=True)) | {
+        name: name for name in skeleton.names
+    }
     for role, joint in stated.items():
         if role not in ROLES:
             raise MotionFileError(
@@ -79,17 +89,19 @@ def _stated(
                 f"found the role {role!r}{did_you_mean(role, ROLES)}, expected one of "
                 f"{', '.join(ROLES)}",
             )
-        if joint not in places:
+        if joint not in names_of:
             raise MotionFileError(
-                source, f"found no joint {joint!r} for {role}{did_you_mean(joint, places)}"
+                source, f"found no joint {joint!r} for {role}{did_you_mean(joint, names_of)}"
             )
-        other = next((own for own, told in found.items() if told.joint == places[joint]), None)
+        other = next(
+            (name for name, guess in guesses.items() if guess.joint == names_of[joint]), None
+        )
         if other is not None:
             raise MotionFileError(
                 source, f"found joint {joint!r} for {other} and {role}, expected one for each"
             )
-        found[role] = RoleGuess(places[joint], 1.0)
-    return found
+        guesses[role] = RoleGuess(names_of[joint], 1.0)
+    return guesses
 
 
 def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequence[str]) -> None:
@@ -103,13 +115,13 @@ def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequenc
             f"{HOW}",
         )
     limbs = {role for chain in CHAINS for role in chain[:3]} | {"hips"}
-    unsure = {role: own for role, own in guesses.items() if role in limbs and not own.is_sure}
+    unsure = {role: guess for role, guess in guesses.items() if role in limbs and not guess.is_sure}
     if unsure:
         # The least sure first: the others often follow from them.
         ranked = sorted(unsure, key=lambda role: unsure[role].confidence)
         doubts = [f"{role} (perhaps {unsure[role].joint!r})" for role in ranked]
         more = f" and {len(doubts) - 4} more" if len(doubts) > 4 else ""
-        reasons = dict.fromkeys(reason for own in unsure.values() for reason in own.reasons)
+        reasons = dict.fromkeys(reason for guess in unsure.values() for reason in guess.reasons)
         raise MotionFileError(
             source,
             f"found no sure joint for {', '.join(doubts[:4])}{more}: {'; '.join([*reasons][:3])}; "
@@ -119,12 +131,12 @@ def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequenc
 
 def _check_order(source: str, skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> None:
     """Raise MotionFileError if a joint of a limb is not below the one before it."""
-    places = {role: skeleton.names.index(own.joint) for role, own in roles.items()}
+    joints = {role: skeleton.names.index(limb.joint) for role, limb in roles.items()}
     for chain in CHAINS:
-        own = ["hips", *chain]
-        known = [role for role in own if role in places]
-        for upper, lower in pairwise(known):
-            if places[upper] not in joint_chain(skeleton.parents, places[lower])[:-1]:
+        limb = ["hips", *chain]
+        recognised = [role for role in limb if role in joints]
+        for upper, lower in pairwise(recognised):
+            if joints[upper] not in joint_chain(skeleton.parents, joints[lower])[:-1]:
                 raise MotionFileError(
                     source,
                     f"found {lower} at {roles[lower].joint!r}, which is not below {upper} at "
@@ -214,7 +226,7 @@ def read_rig(path: Path, roles: Mapping[str, str] = NONE_STATED) -> Rig:
         path.open("rb").close()
     except OSError as fault:
         raise MotionFileError(path, f"cannot be read: {fault.strerror}") from fault
-    named, prim = {name.rpartition("/")[2] for name in roles.values()}, ""
+    joint_names, prim = {name.rpartition("/")[2] for name in roles.values()}, ""
     with rest_joints.naming_faults(
         source, RuntimeError, ArithmeticError, TypeError, AttributeError, LookupError, ValueError
     ):
@@ -222,11 +234,11 @@ def read_rig(path: Path, roles: Mapping[str, str] = NONE_STATED) -> Rig:
         if suffix in USD_SUFFIXES:
             from posefield.rigs import usd_rig
 
-            rest, joints, prim, notes = usd_rig.read(path, source, named)
+            rest, joints, prim, notes = usd_rig.read(path, source, joint_names)
         else:
             from posefield.rigs import gltf_rig
 
-            rest, joints, notes = gltf_rig.read(path, source, named)
-        guesses, facing, said = find_roles(source, rest.skeleton, joints, roles)
+            rest, joints, notes = gltf_rig.read(path, source, joint_names)
+        guesses, facing, role_notes = find_roles(source, rest.skeleton, joints, roles)
     form: Literal["USD", "glTF"] = "USD" if suffix in USD_SUFFIXES else "glTF"
-    return Rig(path, form, joints, prim, rest, guesses, facing, notes + said)
+    return Rig(path, form, joints, prim, rest, guesses, facing, notes + role_notes)

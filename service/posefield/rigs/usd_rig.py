@@ -29,50 +29,50 @@ class SkelStage:
 
     def prims(self, schema: Any) -> list[Any]:
         """Return the prims of a schema, of several instances the first."""
-        found: dict[Any, Any] = {}
+        prims: dict[Any, Any] = {}
         for prim in Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()):
             if prim.IsA(schema):
                 shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-                found.setdefault(shared.GetPath(), prim)
-        return list(found.values())
+                prims.setdefault(shared.GetPath(), prim)
+        return list(prims.values())
 
     def notes(self, *prims: Any) -> list[str]:
         """Return notes on what the stage lacks; MotionFileError where it may be part of prims.
 
         prims: skeleton and animation that are read.
         """
-        found, needed = [], [prim.GetPath() for prim in prims]
+        notes, needed = [], [prim.GetPath() for prim in prims]
         # Clients of the service read the notes: they do not tell where the folder is.
         folder = f"{Path(self.stage.GetRootLayer().realPath).parent}/"
         for fault in self.stage.GetCompositionErrors():
             site = fault.rootSite.path
-            said = " ".join(str(fault).replace(folder, "").split())[:200]
+            message = " ".join(str(fault).replace(folder, "").split())[:200]
             # A layer as a whole has the root's path.
             is_part = any(path.HasPrefix(site) or site.HasPrefix(path) for path in needed)
             if is_part and not site.IsAbsoluteRootPath():
-                raise self.error(f"refers to what cannot be read: {said}")
-            found.append(f"{site} refers to what cannot be read, which was left out: {said}")
-        return found
+                raise self.error(f"refers to what cannot be read: {message}")
+            notes.append(f"{site} refers to what cannot be read, which was left out: {message}")
+        return notes
 
-    def skeleton(self, prims: Sequence[Any], named: Set[str]) -> tuple[Any, list[str]]:
+    def skeleton(self, prims: Sequence[Any], joint_names: Set[str]) -> tuple[Any, list[str]]:
         """Return the one of some skeletons that has named joints or roles, and a note on others."""
         trees = list(map(joint_tree, prims))
-        own = prims[rest_joints.one_skeleton(self.source, trees, named)]
+        chosen = prims[rest_joints.one_skeleton(self.source, trees, joint_names)]
         skeletons = self.prims(UsdSkel.Skeleton)
-        others = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN] if prim != own)
-        said = f"skeleton {own.GetPath()} was read: {others} left out"
-        return own, [said] if others else []
+        left_out = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN] if prim != chosen)
+        note = f"skeleton {chosen.GetPath()} was read: {left_out} left out"
+        return chosen, [note] if left_out else []
 
     def query(self, skeleton: Any) -> Any:
         """Return the query of UsdSkel for a skeleton; MotionFileError if it is not valid."""
-        own = UsdSkel.Skeleton(skeleton)
-        query = self.cache.GetSkelQuery(own)
+        schema = UsdSkel.Skeleton(skeleton)
+        query = self.cache.GetSkelQuery(schema)
         if query:
             return query
-        joints = own.GetJointsAttr().Get()
+        joints = schema.GetJointsAttr().Get()
         valid, reason = UsdSkel.Topology(joints).Validate() if joints else (False, "no joints")
-        said = "its transforms are not one for each joint" if valid else reason
-        raise self.error(f"skeleton {skeleton.GetPath()} is not valid: {said}")
+        cause = "its transforms are not one for each joint" if valid else reason
+        raise self.error(f"skeleton {skeleton.GetPath()} is not valid: {cause}")
 
 
 SHOWN = 20
@@ -82,25 +82,25 @@ SHOWN = 20
 def joint_tree(skeleton: Any) -> JointTree:
     """Return the last names of the joints of a Skeleton, those that USD calls illegal too."""
     tokens = [str(token) for token in UsdSkel.Skeleton(skeleton).GetJointsAttr().Get() or ()]
-    places = {token: joint for joint, token in enumerate(tokens)}
+    joint_of_token = {token: joint for joint, token in enumerate(tokens)}
     parents = []
     for token in tokens:
         above = token.rpartition("/")[0]
-        while above and above not in places:
+        while above and above not in joint_of_token:
             above = above.rpartition("/")[0]
-        parents.append(places.get(above, -1))
+        parents.append(joint_of_token.get(above, -1))
     names = tuple(token.rpartition("/")[2] for token in tokens)
     return JointTree(str(skeleton.GetPath()), names, tuple(parents))
 
 
 def expect_inside(path: Path, source: str) -> None:
     """Raise MotionFileError for a file that is composed of layers out of its folder."""
-    own = path.resolve()
-    places = [str(own)]
-    for place in places:  # It grows.
+    resolved = path.resolve()
+    layers = [str(resolved)]
+    for layer_path in layers:  # It grows.
         try:
-            layer = Sdf.Layer.FindOrOpen(place)
-            names = [*set().union(*UsdUtils.ExtractExternalReferences(place))]
+            layer = Sdf.Layer.FindOrOpen(layer_path)
+            names = [*set().union(*UsdUtils.ExtractExternalReferences(layer_path))]
         except Tf.ErrorException:
             continue  # It has no part in the stage.
         for name in sorted(names):
@@ -108,11 +108,11 @@ def expect_inside(path: Path, source: str) -> None:
             file = Ar.SplitPackageRelativePathOuter(Sdf.Layer.SplitIdentifier(further)[0])[0]
             if not Sdf.FileFormat.FindByExtension(Path(file).suffix[1:]):
                 continue  # Textures and other files are not read.
-            if not Path(file).resolve().is_relative_to(own.parent):
+            if not Path(file).resolve().is_relative_to(resolved.parent):
                 raise MotionFileError(
                     source, f"refers to {name!r}, expected a path below its folder"
                 )
-            places += [further] if further not in places else []
+            layers += [further] if further not in layers else []
 
 
 def open_stage(path: Path, source: str) -> SkelStage:
@@ -124,8 +124,8 @@ def open_stage(path: Path, source: str) -> SkelStage:
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as fault:
-        said = str(fault).rpartition(" : ")[2].strip().strip("'")[:200]
-        raise MotionFileError(source, f"does not open as USD: {said}") from fault
+        message = str(fault).rpartition(" : ")[2].strip().strip("'")[:200]
+        raise MotionFileError(source, f"does not open as USD: {message}") from fault
     cache = UsdSkel.Cache()
     opened = SkelStage(source, stage, cache, quiet)
     for prim in opened.prims(UsdSkel.Root):
@@ -153,8 +153,12 @@ class SkelJoints:
                 "all others"
             )
         stated = tuple(self.query.GetSkeleton().GetJointNamesAttr().Get() or ())
-        own = next(own for own in (stated, names, paths) if len({*own}) == len(own) == len(paths))
-        return JointTree(label, tuple(map(str, own)), parents)
+        labels = next(
+            labels
+            for labels in (stated, names, paths)
+            if len({*labels}) == len(labels) == len(paths)
+        )
+        return JointTree(label, tuple(map(str, labels)), parents)
 
     def rest(
         self, parents: Sequence[int], outer: Transform, frame: Transform | None = None
@@ -168,7 +172,9 @@ class SkelJoints:
         world = np.array(self.query.GetJointWorldBindTransforms(), float)
         bind = {}
         if len(world) == count:
-            bind = {joint: rest_joints.of_matrix(own, path) for joint, own in enumerate(world)}
+            bind = {
+                joint: rest_joints.of_matrix(matrix, path) for joint, matrix in enumerate(world)
+            }
         if len(local) == count:
             frame = self._transforms(local)
         elif bind:
@@ -188,26 +194,26 @@ class SkelJoints:
     def world(self, codes: Sequence[float]) -> Transform:
         """Return transforms (F, ...) of the skeleton in the world."""
         caches = (UsdGeom.XformCache(Usd.TimeCode(code)) for code in codes)
-        return self._transforms(own.GetLocalToWorldTransform(self.prim) for own in caches)
+        return self._transforms(cache.GetLocalToWorldTransform(self.prim) for cache in caches)
 
     def _transforms(self, matrices: Iterable[Any]) -> Transform:
         path = self.prim.GetPath()
-        found = [rest_joints.of_matrix(np.array(own, float), path) for own in matrices]
-        return rest_joints.stacked(found)
+        transforms = [rest_joints.of_matrix(np.array(matrix, float), path) for matrix in matrices]
+        return rest_joints.stacked(transforms)
 
     def moving_parents(self) -> list[Any]:
         """Return the transforms of the skeleton and its ancestors that change over time."""
-        found, prim = [], self.prim
+        moving, prim = [], self.prim
         while prim and not prim.IsPseudoRoot():
-            own = UsdGeom.Xformable(prim)
-            if own and own.TransformMightBeTimeVarying():
-                found.append(own)
+            xformable = UsdGeom.Xformable(prim)
+            if xformable and xformable.TransformMightBeTimeVarying():
+                moving.append(xformable)
             prim = prim.GetParent()
-        return found
+        return moving
 
 
 def read(
-    path: Path, source: str, named: Set[str]
+    path: Path, source: str, joint_names: Set[str]
 ) -> tuple[RestJoints, tuple[str, ...], str, tuple[str, ...]]:
     """Return the joints of a .usd, .usda, .usdc or .usdz file.
 
@@ -221,7 +227,7 @@ def read(
     skeletons = opened.prims(UsdSkel.Skeleton)
     if not skeletons:
         raise opened.error("found no Skeleton, expected a SkelRoot with one")
-    prim, notes = opened.skeleton(skeletons, named)
+    prim, notes = opened.skeleton(skeletons, joint_names)
     joints = SkelJoints(opened, prim, opened.query(prim))
     notes += opened.notes(prim)
     moving = joints.moving_parents()
@@ -233,13 +239,13 @@ def read(
     _, names, parents = joints.tree()
     if len(names) > MAX_JOINTS:
         raise opened.error(f"found {len(names)} joints, expected at most {MAX_JOINTS}")
-    outer = Transform(*(part[0] for part in joints.world([0.0])))
-    _, bound, said = joints.rest(parents, outer)
+    outer = Transform(*(array[0] for array in joints.world([0.0])))
+    _, bound, rest_notes = joints.rest(parents, outer)
     stage = opened.stage
     up: UpAxis = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
     unit = float(UsdGeom.GetStageMetersPerUnit(stage))
     rest = RestJoints(source, names, parents, *bound, outer, unit, up)
-    paths = tuple(str(own) for own in joints.query.GetJointOrder())
+    paths = tuple(str(path_token) for path_token in joints.query.GetJointOrder())
     if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
         notes.append(f"the file states no metersPerUnit, {unit:g} is USD's default")
-    return rest, paths, str(prim.GetPath()), (*notes, *said)
+    return rest, paths, str(prim.GetPath()), (*notes, *rest_notes)

@@ -33,11 +33,11 @@ class Tree:
 
     def path(self, joint: int) -> list[int]:
         """Return the joints from the root to a joint."""
-        found = []
+        path = []
         while joint >= 0:
-            found.append(joint)
+            path.append(joint)
             joint = self.parents[joint]
-        return found[::-1]
+        return path[::-1]
 
     def common(self, joints: Sequence[int]) -> int:
         """Return the last common ancestor of joints; each counts as its own ancestor."""
@@ -54,12 +54,12 @@ class Tree:
 
         A name of other words too counts if no name is exact.
         """
-        found = [
+        joints = [
             joint
             for joint, word in enumerate(self.words)
             if not (word.side or word.is_helper or word.is_digit) and word.key in keys
         ]
-        return min(found, key=lambda joint: not self.words[joint].is_exact, default=None)
+        return min(joints, key=lambda joint: not self.words[joint].is_exact, default=None)
 
 
 def trunk_roles(tree: Tree, upper_legs: Sequence[int], arms: Sequence[int]) -> dict[str, LimbJoint]:
@@ -73,14 +73,14 @@ def trunk_roles(tree: Tree, upper_legs: Sequence[int], arms: Sequence[int]) -> d
     neck, sure = _named_neck(tree, head), NAMED
     if head is None and neck is None and chest is not None:
         (neck, head), sure = _unnamed_neck(tree, chest), ONE_OF_MANY
-    found = {"neck": LimbJoint(neck, sure)} if neck is not None else {}
-    found |= {"head": LimbJoint(head, sure)} if head is not None else {}
+    roles = {"neck": LimbJoint(neck, sure)} if neck is not None else {}
+    roles |= {"head": LimbJoint(head, sure)} if head is not None else {}
     top = next((joint for joint in (neck, head, chest) if joint is not None), None)
     hips = _hips(tree, upper_legs, top)
     if hips is None:
-        return found
-    found = {"hips": hips} | found
-    return found | _spine(tree, hips, top, top if neck is None and head is None else None)
+        return roles
+    roles = {"hips": hips} | roles
+    return roles | _spine(tree, hips, top, top if neck is None and head is None else None)
 
 
 def _named_neck(tree: Tree, head: int | None) -> int | None:
@@ -114,8 +114,8 @@ def _unnamed_neck(tree: Tree, chest: int) -> tuple[int | None, int | None]:
 def _hips(tree: Tree, upper_legs: Sequence[int], top: int | None) -> LimbJoint | None:
     """Return the joint from which legs and spine part, or its ancestor that is named as hips."""
     if len(upper_legs) < 2:
-        named = tree.first(HIPS)
-        return None if named is None else LimbJoint(named, BY_TREE)
+        hips = tree.first(HIPS)
+        return None if hips is None else LimbJoint(hips, BY_TREE)
     parting = tree.common([*upper_legs, *([] if top is None else [top])])
     if parting < 0:
         return None
@@ -286,60 +286,62 @@ def check_shape(guesses: Guesses, names: Sequence[str], positions: Floats) -> di
     names (J,): of the joints. positions (F, J, 3): in any unit and axes, right-handed.
     """
     index = {name: joint for joint, name in enumerate(names)}
-    places = {role: positions[:, index[guess.joint]] for role, guess in guesses.items()}
-    found = dict(guesses)
+    positions_of_roles = {role: positions[:, index[guess.joint]] for role, guess in guesses.items()}
+    checked = dict(guesses)
     for upper, lower in BONES:
-        _check_lengths(found, places, upper, lower)
-    if _is_swapped(places):
-        sided = [role for role in found if role.startswith(SIDES)]
-        _lower(found, sided, SWAPPED, "the joints named left lie on the right of the feet")
-    angle = _trunk_angle(places)
+        _check_lengths(checked, positions_of_roles, upper, lower)
+    if _is_swapped(positions_of_roles):
+        sided = [role for role in checked if role.startswith(SIDES)]
+        _lower(checked, sided, SWAPPED, "the joints named left lie on the right of the feet")
+    angle = _trunk_angle(positions_of_roles)
     if angle is not None and angle < LEAST_ANGLE:
-        said = f"the trunk stands {angle:.0f} degrees from the legs, as a quadruped's"
-        _lower(found, list(found), LEVEL, said)
-    return found
+        reason = f"the trunk stands {angle:.0f} degrees from the legs, as a quadruped's"
+        _lower(checked, list(checked), LEVEL, reason)
+    return checked
 
 
-def _lower(found: dict[str, RoleGuess], roles: Sequence[str], factor: float, reason: str) -> None:
+def _lower(guesses: dict[str, RoleGuess], roles: Sequence[str], factor: float, reason: str) -> None:
     for role in roles:
-        found[role] = found[role].lowered(factor, reason)
+        guesses[role] = guesses[role].lowered(factor, reason)
 
 
 def _check_lengths(
-    found: dict[str, RoleGuess], places: Mapping[str, Floats], upper: str, lower: str
+    guesses: dict[str, RoleGuess], positions: Mapping[str, Floats], upper: str, lower: str
 ) -> None:
     """Lower the confidence of a bone that has no length, or differs from the other side's."""
-    ends = [(side + upper, side + lower) for side in SIDES]
-    if not all({first, second} <= places.keys() for first, second in ends):
+    bones = [(side + upper, side + lower) for side in SIDES]
+    if not all({first, second} <= positions.keys() for first, second in bones):
         return
     left, right = (
-        float(np.median(np.linalg.norm(places[first] - places[second], axis=-1)))
-        for first, second in ends
+        float(np.median(np.linalg.norm(positions[first] - positions[second], axis=-1)))
+        for first, second in bones
     )
     if max(left, right) > LARGEST_RATIO * min(left, right) or max(left, right) == 0.0:
-        said = f"the bones to it are {left:.3g} and {right:.3g} units long, left and right"
-        _lower(found, [second for _, second in ends], UNEVEN, said)
+        reason = f"the bones to it are {left:.3g} and {right:.3g} units long, left and right"
+        _lower(guesses, [second for _, second in bones], UNEVEN, reason)
 
 
-def _is_swapped(places: Mapping[str, Floats]) -> bool:
+def _is_swapped(positions: Mapping[str, Floats]) -> bool:
     """Return whether the left leg is on the right of where the toes point in most poses."""
     needed = [side + role for side in SIDES for role in ("UpperLeg", "Foot", "Toes")]
-    if not {*needed, "head"} <= places.keys():
+    if not {*needed, "head"} <= positions.keys():
         return False
-    feet = 0.5 * (places["leftFoot"] + places["rightFoot"])
-    ahead = 0.5 * (places["leftToes"] + places["rightToes"]) - feet
-    left = np.cross(places["head"] - feet, ahead)
-    across = places["leftUpperLeg"] - places["rightUpperLeg"]
+    feet = 0.5 * (positions["leftFoot"] + positions["rightFoot"])
+    forward = 0.5 * (positions["leftToes"] + positions["rightToes"]) - feet
+    left = np.cross(positions["head"] - feet, forward)
+    across = positions["leftUpperLeg"] - positions["rightUpperLeg"]
     return bool(np.median(np.sum(left * across, axis=-1)) < 0.0)
 
 
-def _trunk_angle(places: Mapping[str, Floats]) -> float | None:
+def _trunk_angle(positions: Mapping[str, Floats]) -> float | None:
     """Return the angle between legs and trunk, degrees, in most poses at least; None if unknown."""
-    top = next((places[role] for role in ("neck", "upperChest", "chest") if role in places), None)
-    if top is None or not {"hips", "leftFoot", "rightFoot"} <= places.keys():
+    top = next(
+        (positions[role] for role in ("neck", "upperChest", "chest") if role in positions), None
+    )
+    if top is None or not {"hips", "leftFoot", "rightFoot"} <= positions.keys():
         return None
-    down = 0.5 * (places["leftFoot"] + places["rightFoot"]) - places["hips"]
-    trunk = top - places["hips"]
+    down = 0.5 * (positions["leftFoot"] + positions["rightFoot"]) - positions["hips"]
+    trunk = top - positions["hips"]
     lengths = np.linalg.norm(down, axis=-1) * np.linalg.norm(trunk, axis=-1)
     cosines = np.sum(down * trunk, axis=-1) / np.maximum(lengths, 1e-12)
     angles = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))

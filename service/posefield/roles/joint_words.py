@@ -118,14 +118,14 @@ def _tokens(name: str) -> list[str]:
 
     Single letters count where they tell the side.
     """
-    whole = name.rpartition(":")[2][-LONGEST_NAME:]
-    bare = REMARK.sub("", whole) or whole
-    found: list[str] = []
+    text = name.rpartition(":")[2][-LONGEST_NAME:]
+    bare = REMARK.sub("", text) or text
+    tokens: list[str] = []
     for token in TOKEN.findall(bare):
         word = token.lower()
-        parts = SIDE_WORD.match(word)
-        found += [part for part in parts.groups() if part] if parts else [word]
-    return [word for word in found if word in SIDES or (len(word) > 1 and not word.isdigit())]
+        match = SIDE_WORD.match(word)
+        tokens += [piece for piece in match.groups() if piece] if match else [word]
+    return [word for word in tokens if word in SIDES or (len(word) > 1 and not word.isdigit())]
 
 
 def _common(split: Sequence[Sequence[str]], end: int) -> str | None:
@@ -146,9 +146,9 @@ def _word(words: Sequence[str]) -> JointWord:
     joined = "".join(rest)
     if joined in KNOWN:
         return JointWord(side, joined, True, is_helper, is_digit)
-    parts = ["".join(rest[a:b]) for a in range(len(rest)) for b in range(a + 1, len(rest) + 1)]
-    known = max((part for part in parts if part in KNOWN), key=len, default="")
-    return JointWord(side, known or joined, not known, is_helper, is_digit)
+    pieces = ["".join(rest[a:b]) for a in range(len(rest)) for b in range(a + 1, len(rest) + 1)]
+    longest = max((piece for piece in pieces if piece in KNOWN), key=len, default="")
+    return JointWord(side, longest or joined, not longest, is_helper, is_digit)
 
 
 def _take_side(words: list[str]) -> tuple[str, list[str]]:
@@ -199,41 +199,43 @@ def align_limb(
         tuple(joint for joint in path if any(words[joint].score(role) for role in roles))
         for path in paths
     )
-    scored = [(way, _scores(way, words, roles)) for way in ways if way]
+    scored = [(chain, _scores(chain, words, roles)) for chain in ways if chain]
     best: dict[str, int] = {}
     top = 0.0
-    for way, scores in scored:
+    for chain, scores in scored:
         total, picks = _align(scores, roles)
         if total > top + 1e-9:
-            top, best = total, {role: way[at] for role, at in picks.items()}
-    found = {}
+            top, best = total, {role: chain[at] for role, at in picks.items()}
+    joints = {}
     for role, joint in best.items():
         second = max(
-            _align(scores, roles, role, _pieces(way, joint, words))[0] for way, scores in scored
+            _align(scores, roles, role, _pieces(chain, joint, words))[0] for chain, scores in scored
         )
-        found[role] = LimbJoint(joint, min(1.0, SURE + GAIN * (top - max(second, 0.0))))
-    found.pop("Fingers", None)
-    return found
+        joints[role] = LimbJoint(joint, min(1.0, SURE + GAIN * (top - max(second, 0.0))))
+    joints.pop("Fingers", None)
+    return joints
 
 
-def _pieces(way: Sequence[int], joint: int, words: Sequence[JointWord]) -> frozenset[int]:
+def _pieces(chain: Sequence[int], joint: int, words: Sequence[JointWord]) -> frozenset[int]:
     """Return the indices in a way of a joint and of others of its name, such as the second half."""
-    if joint not in way:
+    if joint not in chain:
         return frozenset()
-    return frozenset(at for at, other in enumerate(way) if words[other] == words[joint])
+    return frozenset(at for at, other in enumerate(chain) if words[other] == words[joint])
 
 
-def _scores(way: Sequence[int], words: Sequence[JointWord], roles: Sequence[str]) -> Scores:
+def _scores(chain: Sequence[int], words: Sequence[JointWord], roles: Sequence[str]) -> Scores:
     """Return the score of each role at each joint of a way."""
-    by_joints = any(words[joint].key in JOINT_WORDS for joint in way)
-    found = []
-    for joint in way:
-        own = {role: score for role in roles if (score := words[joint].score(role))}
-        for role in own:
-            named = JOINT_NAMED.get((role, words[joint].key))
-            own[role] = named if named and by_joints and words[joint].is_exact else own[role]
-        found.append(own)
-    return found
+    by_joints = any(words[joint].key in JOINT_WORDS for joint in chain)
+    scores = []
+    for joint in chain:
+        role_scores = {role: score for role in roles if (score := words[joint].score(role))}
+        for role in role_scores:
+            stated = JOINT_NAMED.get((role, words[joint].key))
+            role_scores[role] = (
+                stated if stated and by_joints and words[joint].is_exact else role_scores[role]
+            )
+        scores.append(role_scores)
+    return scores
 
 
 def _align(
@@ -249,11 +251,11 @@ def _align(
     for role in roles:
         lack = LACK if role in NEEDED else 0.0
         following = [(totals[0][0] - lack, totals[0][1])]
-        for at, own in enumerate(scores):
+        for at, joint_scores in enumerate(scores):
             skipped = (totals[at + 1][0] - lack, totals[at + 1][1])
             choice = max(following[-1], skipped, key=lambda one: one[0])
-            if role in own and not (role == avoided and at in forbidden):
-                total = totals[at][0] + own[role]
+            if role in joint_scores and not (role == avoided and at in forbidden):
+                total = totals[at][0] + joint_scores[role]
                 if total > choice[0] + 1e-9:
                     choice = (total, totals[at][1] | {role: at})
             following.append(choice)

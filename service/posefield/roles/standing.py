@@ -19,20 +19,20 @@ def standing(skeleton: Skeleton) -> Skeleton:
     """
     offsets = skeleton.offsets.copy()
     offsets[0] = 0.0
-    places = skeleton.at_rest(offsets)
-    tips = places[list(skeleton.tip_joints)] + skeleton.tip_offsets
-    heights = [*places[:, 1].tolist(), *tips[:, 1].tolist()]
+    positions = skeleton.at_rest(offsets)
+    tips = positions[list(skeleton.tip_joints)] + skeleton.tip_offsets
+    heights = [*positions[:, 1].tolist(), *tips[:, 1].tolist()]
     roles = joint_recognition.roles_of(skeleton.names, skeleton.parents)
     index = {role: skeleton.names.index(name) for role, name in roles.items()}
     for side in ("left", "right"):
-        leg = [index.get(side + part, -1) for part in ("UpperLeg", "LowerLeg", "Foot")]
+        leg = [index.get(side + segment, -1) for segment in ("UpperLeg", "LowerLeg", "Foot")]
         if -1 in leg:
             continue
-        length = float(np.linalg.norm(np.diff(places[leg], axis=0), axis=1).sum())
+        length = float(np.linalg.norm(np.diff(positions[leg], axis=0), axis=1).sum())
         toes = index.get(f"{side}Toes")
         if toes is not None:
-            heights.append(float(places[toes, 1]) - SOLE * length)
+            heights.append(float(positions[toes, 1]) - SOLE * length)
         elif leg[2] not in (*skeleton.parents, *skeleton.tip_joints):
-            heights.append(float(places[leg[2], 1]) - ANKLE * length)
+            heights.append(float(positions[leg[2], 1]) - ANKLE * length)
     offsets[0, 1] = -min(heights)
     return replace(skeleton, offsets=offsets)
