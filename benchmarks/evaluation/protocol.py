@@ -120,7 +120,7 @@ def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str)
     if name != "clip":
         return Part(errors, corrected)
     feet = standing_feet.feet_answers(recipe.name, file, held)
-    return Part(errors, corrected, feet, takes.take_results(recipe.name, file, held, fold.held))
+    return Part(errors, corrected, feet, takes.take_results(recipe.name, file, held, fold.held_out))
 
 
 def _predict(

@@ -80,8 +80,8 @@ class SerialJobs:
         shared: Arguments = (),
     ) -> Iterator[Any]:
         """Run jobs as `Jobs.run` does, in their order."""
-        for own in arguments:
-            yield function(*shared, *own)
+        for job in arguments:
+            yield function(*shared, *job)
 
 
 def ordered_results(
@@ -91,16 +91,16 @@ def ordered_results(
     shared: Arguments = (),
 ) -> list[Any]:
     """Return the results of jobs in the order of their arguments, each made on one BLAS thread."""
-    numbered = ((number, own) for number, own in enumerate(arguments))
-    found = jobs.run(_run_numbered, numbered, (function, shared))
-    return [result for _, result in sorted(found, key=lambda pair: pair[0])]
+    numbered = ((number, job) for number, job in enumerate(arguments))
+    results = jobs.run(_run_numbered, numbered, (function, shared))
+    return [result for _, result in sorted(results, key=lambda pair: pair[0])]
 
 
 def _run_numbered(
-    function: Callable[..., Any], shared: Arguments, number: int, own: Arguments
+    function: Callable[..., Any], shared: Arguments, number: int, job: Arguments
 ) -> tuple[int, Any]:
     with single_threaded():
-        return number, function(*shared, *own)
+        return number, function(*shared, *job)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class ProcessJobs:
         shared: Arguments = (),
     ) -> Iterator[Any]:
         """Run jobs as `Jobs.run` does; a single job runs in this process."""
-        jobs = (joblib.delayed(function)(*shared, *own) for own in arguments)
+        jobs = (joblib.delayed(function)(*shared, *job) for job in arguments)
         # joblib starts all its processes at once, so limit them to the number of jobs.
         first = list(islice(jobs, self.count or joblib.cpu_count()))
         parallel = joblib.Parallel(n_jobs=max(len(first), 1), return_as="generator_unordered")
@@ -177,12 +177,12 @@ class FinishedJobs:
         """
         common = joblib.hash((code_key(), f"{function.__module__}.{function.__name__}", shared))
         listed = list(arguments)
-        paths = [self.folder / f"{joblib.hash((common, own))}{SUFFIX}" for own in listed]
+        paths = [self.folder / f"{joblib.hash((common, job))}{SUFFIX}" for job in listed]
         left = []
         for number, file in enumerate(paths):
-            kept = read_result(file)
-            if kept:
-                yield kept[0]
+            finished = read_result(file)
+            if finished:
+                yield finished[0]
             else:
                 left.append((number, listed[number]))
         for number, result in self.jobs.run(_numbered_result, left, (function, shared)):
@@ -192,9 +192,9 @@ class FinishedJobs:
 
 
 def _numbered_result(
-    function: Callable[..., Any], shared: Arguments, number: int, own: Arguments
+    function: Callable[..., Any], shared: Arguments, number: int, job: Arguments
 ) -> tuple[int, Any]:
-    return number, function(*shared, *own)
+    return number, function(*shared, *job)
 
 
 def read_result(file: Path) -> tuple[Any] | None:
@@ -223,21 +223,21 @@ class _DataUnpickler(pickle.Unpickler):
         if package == "numpy" and name in ARRAY_MAKERS:
             return super().find_class(module, name)
         if package in PACKAGES:
-            found = super().find_class(module, name)
-            if isinstance(found, type) and is_dataclass(found):
-                return found
+            kind = super().find_class(module, name)
+            if isinstance(kind, type) and is_dataclass(kind):
+                return kind
         raise pickle.UnpicklingError(f"names {module}.{name}")
 
 
 @cache
 def code_key() -> str:
     """Return a key over the sources of both packages and the versions of the libraries."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for package in PACKAGES:
         folder = Path(str(files(package)))
         for file in sorted(folder.rglob("*.py")):
-            found.update(file.relative_to(folder).as_posix().encode())
-            found.update(hashlib.sha256(file.read_bytes()).digest())
+            digest.update(file.relative_to(folder).as_posix().encode())
+            digest.update(hashlib.sha256(file.read_bytes()).digest())
     for name in LIBRARIES:
-        found.update(f"{name} {version(name)}".encode())
-    return found.hexdigest()
+        digest.update(f"{name} {version(name)}".encode())
+    return digest.hexdigest()

@@ -45,7 +45,7 @@ class GraphBuilder:
     def rename_value(self, name: str, value: str) -> str:
         """Rename a value that no other node uses yet."""
         for node in self._nodes:
-            node.output[:] = [name if own == value else own for own in node.output]
+            node.output[:] = [name if output == value else output for output in node.output]
         return name
 
     def add_output(self, name: str, value: str) -> None:
@@ -146,7 +146,7 @@ class LevelTables:
         rows = [list(chain(*lists)) for lists in zip(*self.entries.values(), strict=True)]
         table = net.weights("ladder", np.array(rows))
         sizes = [len(lists[0]) for lists in self.entries.values()]
-        parts = net.multi_output(
+        lists_of_level = net.multi_output(
             "Split", len(sizes), net("Gather", table, level), net.indices(*sizes)
         )
-        return dict(zip(self.entries, parts, strict=True))
+        return dict(zip(self.entries, lists_of_level, strict=True))

@@ -51,10 +51,10 @@ def check_family(recipe: Recipe, examples: Sequence[Example]) -> None:
 
 def _all_equal(examples: Sequence[Example]) -> bool:
     first = examples[0].clip
-    whole = first.positions()
+    positions = first.positions()
     return all(
         len(example.clip) == len(first)
-        and bool(np.all(np.abs(example.clip.positions() - whole) < SAME_MOTION))
+        and bool(np.all(np.abs(example.clip.positions() - positions) < SAME_MOTION))
         for example in examples[1:]
     )
 
@@ -111,14 +111,14 @@ class OutlierDistances:
         return float(np.median(np.delete(self.distances, self.outside)))
 
 
-def measure_outliers(hyper: Hyper, laid: SamplePoints, motions: Floats) -> OutlierDistances:
+def measure_outliers(hyper: Hyper, samples: SamplePoints, motions: Floats) -> OutlierDistances:
     """Return the outliers of motions (N, m), whose differences are distances, m.
 
     The farthest outlier is excluded before the next is searched, because it spoils the predictions
     of its neighbours.
     """
     outside: list[int] = []
-    judged = _measure(hyper, laid, motions, outside)
+    judged = _measure(hyper, samples, motions, outside)
     while len(outside) < MAX_OUTLIER_SHARE * len(motions):
         times = judged.times.copy()
         times[outside] = 0.0
@@ -129,7 +129,7 @@ def measure_outliers(hyper: Hyper, laid: SamplePoints, motions: Floats) -> Outli
         ):
             break
         outside.append(worst)
-        judged = _measure(hyper, laid, motions, outside)
+        judged = _measure(hyper, samples, motions, outside)
     return judged
 
 
@@ -142,21 +142,23 @@ def robust_deviations(values: Floats) -> Floats:
 
 
 def _measure(
-    hyper: Hyper, laid: SamplePoints, motions: Floats, outside: list[int]
+    hyper: Hyper, samples: SamplePoints, motions: Floats, outside: list[int]
 ) -> OutlierDistances:
-    kept = np.delete(np.arange(len(motions)), outside)
+    inside = np.delete(np.arange(len(motions)), outside)
     left_out = np.zeros((len(motions), len(motions)))
-    left_out[np.ix_(kept, kept)] = _left_out(hyper, laid, kept)
+    left_out[np.ix_(inside, inside)] = _left_out(hyper, samples, inside)
     for clip in outside:
-        with_it = np.append(kept, clip)
-        left_out[clip, with_it] = _left_out(hyper, laid, with_it)[-1]
+        with_it = np.append(inside, clip)
+        left_out[clip, with_it] = _left_out(hyper, samples, with_it)[-1]
     distances = np.linalg.norm(left_out @ motions, axis=1)
-    times = distances / np.sqrt(universal_kriging.left_out_variances(hyper, laid.points, left_out))
-    return OutlierDistances(left_out, distances, times / np.median(times[kept]), tuple(outside))
+    times = distances / np.sqrt(
+        universal_kriging.left_out_variances(hyper, samples.points, left_out)
+    )
+    return OutlierDistances(left_out, distances, times / np.median(times[inside]), tuple(outside))
 
 
-def _left_out(hyper: Hyper, laid: SamplePoints, kept: Indices) -> Floats:
-    return universal_kriging.leave_out_samples(hyper, laid, kept)
+def _left_out(hyper: Hyper, samples: SamplePoints, indices: Indices) -> Floats:
+    return universal_kriging.leave_out_samples(hyper, samples, indices)
 
 
 # A transform is reported if undoing it reduces the distance below this share.
@@ -180,34 +182,34 @@ class ClipTransform:
 
 
 def find_transform(
-    own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
+    positions: Floats, expected: Floats, names: tuple[str, ...], left: Floats
 ) -> ClipTransform | None:
     """Return the transform that explains a clip's distance from its prediction; None if none does.
 
-    own, expected: joint positions (T, J, 3), m. left: unit vector (3,) to the family's left.
+    positions, expected: joint positions (T, J, 3), m. left: unit vector (3,) to the family's left.
     """
-    before = apart(own, expected)
+    before = apart(positions, expected)
     undone = [
-        ClipTransform(said, before, apart(other, expected))
-        for said, other in _transformed(own, expected, names, left)
+        ClipTransform(description, before, apart(other, expected))
+        for description, other in _transformed(positions, expected, names, left)
     ]
     best = min(undone, key=lambda disguise: disguise.after, default=None)
     return best if best and best.after < MAX_DISTANCE_RATIO * before else None
 
 
 def _transformed(
-    own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
+    positions: Floats, expected: Floats, names: tuple[str, ...], left: Floats
 ) -> Iterator[tuple[str, Floats]]:
     swapped, flipped = (
         recording_groups.mirrored_joints(names),
-        own - 2.0 * (own @ left)[..., None] * left,
+        positions - 2.0 * (positions @ left)[..., None] * left,
     )
-    turn = _best_rotation(own, expected)
-    if said := _describe_rotation(turn):
-        yield said, own @ turn.T
+    turn = _best_rotation(positions, expected)
+    if description := _describe_rotation(turn):
+        yield description, positions @ turn.T
     if swapped != tuple(range(len(names))):
         yield "mirrored left to right", flipped[:, swapped]
-        yield "with the names of left and right joints exchanged", own[:, swapped]
+        yield "with the names of left and right joints exchanged", positions[:, swapped]
         yield "with the axis from left to right reversed", flipped
 
 
@@ -226,9 +228,9 @@ def left_direction(joints: Floats, names: tuple[str, ...]) -> Floats:
     return np.asarray(level / np.linalg.norm(level))
 
 
-def _best_rotation(own: Floats, expected: Floats) -> Floats:
-    """Return the rotation matrix that best aligns own with expected (Kabsch 1976)."""
-    u, _, v = np.linalg.svd(np.einsum("tjk,tjl->kl", expected, own))
+def _best_rotation(positions: Floats, expected: Floats) -> Floats:
+    """Return the rotation matrix that best aligns positions with expected (Kabsch 1976)."""
+    u, _, v = np.linalg.svd(np.einsum("tjk,tjl->kl", expected, positions))
     sign = np.sign(np.linalg.det(u @ v))
     return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ v)
 
@@ -254,15 +256,15 @@ def _describe_rotation(turn: Floats) -> str:
 class JointJump:
     """The largest jump of a clip, from frame to frame + 1.
 
-    distance: of the joint, m. times: ratio to the median step around it. whole: True if more than
-    half of the joints jump too.
+    distance: of the joint, m. times: ratio to the median step around it. whole_body: True if more
+    than half of the joints jump too.
     """
 
     frame: int
     joint: int
     distance: float
     times: float
-    whole: bool
+    whole_body: bool
 
 
 def largest_jump(clip: Clip) -> JointJump | None:
@@ -274,9 +276,9 @@ def largest_jump(clip: Clip) -> JointJump | None:
     ways = steps[leaping.frames, leaping.joints]
     farthest = int(np.argmax(ways - leaping.paces))
     frame, joint = int(leaping.frames[farthest]), int(leaping.joints[farthest])
-    found, usual = float(ways[farthest]), float(leaping.paces[farthest])
-    whole = bool(np.sum(leaping.frames == frame) > 0.5 * steps.shape[1])
-    return JointJump(frame, joint, found, found / usual, whole)
+    speed, pace = float(ways[farthest]), float(leaping.paces[farthest])
+    whole_body = bool(np.sum(leaping.frames == frame) > 0.5 * steps.shape[1])
+    return JointJump(frame, joint, speed, speed / pace, whole_body)
 
 
 # Multiple of the median distance above which a clip is tested for mirroring, turns and swaps.
@@ -288,16 +290,18 @@ OUTLIER_DEVIATIONS, FACTOR, WAY = 8.0, 1.5, 0.3
 
 def find_outliers(recipe: Recipe, trained: TrainedModel) -> tuple[Outlier, ...]:
     """Return the evidence against the clips of a trained family, sorted by clip."""
-    own = _OutlierSearch(recipe, trained)
-    parts = (
-        own.resized_clips(),
-        own.distant_clips(),
-        own.transformed_clips(),
-        own.jumping_clips(),
-        own.unusual_durations(),
-        own.unusual_travel(),
+    search = _OutlierSearch(recipe, trained)
+    findings = (
+        search.resized_clips(),
+        search.distant_clips(),
+        search.transformed_clips(),
+        search.jumping_clips(),
+        search.unusual_durations(),
+        search.unusual_travel(),
     )
-    return tuple(sorted((one for part in parts for one in part), key=lambda one: one.clip))
+    return tuple(
+        sorted((one for outliers in findings for one in outliers), key=lambda one: one.clip)
+    )
 
 
 @dataclass(frozen=True)
@@ -312,24 +316,24 @@ class _OutlierSearch:
     @cached_property
     def motions(self) -> Floats:
         """Return motions (N, m) whose differences are root mean square joint distances, m."""
-        whole = self.trained.tensor
-        return self.trained.values["pose"] / np.sqrt(whole.weight * whole.values.shape[1])
+        tensor = self.trained.tensor
+        return self.trained.values["pose"] / np.sqrt(tensor.weight * tensor.values.shape[1])
 
     def distant_clips(self) -> Iterator[Outlier]:
         for clip in self.leave_one_out.outside:
-            said = (
+            evidence = (
                 f"lies {_cm(self.leave_one_out.distances[clip])} from what the others predict, "
                 f"{self.leave_one_out.times[clip]:.0f} times as far as is usual "
                 f"({_cm(self.leave_one_out.usual)}); {self._nearest(clip)}"
             )
-            yield Outlier(clip, "far", said)
+            yield Outlier(clip, "far", evidence)
 
     def _nearest(self, clip: int) -> str:
         apart = np.linalg.norm(self.motions - self.motions[clip], axis=1)
         apart[clip] = np.inf
         nearest = int(np.argmin(apart))
-        named = self.trained.examples[nearest].row.named
-        return f"most like it is {named}, {_cm(apart[nearest])} away"
+        clip_name = self.trained.examples[nearest].row.named
+        return f"most like it is {clip_name}, {_cm(apart[nearest])} away"
 
     def transformed_clips(self) -> Iterator[Outlier]:
         """Yield clips that would fit better mirrored, turned or with sides exchanged."""
@@ -337,15 +341,15 @@ class _OutlierSearch:
         # A single joint has no shape that could be mirrored or turned.
         if not len(suspects) or len(self.trained.skeleton) == 1:
             return
-        names, whole = self.trained.skeleton.names, self.trained.tensor.values
+        names, values = self.trained.skeleton.names, self.trained.tensor.values
         offsets = np.stack([example.offsets for example in self.trained.examples])
-        usual = np.median(offsets, axis=0)
-        left = left_direction(self._root_relative_positions(whole, usual), names)
+        median_offsets = np.median(offsets, axis=0)
+        left = left_direction(self._root_relative_positions(values, median_offsets), names)
         for clip, size in zip(suspects, clip_joints.relative_sizes(offsets)[suspects], strict=True):
-            expected = whole[:, :, clip] - whole @ self.leave_one_out.left_out[clip]
-            own = self._root_relative_positions(whole[:, :, [clip]], offsets[clip] / size)[0]
-            there = self._root_relative_positions(expected[:, :, None], usual)[0]
-            worn = find_transform(own, there, names, left)
+            expected = values[:, :, clip] - values @ self.leave_one_out.left_out[clip]
+            positions = self._root_relative_positions(values[:, :, [clip]], offsets[clip] / size)[0]
+            there = self._root_relative_positions(expected[:, :, None], median_offsets)[0]
+            worn = find_transform(positions, there, names, left)
             if worn:
                 yield Outlier(int(clip), "disguise", _transform_text(worn))
 
@@ -354,8 +358,8 @@ class _OutlierSearch:
 
         offsets: bone offsets (J, 3), m.
         """
-        whole = self.trained.tensor
-        rotations, _ = whole.chart.poses(whole.numbers(values))
+        tensor = self.trained.tensor
+        rotations, _ = tensor.chart.poses(tensor.numbers(values))
         translations = np.broadcast_to(offsets, (*rotations.shape[:-1], 3))
         return skeleton.positions(self.trained.skeleton.parents, rotations, translations)
 
@@ -381,20 +385,20 @@ class _OutlierSearch:
         gaps = self.trained.residuals["duration"][:, 0]
         for clip in _beyond_limits(np.abs(gaps), np.log(FACTOR)):
             lasts = self.trained.aligned.durations[clip]
-            said = f"lasts {lasts:.2f} s, expected about {lasts / np.exp(gaps[clip]):.2f} s"
-            yield Outlier(clip, "duration", said)
+            evidence = f"lasts {lasts:.2f} s, expected about {lasts / np.exp(gaps[clip]):.2f} s"
+            yield Outlier(clip, "duration", evidence)
 
     def unusual_travel(self) -> Iterator[Outlier]:
         """Yield cycles with travel far from the prediction."""
         gaps = self.trained.residuals.get("travel", np.zeros((1, 2)))[:, :2]
         lost = np.linalg.norm(gaps, axis=1)
         for clip in _beyond_limits(lost, WAY):
-            said = f"its cycle ends {lost[clip]:.2f} m from where the others predict"
-            yield Outlier(clip, "travel", said)
+            evidence = f"its cycle ends {lost[clip]:.2f} m from where the others predict"
+            yield Outlier(clip, "travel", evidence)
 
 
-def _beyond_limits(gaps: Floats, least: float) -> list[int]:
-    strange = (robust_deviations(gaps) > OUTLIER_DEVIATIONS) & (gaps > least)
+def _beyond_limits(gaps: Floats, limit: float) -> list[int]:
+    strange = (robust_deviations(gaps) > OUTLIER_DEVIATIONS) & (gaps > limit)
     return [int(clip) for clip in np.flatnonzero(strange)]
 
 
@@ -413,16 +417,16 @@ def _transform_text(worn: ClipTransform) -> str:
 def _jump_text(leap: JointJump, example: Example) -> str:
     cycle = len(example.clip) - 1
     frame = example.row.first_frame + (leap.frame + round(example.shift * cycle)) % cycle
-    what = "its whole body" if leap.whole else example.clip.skeleton.names[leap.joint]
+    what = "its whole body" if leap.whole_body else example.clip.skeleton.names[leap.joint]
     return (
         f"{what} leaps {_cm(leap.distance)} between frames {frame} and {frame + 1}, "
         f"{leap.times:.0f} times the pace around them"
     )
 
 
-def _size_text(size: float, given: float) -> str:
-    unit = clip_joints.guess_unit(given, size)
-    guess = f": is the file in {unit}, not in units of {given:g} m?" if unit else ""
+def _size_text(size: float, expected: float) -> str:
+    unit = clip_joints.guess_unit(expected, size)
+    guess = f": is the file in {unit}, not in units of {expected:g} m?" if unit else ""
     return f"its bones are {size:.3g} times as long as the family's, expected about 1{guess}"
 
 

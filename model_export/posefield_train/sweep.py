@@ -19,7 +19,7 @@ class SweepResult:
     """Result of a recipe: an exported model, or the error that prevented it."""
 
     name: str
-    found: ExportedModel | TrainingError
+    outcome: ExportedModel | TrainingError
 
 
 def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterator[SweepResult]:
@@ -35,7 +35,7 @@ def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterat
     # Data are read when jobs are started, so that few recipes' data are in memory.
     return jobs.run(
         _train_model,
-        ((path.stem, own, *ingest.ingest(own, data or path.parent)) for path, own in read),
+        ((path.stem, family, *ingest.ingest(family, data or path.parent)) for path, family in read),
     )
 
 

@@ -73,8 +73,9 @@ def read_recipe(path: Path | str) -> Recipe:
 class _VectorizedClips:
     """Aligned clips as pose vectors.
 
-    tensor: of their pose vectors. offsets: bone offsets (N, J, 3), m. laid: their sample points.
-    travels: (N, 3) of cycles, otherwise empty. controls: (N, d), in their own units.
+    samples: their sample points. labels: names of each label set. offsets: bone offsets (N, J, 3),
+    m. tensor: of the pose vectors. travels: (N, 3) of cycles, otherwise empty. controls: (N, d), in
+    their own units.
     """
 
     samples: SamplePoints
@@ -124,20 +125,22 @@ def train_examples(
     Raises TrainingError if the samples do not determine a kriging model.
     """
     names = tuple(control.name for control in recipe.controls)
-    given = np.stack([example.controls for example in examples])
+    controls = np.stack([example.controls for example in examples])
     outliers.check_family(recipe, examples)
-    universal_kriging.check_samples(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
+    universal_kriging.check_samples(
+        controls, names, recipe.kriging.degree, recipe.kriging.nugget == 0
+    )
     examples = _sorted(examples)
     canonical.return_freed_memory()
     report(f"aligning {len(examples)} clips")
     weights = truncation_error.joint_weights(recipe, examples)
     examples = phase_alignment.align_phases(recipe, examples, weights)
-    moved = _vectorize(recipe, examples, weights, jobs)
+    clips = _vectorize(recipe, examples, weights, jobs)
     report("decomposing the motion tensor")
-    full = _decompose(moved)
+    full = _decompose(clips)
     canonical.return_freed_memory()
     report("fitting the fields")
-    trained = _fit_and_truncate(recipe, examples, moved, full, jobs)
+    trained = _fit_and_truncate(recipe, examples, clips, full, jobs)
     return replace(trained, outliers=outliers.find_outliers(recipe, trained), notes=tuple(notes))
 
 
@@ -146,13 +149,15 @@ def train_examples(
 NEXT_TO_NOTHING = 5e-5
 
 
-def _decompose(moved: _VectorizedClips) -> TuckerTensor:
+def _decompose(vectorized: _VectorizedClips) -> TuckerTensor:
     """Return the HOSVD of a family's tensor; that of a large one in passes over its clips."""
-    own = moved.tensor
-    if moved.samples.inducing is None:
-        return hosvd.decompose(own.values)
-    _, frames, clips = own.values.shape
-    return hosvd.decompose_in_passes(own.values, NEXT_TO_NOTHING**2 * own.weight * frames * clips)
+    tensor = vectorized.tensor
+    if vectorized.samples.inducing is None:
+        return hosvd.decompose(tensor.values)
+    _, frames, clips = tensor.values.shape
+    return hosvd.decompose_in_passes(
+        tensor.values, NEXT_TO_NOTHING**2 * tensor.weight * frames * clips
+    )
 
 
 def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
@@ -166,8 +171,8 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
 
 def _curves(examples: Sequence[Example]) -> tuple[Curve, ...]:
     """Return the curves of the family."""
-    own = examples[0].clip.curves
-    return own.curves if own else ()
+    curves = examples[0].clip.curves
+    return curves.curves if curves else ()
 
 
 def _vectorize(
@@ -175,8 +180,8 @@ def _vectorize(
 ) -> _VectorizedClips:
     """Align clips and build the tensor of their pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
-    laid, labels = sample_points.make_samples(recipe, examples)
-    refinement = Refinement(settings.rounds, _predictor(recipe, laid, jobs))
+    samples, labels = sample_points.make_samples(recipe, examples)
+    refinement = Refinement(settings.rounds, _predictor(recipe, samples, jobs))
     aligned = time_alignment.align(examples, recipe.motion.frames, basis, weights, refinement, jobs)
     travels = {}
     if recipe.motion.cyclic:
@@ -184,24 +189,24 @@ def _vectorize(
     offsets = np.stack([example.offsets for example in examples])
     parents = examples[0].clip.skeleton.parents
     numbers, chart, noticed = motion_tensor.pose_vectors(aligned, parents, offsets)
-    if laid.inducing is not None:
+    if samples.inducing is not None:
         aligned = aligned.without_poses()
-    own_tensor = motion_tensor.build_tensor(
+    tensor = motion_tensor.build_tensor(
         numbers, chart, parents, offsets, weights, _curves(examples)
     )
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
     findings = jumps + noticed
     controls = np.stack([example.controls for example in examples])
-    return _VectorizedClips(laid, labels, aligned, offsets, own_tensor, travels, findings, controls)
+    return _VectorizedClips(samples, labels, aligned, offsets, tensor, travels, findings, controls)
 
 
-def _predictor(recipe: Recipe, laid: SamplePoints, jobs: Jobs) -> time_alignment.Predictor:
+def _predictor(recipe: Recipe, samples: SamplePoints, jobs: Jobs) -> time_alignment.Predictor:
     """Return a function that predicts each clip from the others by a tuned kriging model."""
 
     settings = recipe.kriging
 
     def predict(values: Floats) -> Floats:
-        problem = TuningProblem(laid, values, settings.nugget)
+        problem = TuningProblem(samples, values, settings.nugget)
         covariance, degree = settings.covariances[0], settings.fixed_degree
         tuned = kriging_tuning.tune(problem, covariance, degree, jobs=jobs)
         predicted: Floats = np.subtract(values, tuned.residuals, out=tuned.residuals)
@@ -224,7 +229,7 @@ class _FittedModels:
     proportions: Proportions
     values: dict[str, Floats]
     pose: TunedKriging
-    beside: dict[str, FittedModel]
+    other_models: dict[str, FittedModel]
     left_out_errors: Floats
     warped_errors: Floats
     power_law: PowerLaw | None
@@ -234,53 +239,65 @@ class _FittedModels:
 def _fit_models(
     recipe: Recipe,
     examples: Sequence[Example],
-    moved: _VectorizedClips,
-    judge: TruncationReference,
+    clips: _VectorizedClips,
+    reference: TruncationReference,
     full: TuckerTensor,
     jobs: Jobs,
 ) -> _FittedModels:
-    laid, own_tensor = moved.samples, judge.own_tensor
-    proportions, bones = coefficient_models.fit_proportions(moved.offsets)
-    durations = np.log(moved.aligned.durations)[:, None]
-    beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
-    effector = effector_weights(judge, full)
-    pose = coefficient_models.choose_covariance(recipe.kriging, laid, full.motions, effector, jobs)
-    fitted = {
-        k: coefficient_models.fit(recipe.kriging, pose.hyper, laid, v) for k, v in beside.items()
+    samples, tensor = clips.samples, reference.tensor
+    proportions, bones = coefficient_models.fit_proportions(clips.offsets)
+    durations = np.log(clips.aligned.durations)[:, None]
+    other_values = {
+        **clips.travels,
+        "offsets": bones,
+        "duration": durations,
+        "warp": clips.aligned.logs,
     }
-    law = kriging_bank.fit_power_law(
-        pose.hyper, laid, moved.controls, durations, fitted["duration"].residuals
+    effector = effector_weights(reference, full)
+    pose = coefficient_models.choose_covariance(
+        recipe.kriging, samples, full.motions, effector, jobs
     )
-    found_law = law.law if law else None
-    if law:
-        fitted["duration"] = coefficient_models.factor_of(law, laid, moved.controls, durations)
-    values = {"pose": full.motions, **beside}
-    missed = _left_out_errors(own_tensor, pose, fitted)
+    fitted = {
+        k: coefficient_models.fit(recipe.kriging, pose.hyper, samples, v)
+        for k, v in other_values.items()
+    }
+    power_law_fit = kriging_bank.fit_power_law(
+        pose.hyper, samples, clips.controls, durations, fitted["duration"].residuals
+    )
+    power_law = power_law_fit.law if power_law_fit else None
+    if power_law_fit:
+        fitted["duration"] = coefficient_models.factor_of(
+            power_law_fit, samples, clips.controls, durations
+        )
+    values = {"pose": full.motions, **other_values}
+    left_out_errors = _left_out_errors(tensor, pose, fitted)
     motions = full.motions - pose.residuals
-    expected = {name: values[name] - found.residuals for name, found in fitted.items()}
+    expected = {name: values[name] - fit.residuals for name, fit in fitted.items()}
 
     def motions_of(rows: slice) -> tuple[Floats, Floats, int]:
         predicted = warped_errors.predicted_positions(
             CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
-            own_tensor,
+            tensor,
             proportions,
             full.slices(motions[rows]),
-            {name: own[rows] for name, own in expected.items()},
-            judge.parents,
+            {name: rows_of_values[rows] for name, rows_of_values in expected.items()},
+            reference.parents,
         )
         captured = warped_errors.captured_positions(examples[rows])
-        return captured, predicted, len(own_tensor.curves)
+        return captured, predicted, len(tensor.curves)
 
     compared = map(motions_of, canonical.clip_blocks(len(examples)))
     warped = np.concatenate(ordered_results(jobs, warped_errors.mean_squared_errors, compared))
-    event = _fit_event(recipe, laid, judge, full, pose, effector)
-    return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
+    event = _fit_event(recipe, samples, reference, full, pose, effector)
+    return _FittedModels(
+        proportions, values, pose, fitted, left_out_errors, warped, power_law, event
+    )
 
 
 def _fit_event(
     recipe: Recipe,
-    laid: SamplePoints,
-    judge: TruncationReference,
+    samples: SamplePoints,
+    reference: TruncationReference,
     full: TuckerTensor,
     pose: TunedKriging,
     effector: Floats | None,
@@ -289,12 +306,14 @@ def _fit_event(
 
     effector: as in `TuningProblem`.
     """
-    if effector is None or judge.event_frame is None or recipe.kriging.fixed_degree is not None:
+    if effector is None or reference.event_frame is None or recipe.kriging.fixed_degree is not None:
         return None
     second = coefficient_models.tune_event(
-        recipe.kriging.nugget, pose, laid, full.motions, effector
+        recipe.kriging.nugget, pose, samples, full.motions, effector
     )
-    errors = coefficient_models.compare_models(judge, full, judge.event_frame, (pose, second))
+    errors = coefficient_models.compare_models(
+        reference, full, reference.event_frame, (pose, second)
+    )
     return second if errors.is_used else None
 
 
@@ -306,15 +325,15 @@ SMALLEST_LIMIT = 1e-4
 
 
 def _truncation_limits(
-    judge: TruncationReference, full: TuckerTensor, fits: _FittedModels
+    reference: TruncationReference, full: TuckerTensor, fits: _FittedModels
 ) -> dict[str, float]:
     """Return the largest errors of a truncation, m, that hardly add to those of the prediction."""
     rms = float(np.sqrt(np.mean(fits.left_out_errors)))
     limits = {"rms": max(ALL_JOINTS_SHARE * rms, SMALLEST_LIMIT)}
-    if judge.event_frame is not None:
+    if reference.event_frame is not None:
         residuals = (fits.event or fits.pose).residuals
-        missed = event_distances(judge, full, judge.event_frame, residuals)
-        effector = float(np.sqrt(np.mean(np.square(missed))))
+        distances = event_distances(reference, full, reference.event_frame, residuals)
+        effector = float(np.sqrt(np.mean(np.square(distances))))
         share = EVENT_SHARE if fits.event else EFFECTOR_SHARE
         limits["effector"] = max(share * effector, SMALLEST_LIMIT)
     return limits
@@ -323,102 +342,108 @@ def _truncation_limits(
 def _assemble(
     recipe: Recipe,
     controls: Floats,
-    moved: _VectorizedClips,
-    judge: TruncationReference,
+    clips: _VectorizedClips,
+    reference: TruncationReference,
     fits: _FittedModels,
     reduced: TuckerTensor,
 ) -> FloatModel:
     """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
-    solved = universal_kriging.solve_samples(fits.pose.hyper, moved.samples, reduced.bases[2])
-    event, blend = None, _event_blend(recipe, judge, fits, reduced)
+    solved = universal_kriging.solve_samples(fits.pose.hyper, clips.samples, reduced.bases[2])
+    event, blend = None, _event_blend(recipe, reference, fits, reduced)
     if fits.event and blend:
         values = reduced.bases[2][:, : blend.count]
-        event = universal_kriging.solve_samples(fits.event.hyper, moved.samples, values)
-    others = {name: found.field for name, found in fits.beside.items()}
-    ends, own_tensor = (controls.min(axis=0), controls.max(axis=0)), judge.own_tensor
+        event = universal_kriging.solve_samples(fits.event.hyper, clips.samples, values)
+    other_models = {name: fit.field for name, fit in fits.other_models.items()}
+    ranges, tensor = (controls.min(axis=0), controls.max(axis=0)), reference.tensor
     timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)
     sill = float(np.mean(fits.warped_errors / fits.pose.variances))
     return FloatModel(
-        KrigingBank(*ends, moved.labels, solved, others, sill, (), fits.power_law, event),
+        KrigingBank(*ranges, clips.labels, solved, other_models, sill, (), fits.power_law, event),
         timing,
-        _decoder(own_tensor, reduced, blend),
+        _decoder(tensor, reduced, blend),
         fits.proportions,
-        Travel(recipe.motion.frames, len(own_tensor.chart.means)) if recipe.motion.cyclic else None,
+        Travel(recipe.motion.frames, len(tensor.chart.means)) if recipe.motion.cyclic else None,
     )
 
 
-def _with_contacts(model: FloatModel, found: FittedContacts | None) -> FloatModel:
-    if found is None:
+def _with_contacts(model: FloatModel, contacts: FittedContacts | None) -> FloatModel:
+    if contacts is None:
         return model
-    return replace(model, bank=replace(model.bank, contacts=found.kriging), contacts=found.table)
+    return replace(
+        model, bank=replace(model.bank, contacts=contacts.kriging), contacts=contacts.table
+    )
 
 
 def _event_blend(
-    recipe: Recipe, judge: TruncationReference, fits: _FittedModels, reduced: TuckerTensor
+    recipe: Recipe, reference: TruncationReference, fits: _FittedModels, reduced: TuckerTensor
 ) -> EventBlend | None:
-    if fits.event is None or judge.event_frame is None:
+    if fits.event is None or reference.event_frame is None:
         return None
-    weights = event_weights(recipe.motion.frames, judge.event_frame.frame, recipe.motion.cyclic)
+    weights = event_weights(recipe.motion.frames, reference.event_frame.frame, recipe.motion.cyclic)
     return build_blend(COEFFICIENTS, weights, reduced.core, reduced.bases[1])
 
 
-def _decoder(own: MotionTensor, reduced: TuckerTensor, blend: EventBlend | None) -> Decoder:
-    return Decoder(reduced, own.mean, own.unwhiten, own.chart, event=blend, curves=own.curves)
+def _decoder(tensor: MotionTensor, reduced: TuckerTensor, blend: EventBlend | None) -> Decoder:
+    return Decoder(
+        reduced, tensor.mean, tensor.unwhiten, tensor.chart, event=blend, curves=tensor.curves
+    )
 
 
 def _fit_and_truncate(
     recipe: Recipe,
     examples: Sequence[Example],
-    moved: _VectorizedClips,
+    clips: _VectorizedClips,
     full: TuckerTensor,
     jobs: Jobs,
 ) -> TrainedModel:
     """Fit the coefficient models, choose the ranks within the budgets, and assemble the model."""
-    own_tensor = moved.tensor
-    judge = truncation_error.truncation_reference(recipe, examples, own_tensor)
-    fits = _fit_models(recipe, examples, moved, judge, full, jobs)
+    tensor = clips.tensor
+    reference = truncation_error.truncation_reference(recipe, examples, tensor)
+    fits = _fit_models(recipe, examples, clips, reference, full, jobs)
     controls = np.stack([example.controls for example in examples])
-    price = truncation_cost.RANK_COSTS[recipe.size.cost](own_tensor, controls.shape[1])
-    limits = _truncation_limits(judge, full, fits)
-    reduced = full.truncated(truncation_cost.choose_ranks(recipe.size, full, price, judge, limits))
-    explained = {name: found.explained for name, found in fits.beside.items()}
-    residuals = {name: found.residuals for name, found in fits.beside.items()}
-    model = _assemble(recipe, controls, moved, judge, fits, reduced)
-    warps = (model.timing, moved.aligned.logs)
+    price = truncation_cost.RANK_COSTS[recipe.size.cost](tensor, controls.shape[1])
+    limits = _truncation_limits(reference, full, fits)
+    reduced = full.truncated(
+        truncation_cost.choose_ranks(recipe.size, full, price, reference, limits)
+    )
+    explained = {name: fit.explained for name, fit in fits.other_models.items()}
+    residuals = {name: fit.residuals for name, fit in fits.other_models.items()}
+    model = _assemble(recipe, controls, clips, reference, fits, reduced)
+    warps = (model.timing, clips.aligned.logs)
     hyper = fits.pose.hyper
-    contacts, notes = contact_model.fit_contacts(recipe, examples, moved.samples, hyper, warps)
+    contacts, notes = contact_model.fit_contacts(recipe, examples, clips.samples, hyper, warps)
     return TrainedModel(
         recipe,
         _with_contacts(model, contacts),
         tuple(examples),
-        moved.samples,
-        _mean_skeleton(examples, moved.offsets),
-        moved.aligned,
-        own_tensor,
+        clips.samples,
+        _mean_skeleton(examples, clips.offsets),
+        clips.aligned,
+        tensor,
         full,
         fits.pose,
         fits.values,
         fits.left_out_errors,
         fits.warped_errors,
         {"pose": 1.0 - fits.pose.unexplained, **explained},
-        moved.findings,
+        clips.findings,
         residuals,
-        judge.evaluate(reduced),
-        joint_error_shares(judge, full, fits.pose, residuals.get("travel")),
+        reference.evaluate(reduced),
+        joint_error_shares(reference, full, fits.pose, residuals.get("travel")),
         contacts=contacts,
         contact_notes=tuple(notes),
     )
 
 
 def _left_out_errors(
-    own_tensor: MotionTensor, pose: TunedKriging, fitted: dict[str, FittedModel]
+    tensor: MotionTensor, pose: TunedKriging, fitted: dict[str, FittedModel]
 ) -> Floats:
     """Return leave-one-out mean squared joint distances (N,), m², of all clips."""
-    frames = own_tensor.values.shape[1]
-    missed = np.sum(np.square(pose.residuals), axis=1) / (own_tensor.weight * frames)
+    frames = tensor.values.shape[1]
+    squares = np.sum(np.square(pose.residuals), axis=1) / (tensor.weight * frames)
     if "travel" in fitted:
-        missed += travel.mean_squared_distance(fitted["travel"].residuals)
-    return missed
+        squares += travel.mean_squared_distance(fitted["travel"].residuals)
+    return squares
 
 
 def _mean_skeleton(examples: Sequence[Example], offsets: Floats) -> Skeleton:
@@ -435,7 +460,7 @@ MIN_JOINT_SHARE = 0.01
 
 
 def joint_error_shares(
-    judge: TruncationReference, full: TuckerTensor, pose: TunedKriging, travels: Floats | None
+    reference: TruncationReference, full: TuckerTensor, pose: TunedKriging, travels: Floats | None
 ) -> Floats:
     """Return the root mean square error (J,) of each joint as a share of that of all joints.
 
@@ -443,20 +468,22 @@ def joint_error_shares(
     clip. travels: residuals (N, 3) of a cycle's travel. Distances are true ones, by forward
     kinematics.
     """
-    own = judge.own_tensor
+    tensor = reference.tensor
 
     def block_squares(rows: slice) -> Floats:
-        predicted = own.values[:, :, rows] - full.slices(pose.residuals[rows])
-        places = truncation_error.positions(own, predicted, judge.parents, judge.offsets[rows])
-        return np.mean(np.sum(np.square(places - judge.whole[rows]), axis=-1), axis=1)
+        predicted = tensor.values[:, :, rows] - full.slices(pose.residuals[rows])
+        positions = truncation_error.positions(
+            tensor, predicted, reference.parents, reference.offsets[rows]
+        )
+        return np.mean(np.sum(np.square(positions - reference.points[rows]), axis=-1), axis=1)
 
-    blocks = canonical.clip_blocks(len(judge.whole))
+    blocks = canonical.clip_blocks(len(reference.points))
     squares = np.concatenate([block_squares(rows) for rows in blocks])
     if travels is not None:
-        squares[:, : len(judge.parents)] += travel.mean_squared_distance(travels)[:, None]
-    usual = np.mean(squares / pose.variances[:, None], axis=0)
+        squares[:, : len(reference.parents)] += travel.mean_squared_distance(travels)[:, None]
+    mean_squares = np.mean(squares / pose.variances[:, None], axis=0)
     # Sigma is that of joints and curves together.
-    every, joints = np.mean(usual), usual[: len(judge.parents)]
-    if every == 0.0:
+    overall, joints = np.mean(mean_squares), mean_squares[: len(reference.parents)]
+    if overall == 0.0:
         return np.ones_like(joints)
-    return np.maximum(np.sqrt(joints / every), MIN_JOINT_SHARE)
+    return np.maximum(np.sqrt(joints / overall), MIN_JOINT_SHARE)

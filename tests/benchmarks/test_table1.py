@@ -36,7 +36,7 @@ def test_at_the_samples_without_nugget_the_motions_are_the_clips(over, made, sma
     judge = truncation_error.truncation_reference(small_recipe, made.examples, made.trained.tensor)
     bones = np.broadcast_to(made.offsets.mean(axis=0), made.offsets.shape)
     clips = truncation_error.positions(
-        judge.own_tensor, judge.own_tensor.values, judge.parents, np.array(bones)
+        judge.tensor, judge.tensor.values, judge.parents, np.array(bones)
     )
     assert np.abs(at_samples.whole - clips).max() < 1e-6
     assert np.abs(replace(over, points=made.samples).whole - clips).max() > 1e-3

@@ -137,8 +137,8 @@ def clips(strides):
 
 @pytest.fixture(scope="module")
 def labels(clips):
-    asked = contact_labels.settings(sample_walk.recipe(), clips.held[0].clip.skeleton.names)
-    return np.stack([contact_labels.clip_contacts(e, asked).at(SHARES) for e in clips.held])
+    asked = contact_labels.settings(sample_walk.recipe(), clips.held_out[0].clip.skeleton.names)
+    return np.stack([contact_labels.clip_contacts(e, asked).at(SHARES) for e in clips.held_out])
 
 
 def accuracies(clips, predicted):

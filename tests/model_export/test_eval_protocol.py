@@ -81,13 +81,13 @@ def test_every_clip_is_held_out_once_with_all_of_its_take(family):
     stated = [replace(e, recording=f"recording {i // 3}") for i, e in enumerate(family)]
     for examples, parts in ((family, CLIPS), (files, CLIPS), (same, CLIPS // 3)):
         listed = protocol.clip_folds(examples)
-        assert sorted(i for fold in listed for i in fold.held) == list(range(CLIPS))
+        assert sorted(i for fold in listed for i in fold.held_out) == list(range(CLIPS))
         assert len(listed) == parts
         for fold in listed:
             rest, held = fold.split(examples)
             assert not {e.row.place for e in rest} & {e.row.place for e in held}
-    assert [fold.held for fold in protocol.clip_folds(stated)] == [
-        fold.held for fold in protocol.clip_folds(same)
+    assert [fold.held_out for fold in protocol.clip_folds(stated)] == [
+        fold.held_out for fold in protocol.clip_folds(same)
     ]
     with pytest.raises(
         TrainingError, match=r"all \d+ clips are of one recording, expected two or more"
@@ -96,7 +96,7 @@ def test_every_clip_is_held_out_once_with_all_of_its_take(family):
 
 
 def test_performers_are_held_out_whole(family):
-    assert [set(fold.held) for fold in protocol.performer_folds(family)] == [
+    assert [set(fold.held_out) for fold in protocol.performer_folds(family)] == [
         set(range(first, CLIPS, 3)) for first in range(3)
     ]
     assert protocol.protocols(family) == ["clip", "performer"]

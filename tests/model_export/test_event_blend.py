@@ -95,7 +95,7 @@ def test_the_second_model_is_used_where_it_is_clearly_better(judge, trained, sma
 def at_event(judge, full, motions):
     """Positions (N, 3) of the event's joint by forward kinematics of whole motions."""
     whole = truncation_error.positions(
-        judge.own_tensor, full.slices(motions), judge.parents, judge.offsets
+        judge.tensor, full.slices(motions), judge.parents, judge.offsets
     )
     return whole[:, judge.event_frame.frame, judge.event_frame.joint]
 

@@ -27,10 +27,10 @@ def test_a_leap_is_found_whether_or_not_it_leads_back(frames):
     clip = small_clip(frames=100)
     found = outliers.largest_jump(spoiled(clip, frames, 4, 0.3))
     assert found.frame in (49, 50)
-    assert (found.joint, found.whole) == (4, False)
+    assert (found.joint, found.whole_body) == (4, False)
     assert found.distance == pytest.approx(0.3, abs=0.03)
     assert outliers.largest_jump(clip) is None
-    assert outliers.largest_jump(spoiled(clip, frames, 0, 0.3)).whole
+    assert outliers.largest_jump(spoiled(clip, frames, 0, 0.3)).whole_body
 
 
 @pytest.fixture

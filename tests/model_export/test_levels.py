@@ -1,5 +1,6 @@
 """Tests of levels of detail: nested, increasingly coarse, each within its error limit."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +25,8 @@ def with_levels(recipe, *details):
 def still(small_recipe, trained):
     """Levels of which the coarser ones keep a hand, and then a whole arm, still."""
     details = Detail(times=2.0, drop_joints=[HAND]), Detail(times=8.0, drop_joints=["LeftArm"])
-    return levels.build_levels(with_levels(small_recipe, *details), trained)
+    recipe = with_levels(small_recipe, *details)
+    return levels.build_levels(replace(trained, recipe=recipe))
 
 
 def test_every_level_is_a_leading_part_of_the_one_before(exported):
@@ -52,18 +54,19 @@ def test_errors_keep_the_budgets_times_what_the_level_may_cost(small_recipe, exp
 
 
 def test_joints_that_a_level_drops_do_not_move(still, trained):
+    model, listed = still
     names, parents = trained.skeleton.names, trained.skeleton.parents
     arm, hand = names.index("LeftArm"), names.index(HAND)
     below = np.flatnonzero(skeleton.descendant_matrix(parents)[arm])
     assert hand in below
-    dropped = [set(range(len(names))) - set(level.joints) for level in still.levels]
+    dropped = [set(range(len(names))) - set(level.joints) for level in listed]
     assert dropped[0] == set()
     assert hand in dropped[1] and arm not in dropped[1]
     assert dropped[2] == set(below.tolist()) > dropped[1]
-    low, high = still.model.bank.low, still.model.bank.high
+    low, high = model.bank.low, model.bank.high
     points = np.linspace(low, high, 20)
     for level in range(3):
-        turns = still.model.evaluate(points, np.full((20, 1), 0.5), level=level).rotations[:, 0]
+        turns = model.evaluate(points, np.full((20, 1), 0.5), level=level).rotations[:, 0]
         moved = np.flatnonzero(np.ptp(turns, axis=0).max(axis=-1) > 1e-6)
         assert not set(moved) & dropped[level]
         assert arm in moved or level == 2
@@ -73,7 +76,7 @@ def test_joints_that_a_level_drops_do_not_move(still, trained):
 def test_joints_that_cannot_be_dropped_are_named(small_recipe, trained, joint):
     asked = with_levels(small_recipe, Detail(times=2.0, drop_joints=[joint]))
     with pytest.raises(TrainingError, match=rf"drop_joints \['{joint}'\], expected some of "):
-        levels.build_levels(asked, trained)
+        levels.build_levels(replace(trained, recipe=asked))
 
 
 # --- the file -------------------------------------------------------------------------------------

@@ -63,7 +63,7 @@ def test_a_reopened_model_answers_as_the_trained_one(labelled_exported, reopened
 def test_what_the_fields_were_laid_through_comes_back(labelled, reopened):
     """Dual weights alone do not tell: a wrong nugget answers alike everywhere but there."""
     bank = reopened.known.model.bank
-    for name, field in bank.others.items():
+    for name, field in bank.other_models.items():
         # Values of a quantity that the controls explain in part are shrunk to their mean.
         expected = labelled.model.bank.sample_values(name)
         scale = np.ptp(expected, axis=0).max()
@@ -81,7 +81,7 @@ def wrong_nuggets(reopened, fields):
     bank = reopened.known.model.bank
     found = {}
     for name in fields:
-        field = bank.others[name]
+        field = bank.other_models[name]
         hyper = replace(field.hyper, nugget=fields[name][0])
         found[name] = universal_kriging.values(hyper, field.samples, field.dual)
     return found

@@ -225,7 +225,7 @@ def travel():
         "rotations": quat.normalize(own.normal(size=(BATCH, STEPS, 5, 4))),
         "root": own.normal(size=(BATCH, STEPS, 3)),
         "travel": own.normal(size=(BATCH, 3)),
-        "place": own.uniform(0.0, 19.0, (BATCH, STEPS)),
+        "frames": own.uniform(0.0, 19.0, (BATCH, STEPS)),
     }
     given = {name: array.astype(np.float32).astype(float) for name, array in given.items()}
 
@@ -235,7 +235,7 @@ def travel():
         planes=given["rotations"].reshape(-1, 5, 4).transpose(1, 2, 0),
         root=given["root"].reshape(-1, 3),
         travel=given["travel"],
-        place=given["place"],
+        frames=given["frames"],
     )
     rotations = planes.transpose(2, 0, 1).reshape(given["rotations"].shape)
     found = [rotations, root.reshape(BATCH, STEPS, 3), gone.reshape(BATCH, STEPS, 3)]

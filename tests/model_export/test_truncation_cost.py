@@ -36,7 +36,7 @@ def test_numbers_are_those_that_the_file_holds(held, trained):
 def test_levels_read_what_the_file_holds_for_them(held, exported):
     model, levels = exported.model, exported.card.levels
     finest = ("core", "directions", "time_basis", "samples", "precision")
-    duals = [f"{name}_weights" for name in ("pose", *model.bank.others)]
+    duals = [f"{name}_weights" for name in ("pose", *model.bank.other_models)]
     drift = held["linear_weights"][:, 2:].size
     assert levels[0].event, "the family has an event, and its prediction pays"
     blend = ("event_mixing", "event_times")

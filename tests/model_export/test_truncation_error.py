@@ -30,16 +30,16 @@ def reduced(trained):
 def gaps(trained, judge, reduced):
     """Distances (N, T, J) of that truncation, m."""
     found = truncation_error.positions(
-        judge.own_tensor, reduced.restored(), judge.parents, judge.offsets
+        judge.tensor, reduced.restored(), judge.parents, judge.offsets
     )
-    return np.linalg.norm(found - judge.whole, axis=-1)
+    return np.linalg.norm(found - judge.points, axis=-1)
 
 
 def test_whole_tensor_is_the_aligned_clips(trained, judge):
     clips = time_alignment.joint_positions(trained.aligned, judge.parents, judge.offsets)
-    assert np.abs(judge.whole - clips).max() < EXACT
+    assert np.abs(judge.points - clips).max() < EXACT
     shuffled = time_alignment.joint_positions(trained.aligned, judge.parents, judge.offsets[::-1])
-    assert np.abs(judge.whole - shuffled).max() > 1e-2
+    assert np.abs(judge.points - shuffled).max() > 1e-2
 
 
 def test_distances_are_those_of_the_joints(judge, reduced, gaps):

@@ -213,7 +213,7 @@ def solve_extended(
     laid: ExtendedSamples, bank: KrigingBank, name: str, new: Floats
 ) -> CoefficientModel:
     """Return one of a bank's other models solved with its old values and new ones (k, m)."""
-    field, old = bank.others[name], bank.sample_values(name)
+    field, old = bank.other_models[name], bank.sample_values(name)
     if isinstance(field, ConstantModel):
         # The controls did not explain the old values, so the model stays constant.
         n, k = len(old), len(new)
@@ -228,7 +228,7 @@ def solve_bones(
     """Return the model of bone offsets solved with new clips' (k, J, 3), m, and its directions."""
     known = bank.sample_values("offsets")
     old, new, longer = _extend_proportions(proportions, known, offsets)
-    both, field = np.vstack([old, new]), bank.others["offsets"]
+    both, field = np.vstack([old, new]), bank.other_models["offsets"]
     if not isinstance(field, ConstantModel):
         return universal_kriging.solve(laid.hyper(field.hyper), laid.samples.points, both), longer
     apart = longer.numpy(new) - longer.numpy(old[:1])
@@ -332,7 +332,7 @@ def solve(known: AdaptableModel, moved: CanonicalClips, performer: str) -> Adapt
     new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
     solved = {name: solve_extended(laid, model.bank, name, values) for name, values in new.items()}
     # Keep the model's order of quantities.
-    others = {name: solved.get(name, bones) for name in model.bank.others}
+    others = {name: solved.get(name, bones) for name in model.bank.other_models}
     missed, sill = _left_out_errors(known, laid, moved, extended)
     ends = laid.low, laid.high
     event, blend = _event(laid, model, reduced)
@@ -382,7 +382,7 @@ def _left_out_errors(
 
 def _travel_residuals(old: KrigingBank, laid: ExtendedSamples, new: Floats) -> Floats:
     """Return leave-one-out residuals (k, 3) of the new clips' travel, m."""
-    field, both = old.others["travel"], np.vstack([old.sample_values("travel"), new])
+    field, both = old.other_models["travel"], np.vstack([old.sample_values("travel"), new])
     if isinstance(field, UniversalKriging):
         hyper, groups = laid.hyper(field.hyper), laid.samples.groups
         left_out = universal_kriging.leave_out(hyper, laid.samples.points, groups)

@@ -15,7 +15,8 @@ from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.graph import levels, onnx_export, trained_card, truncation_cost
-from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, LevelTest, ModelLevels
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, LevelTest
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_card import MAX_LISTED_VALUES
 from posefield_train.jobs import single_threaded
@@ -86,28 +87,28 @@ def export_adapted(reopened: ReconstructedModel, newcomer: NewPerformer) -> Expo
         moved = canonical_clips.to_canonical(reopened.known, examples)
         canonical_clips.refuse_outliers(reopened.known, moved)
         adapted = adaptation.solve(reopened.known, moved, newcomer.performer)
-        laddered = _build_levels(reopened, adapted)
+        model, model_levels = _build_levels(reopened, adapted)
         return onnx_export.check_and_export(
-            laddered.model,
-            lambda parity: _card(reopened, adapted, newcomer, laddered.levels, parity),
+            model, lambda parity: _card(reopened, adapted, newcomer, model_levels, parity)
         )
 
 
-def _build_levels(reopened: ReconstructedModel, adapted: AdaptedModel) -> ModelLevels:
+def _build_levels(
+    reopened: ReconstructedModel, adapted: AdaptedModel
+) -> tuple[FloatModel, tuple[Level, ...]]:
     """Build the levels of detail with the error bounds of the parent model's levels.
 
     Joints are compared with the finest level; the errors of the parent's finest level are added.
     """
-    shop = _level_builder(reopened, adapted)
+    builder = _level_builder(reopened, adapted)
     finest, *coarser = reopened.card.levels
-    model = shop.model
+    model = builder.model
     for level in coarser:
         allowed = np.sqrt(max(level.rms**2 - finest.rms**2, finest.rms**2))
-        model = shop.with_coarser_level(model, level.joints, float(allowed))
-    every = range(len(model.decoder.level_sizes))
-    return ModelLevels(
-        model, tuple(_add_parent_errors(shop.level(model, n), finest) for n in every)
-    )
+        model = builder.with_coarser_level(model, level.joints, float(allowed))
+    count = len(model.decoder.level_sizes)
+    built = (builder.level(model, level) for level in range(count))
+    return model, tuple(_add_parent_errors(level, finest) for level in built)
 
 
 def _add_parent_errors(found: Level, finest: Level) -> Level:
@@ -174,7 +175,7 @@ def _card(
     own = tuple(tuple(map(float, clip.controls)) for clip in clips)
     seconds = (*old.durations, *adapted.new_clips.aligned.durations.tolist())
     left_out = (*old.left_out, *map(rounded, np.sqrt(adapted.left_out_errors)))
-    fields = bank.others.items()
+    fields = bank.other_models.items()
     made = {
         n: trained_card.kriging_settings(f.hyper)
         for n, f in fields

@@ -22,10 +22,10 @@ def warp(sequences: Traces, reference: Annotated[Floats, "... frames features"])
     are fixed. The cells that a step skips are added to its cost, so that long steps have no
     advantage.
     """
-    own = np.broadcast_to(reference, (len(sequences), *reference.shape[-2:]))
+    references = np.broadcast_to(reference, (len(sequences), *reference.shape[-2:]))
     starts = range(0, len(sequences), BATCH)
     return np.concatenate(
-        [_batch_phases(sequences[i : i + BATCH], own[i : i + BATCH]) for i in starts]
+        [_batch_phases(sequences[i : i + BATCH], references[i : i + BATCH]) for i in starts]
     )
 
 
@@ -53,8 +53,8 @@ def _distances(
     """Return squared distances (N, F, F) between every frame and every reference frame."""
     squares = np.sum(np.square(sequences), axis=-1)[:, :, None]
     cross = sequences @ np.swapaxes(reference, -1, -2)
-    own = np.sum(np.square(reference), axis=-1)[..., None, :]
-    return np.maximum(squares + own - 2.0 * cross, 0.0)
+    reference_squares = np.sum(np.square(reference), axis=-1)[..., None, :]
+    return np.maximum(squares + reference_squares - 2.0 * cross, 0.0)
 
 
 def _initial_costs(

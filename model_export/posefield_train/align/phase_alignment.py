@@ -46,20 +46,22 @@ def align_phases(
     traces = np.stack(
         [_resample(time_alignment.trace(e.clip, np.sqrt(joint_weights))) for e in examples]
     )
-    found = shifts(traces, recipe.alignment.rounds)
+    shares = shifts(traces, recipe.alignment.rounds)
     in_place = recipe.motion.root == "in_place"
-    begun = tuple(
+    shifted = tuple(
         _remeasure(recipe, shift_start(example, share, in_place))
-        for example, share in zip(examples, found, strict=True)
+        for example, share in zip(examples, shares, strict=True)
     )
-    _refuse_split_landmarks(begun)
-    return begun
+    _refuse_split_landmarks(shifted)
+    return shifted
 
 
-def _remeasure(recipe: Recipe, begun: Example) -> Example:
+def _remeasure(recipe: Recipe, shifted: Example) -> Example:
     """Measure the controls of a shifted example again; travel on an arc depends on the phase."""
-    controls = measured_controls.control_values(recipe, begun.row, begun.clip, begun.landmarks)
-    return replace(begun, controls=controls)
+    controls = measured_controls.control_values(
+        recipe, shifted.row, shifted.clip, shifted.landmarks
+    )
+    return replace(shifted, controls=controls)
 
 
 def align_phases_to(
@@ -72,18 +74,18 @@ def align_phases_to(
     traces = np.stack(
         [_resample(time_alignment.trace(e.clip, np.sqrt(joint_weights))) for e in examples]
     )
-    found = _shifts_to(traces, np.stack([_resample(reference) for reference in references]))
-    return tuple(shift_start(e, share, in_place) for e, share in zip(examples, found, strict=True))
+    shares = _shifts_to(traces, np.stack([_resample(reference) for reference in references]))
+    return tuple(shift_start(e, share, in_place) for e, share in zip(examples, shares, strict=True))
 
 
 def shifts(traces: Annotated[Floats, "clips steps features"], rounds: int) -> PerClip:
     """Return shares of a cycle (N,) at which traces (N, STEPS, features) have a common phase."""
-    found = _centre(_shifts_to(traces, traces[_medoid(traces)]))
+    shares = _centre(_shifts_to(traces, traces[_medoid(traces)]))
     for _ in range(rounds):
-        turned = _shift_traces(traces, found)
-        others = (turned.sum(axis=0) - turned) / (len(turned) - 1)
-        found = _centre(found + _shifts_to(turned, others))
-    return found
+        turned = _shift_traces(traces, shares)
+        means = (turned.sum(axis=0) - turned) / (len(turned) - 1)
+        shares = _centre(shares + _shifts_to(turned, means))
+    return shares
 
 
 def _resample(trace: Annotated[Floats, "frames features"]) -> Annotated[Floats, "steps features"]:
@@ -107,8 +109,10 @@ def _costs(
     references: (STEPS, features), or one per cycle.
     """
     cross = np.sum(_spectra(traces) * np.conj(_spectra(references)), axis=-1)
-    own = np.sum(np.square(traces), axis=(-2, -1)) + np.sum(np.square(references), axis=(-2, -1))
-    return np.maximum(own[..., None] - 2.0 * np.fft.irfft(cross, PHASE_STEPS, axis=-1), 0.0)
+    squares = np.sum(np.square(traces), axis=(-2, -1)) + np.sum(
+        np.square(references), axis=(-2, -1)
+    )
+    return np.maximum(squares[..., None] - 2.0 * np.fft.irfft(cross, PHASE_STEPS, axis=-1), 0.0)
 
 
 def _medoid(traces: Annotated[Floats, "clips steps features"]) -> int:
@@ -163,19 +167,19 @@ def shift_start(example: Example, share: float, in_place: bool = False) -> Examp
     frames = round(share * cycle) % cycle
     if frames == 0:
         return example
-    own = frames / cycle
+    shift = frames / cycle
     clip = _shift_clip(example.clip, frames)
     # The heading changes linearly over the cycle. A line fitted again to the shifted clip would
     # vary with the swing of the pelvis.
     clip = canonical.place(
-        clip, clip.root_path[0] * (1.0 - UP), _heading_change(example.clip) * own
+        clip, clip.root_path[0] * (1.0 - UP), _heading_change(example.clip) * shift
     )
     return replace(
         example,
         # The appended frames are turned by the change of heading, which moves the root again.
         clip=canonical.remove_drift(clip) if in_place else clip,
-        landmarks=tuple((mark - own) % 1.0 for mark in example.landmarks),
-        shift=own - np.rint(own),
+        landmarks=tuple((mark - shift) % 1.0 for mark in example.landmarks),
+        shift=shift - np.rint(shift),
     )
 
 
@@ -201,9 +205,9 @@ def _shift_clip(clip: Clip, frames: int) -> Clip:
     )
 
 
-def _shift_curves(own: CurveValues, frames: int) -> CurveValues:
-    values = np.concatenate([own.values[frames:], own.values[1 : frames + 1]])
-    return replace(own, values=values)
+def _shift_curves(curves: CurveValues, frames: int) -> CurveValues:
+    values = np.concatenate([curves.values[frames:], curves.values[1 : frames + 1]])
+    return replace(curves, values=values)
 
 
 def shift_notes(examples: Sequence[Example]) -> list[str]:
@@ -214,30 +218,30 @@ def shift_notes(examples: Sequence[Example]) -> list[str]:
     shifted = [example for example in examples if abs(example.shift) > NOTED_SHIFT]
     if len(shifted) <= MOST_NOTED:
         return [f"{example.row.named}: {_shift_text(example)}" for example in shifted]
-    most = max(shifted, key=lambda example: abs(example.shift))
+    farthest = max(shifted, key=lambda example: abs(example.shift))
     return [
         f"{len(shifted)} of {len(examples)} clips begin elsewhere in their cycle than they were "
-        f"cut, the most {most.row.named}: {_shift_text(most)}"
+        f"cut, the most {farthest.row.named}: {_shift_text(farthest)}"
     ]
 
 
 def _shift_text(example: Example) -> str:
-    way = "later" if example.shift > 0 else "earlier"
-    return f"begun {abs(example.shift):.0%} of its cycle {way} than it was cut"
+    direction = "later" if example.shift > 0 else "earlier"
+    return f"begun {abs(example.shift):.0%} of its cycle {direction} than it was cut"
 
 
 def _refuse_split_landmarks(examples: Sequence[Example]) -> None:
     """Raise RecipeError for landmarks that the shift moves across the end of some cycles."""
     marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
-    usual = np.median(marks, axis=0)
-    for example, own in zip(examples, marks, strict=True):
-        rising = np.diff(own[np.argsort(usual)]) > 0
-        if not rising.all() or np.any(np.abs(own - usual) >= 0.5) or np.any(own == 0):
+    median = np.median(marks, axis=0)
+    for example, row in zip(examples, marks, strict=True):
+        rising = np.diff(row[np.argsort(median)]) > 0
+        if not rising.all() or np.any(np.abs(row - median) >= 0.5) or np.any(row == 0):
             raise RecipeError(
                 example.row.table,
-                f"landmarks lie at {_percentages(own)} of the cycle once it begins at the family's "
+                f"landmarks lie at {_percentages(row)} of the cycle once it begins at the family's "
                 f"phase ({example.shift:+.0%}), expected near "
-                f"{_percentages(usual)} and in that order; "
+                f"{_percentages(median)} and in that order; "
                 "cut the cycles away from a landmark, or say alignment.begin = 'as_cut'",
                 example.row.line,
             )

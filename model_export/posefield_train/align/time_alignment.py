@@ -97,9 +97,9 @@ def align(
     knees = _breakpoints(marks, marks.mean(axis=0))
     medoid = _medoid(_align_piecewise(traces, knees, COARSE))
     fine = _align_piecewise(traces, knees, FINE)
-    shown = fine if len(fine) <= LARGEST_COMPARED else _movements(fine)
-    logs = _centre(_warps_to(shown, shown[medoid], knees, basis, jobs), knees, basis)
-    del shown
+    compared = fine if len(fine) <= LARGEST_COMPARED else _movements(fine)
+    logs = _centre(_warps_to(compared, compared[medoid], knees, basis, jobs), knees, basis)
+    del compared
     for _ in range(refinement.rounds):
         pairs = zip(traces, logs, strict=True)
         warped = _stack(
@@ -126,13 +126,13 @@ class _ClipTraces:
 
 def _stack(rows: Iterable[Floats], count: int) -> Annotated[Floats, "{count} ..."]:
     """Return `np.stack` of `count` arrays of equal shapes, of which only one is held at a time."""
-    found: Floats | None = None
+    stacked: Floats | None = None
     for index, row in enumerate(rows):
-        if found is None:
-            found = np.empty((count, *row.shape))
-        found[index] = row
-    assert found is not None and index == count - 1
-    return found
+        if stacked is None:
+            stacked = np.empty((count, *row.shape))
+        stacked[index] = row
+    assert stacked is not None and index == count - 1
+    return stacked
 
 
 @dataclass(frozen=True)
@@ -180,9 +180,9 @@ def _resample_all(
 
     def rotations() -> Iterator[JointRotations]:
         for example, u in pairs:
-            found, path = resample(example.clip, u)
+            rotation_frames, path = resample(example.clip, u)
             paths.append(path)
-            yield found
+            yield rotation_frames
 
     return AlignedClips(
         _stack(rotations(), len(examples)),
@@ -226,18 +226,18 @@ def interpolate(
 class _Breakpoints:
     """Breakpoints of piecewise linear time maps.
 
-    own: clip times (N, M + 2). canonical: canonical times (M + 2,).
+    times: clip times (N, M + 2). canonical: canonical times (M + 2,).
     """
 
-    own: Annotated[Floats, "clips breakpoints"]
+    times: Annotated[Floats, "clips breakpoints"]
     canonical: Annotated[Floats, "breakpoints"]
 
     @property
     def weights(self) -> Annotated[Floats, "clips fitted"]:
         """Return the weight (N, 501) of each sample in the fit of a warp."""
-        weights = np.ones((len(self.own), len(FIT_TIMES)))
-        for row, own in zip(weights, self.own[:, 1:-1], strict=True):
-            row[np.rint(own * (len(FIT_TIMES) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
+        weights = np.ones((len(self.times), len(FIT_TIMES)))
+        for row, times in zip(weights, self.times[:, 1:-1], strict=True):
+            row[np.rint(times * (len(FIT_TIMES) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
         return weights
 
 
@@ -245,15 +245,17 @@ def _breakpoints(
     marks: Annotated[Floats, "clips landmarks"], canonical: Annotated[Floats, "landmarks"]
 ) -> _Breakpoints:
     """Return breakpoints for landmarks (N, M) with canonical times (M,)."""
-    ends = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
-    return _Breakpoints(np.hstack([ends[0], marks, ends[1]]), np.array([0.0, *canonical, 1.0]))
+    bounds = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
+    return _Breakpoints(np.hstack([bounds[0], marks, bounds[1]]), np.array([0.0, *canonical, 1.0]))
 
 
 def _align_piecewise(
     traces: Iterable[Annotated[Floats, "_ features"]], knees: _Breakpoints, frames: int
 ) -> Annotated[Floats, "clips {frames} features"]:
     """Resample traces to (N, frames, features), with landmarks aligned by piecewise linear maps."""
-    times = [np.interp(_uniform_times(frames), knees.canonical, own) for own in knees.own]
+    times = [
+        np.interp(_uniform_times(frames), knees.canonical, knee_times) for knee_times in knees.times
+    ]
     pairs = zip(traces, times, strict=True)
     return _stack((interpolate(trace, u) for trace, u in pairs), len(times))
 
@@ -288,7 +290,9 @@ def _warps_to(
 
     reference: (F, features), or one per clip (N, F, features).
     """
-    straight = np.stack([np.interp(FIT_TIMES, own, knees.canonical) for own in knees.own])
+    straight = np.stack(
+        [np.interp(FIT_TIMES, knee_times, knees.canonical) for knee_times in knees.times]
+    )
     # Time warping may shift a landmark: the phases are rescaled so that it returns to its time.
     phases = [
         np.interp(phase, np.interp(knees.canonical, _uniform_times(FINE), phase), knees.canonical)
@@ -304,10 +308,10 @@ def _phases(
     traces: Traces, reference: Annotated[Floats, "... frames features"], jobs: Jobs
 ) -> ClipFrames:
     """Return `dtw.warp` of traces, block by block of clips."""
-    own = np.broadcast_to(reference, traces.shape)
+    references = np.broadcast_to(reference, traces.shape)
     blocks = canonical.clip_blocks(len(traces))
     return np.concatenate(
-        ordered_results(jobs, dtw.warp, ((traces[rows], own[rows]) for rows in blocks))
+        ordered_results(jobs, dtw.warp, ((traces[rows], references[rows]) for rows in blocks))
     )
 
 
@@ -327,9 +331,9 @@ def resample(
     clip: Clip, u: Annotated[Floats, "asked"]
 ) -> tuple[Annotated[Floats, "asked joints 4"], Annotated[Floats, "asked 3"]]:
     """Return rotations (S, J, 4) and root path (S, 3) at fractions u (S,) of the duration."""
-    place = np.clip(u, 0.0, 1.0) * (len(clip) - 1)
-    before = np.minimum(place.astype(np.int64), len(clip) - 2)
-    share = place - before
+    frame = np.clip(u, 0.0, 1.0) * (len(clip) - 1)
+    before = np.minimum(frame.astype(np.int64), len(clip) - 2)
+    share = frame - before
     rotations = quat.slerp(clip.rotations[before], clip.rotations[before + 1], share[:, None])
     return rotations, interpolate(clip.root_path, np.clip(u, 0.0, 1.0))
 

@@ -72,36 +72,36 @@ class Travel:
     joints: int
 
     def numpy(
-        self, rotations: ClipRotations, root: ClipPaths, travel: ClipTravel, place: ClipFrames
+        self, rotations: ClipRotations, root: ClipPaths, travel: ClipTravel, frames: ClipFrames
     ) -> tuple[ClipRotations, ClipPaths, ClipPaths]:
         """Return rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) added.
 
-        The third value is the travel completed (B, S, 3). place: canonical frames (B, S).
+        The third value is the travel completed (B, S, 3). frames: canonical frames (B, S).
         """
-        share = place / (self.frames - 1)
+        share = frames / (self.frames - 1)
         return *put_back(rotations, root, travel, share), share[..., None] * travel[:, None]
 
     def onnx(
-        self, net: GraphBuilder, planes: str, root: str, travel: str, place: str
+        self, net: GraphBuilder, planes: str, root: str, travel: str, frames: str
     ) -> tuple[str, str, str]:
         """Build `numpy` in a graph with poses as rows P = B S.
 
-        planes: rotations (J, 4, P), poses innermost. root: (P, 3). travel: (B, 3). place: canonical
-        frames (B, S). The travel completed is (P, 3).
+        planes: rotations (J, 4, P), poses innermost. root: (P, 3). travel: (B, 3). frames:
+        canonical frames (B, S). The travel completed is (P, 3).
         """
-        share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
-        steps, whole = net("Unsqueeze", share, net.indices(2)), net.indices(1)
-        gone = net("Mul", steps, net("Unsqueeze", travel, whole))
+        share = net("Mul", frames, net.number(1.0 / (self.frames - 1)))
+        steps, axis = net("Unsqueeze", share, net.indices(2)), net.indices(1)
+        gone = net("Mul", steps, net("Unsqueeze", travel, axis))
         rows = net.rename_value(ROW_VALUES["travel"], net("Reshape", gone, net.indices(-1, 3)))
         axes = np.vstack([np.eye(3)[[0, 2]], np.zeros(3)])
-        moved = net("Gemm", rows, net.weights("travel_axes", axes), root)
+        moved_root = net("Gemm", rows, net.weights("travel_axes", axes), root)
         angle = net("Gather", rows, net.weights("travel_turn", np.array(2)), axis=1)
         half = net.padded(net("Mul", angle, net.number(0.5)))
         cosine, sine = (net.unpadded(net(turn, half)) for turn in ("Cos", "Sin"))
         sizes = net.indices(1, self.joints - 1)
-        own, *others = (
+        root_planes, *joint_planes = (
             net.multi_output("Split", 2, planes, sizes, axis=0) if self.joints > 1 else [planes]
         )
-        across = net("MatMul", net.weights("travel_quarter", HALF_TURN.T), own)
-        turned = net("Add", net("Mul", own, cosine), net("Mul", across, sine))
-        return net("Concat", turned, *others, axis=0), moved, rows
+        across = net("MatMul", net.weights("travel_quarter", HALF_TURN.T), root_planes)
+        turned = net("Add", net("Mul", root_planes, cosine), net("Mul", across, sine))
+        return net("Concat", turned, *joint_planes, axis=0), moved_root, rows

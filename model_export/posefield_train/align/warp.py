@@ -147,8 +147,8 @@ class CanonicalTiming:
         coefficients = net("Unsqueeze", net("Gemm", form, increments, transB=1), net.indices(2))
         # Powers lie outermost: a sum over them has the same order at every place of a row.
         terms = net("Mul", self._powers(net, u), coefficients)
-        place = net("ReduceSum", terms, net.indices(0), keepdims=0)
-        return duration, net("Clip", place, net.number(0.0), net.number(self.frames - 1.0))
+        frames = net("ReduceSum", terms, net.indices(0), keepdims=0)
+        return duration, net("Clip", frames, net.number(0.0), net.number(self.frames - 1.0))
 
     def _powers(self, net: GraphBuilder, u: str) -> str:
         """Build the functions (2 + pieces, B, S) of the warps' power form at shares (B, S).
@@ -158,9 +158,9 @@ class CanonicalTiming:
         breaks = np.concatenate([np.zeros(3), self.basis.breaks])[:, None, None]
         hinges = net("Sub", u, net.weights("warp_breaks", breaks))
         # No hinge exceeds one, and none of the first two is negative.
-        least = np.zeros((2, len(breaks), 1, 1))
-        least[0, :1], least[1, :2] = 1.0, 1.0
+        lowest = np.zeros((2, len(breaks), 1, 1))
+        lowest[0, :1], lowest[1, :2] = 1.0, 1.0
         second, third = (
-            net("Max", hinges, net.weights(f"warp_factor_{i + 2}", least[i])) for i in range(2)
+            net("Max", hinges, net.weights(f"warp_factor_{i + 2}", lowest[i])) for i in range(2)
         )
         return net("Mul", net("Mul", net("Relu", hinges), second), third)

@@ -139,17 +139,17 @@ def _sweep(
     ):
         for made in sweep.train_models(recipe_files, data, jobs):
             bar.advance(1)
-            if isinstance(made.found, TrainingError):
+            if isinstance(made.outcome, TrainingError):
                 failed.append(made.name)
-                bar.print(f"{made.name}: {made.found}")
+                bar.print(f"{made.name}: {made.outcome}")
                 continue
             path = folder / f"{made.name}.onnx"
-            atomic_files.write(made.found.content, path)
-            found.append(output_files.facts(made.found, path))
+            atomic_files.write(made.outcome.content, path)
+            found.append(output_files.facts(made.outcome, path))
             if json:
-                bar.print(output_files.summary(made.found, path))
+                bar.print(output_files.summary(made.outcome, path))
             else:
-                typer.echo(output_files.summary(made.found, path))
+                typer.echo(output_files.summary(made.outcome, path))
     if json:
         typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
     if failed:

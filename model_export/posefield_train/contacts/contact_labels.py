@@ -57,13 +57,13 @@ def settings(recipe: Recipe, names: Sequence[str]) -> ContactSettings:
     labelled = [*recipe.motion.feet, *(name for name in columns if name not in recipe.motion.feet)]
     return ContactSettings(
         tuple(map(names.index, labelled)),
-        {place: name for place, name in enumerate(labelled) if name in columns},
+        {index: name for index, name in enumerate(labelled) if name in columns},
         recipe.motion.cyclic,
         recipe.motion.root == "in_place",
     )
 
 
-def clip_contacts(example: Example, asked: ContactSettings) -> ClipContacts:
+def clip_contacts(example: Example, settings: ContactSettings) -> ClipContacts:
     """Return the contacts of one example."""
     clip = example.clip
     steps = max(2, round(RATE * clip.duration))
@@ -71,18 +71,18 @@ def clip_contacts(example: Example, asked: ContactSettings) -> ClipContacts:
     rotations, root_path = time_alignment.resample(clip, shares)
     translations = skeleton.translations(example.offsets, root_path)
     positions = skeleton.positions(clip.skeleton.parents, rotations, translations)
-    paths = positions[:, list(asked.joints)]
-    found = np.zeros(paths.shape[:2], dtype=np.bool_)
-    feet = [place for place in range(len(asked.joints)) if place not in asked.columns]
-    moving = asked.in_place and feet
+    paths = positions[:, list(settings.joints)]
+    contacts = np.zeros(paths.shape[:2], dtype=np.bool_)
+    feet = [column for column in range(len(settings.joints)) if column not in settings.columns]
+    moving = settings.in_place and feet
     ground = contact_detection.ground_velocity(paths[:, feet], rate) if moving else None
-    for place in feet:
-        found[:, place] = contact_detection.detect_contacts(
-            paths[:, place], rate, asked.cyclic, ground
+    for column in feet:
+        contacts[:, column] = contact_detection.detect_contacts(
+            paths[:, column], rate, settings.cyclic, ground
         )
-    for place, name in asked.columns.items():
-        found[:, place] = _table_contacts(example, name, shares, asked.cyclic)
-    return ClipContacts(found, paths[..., 1], rate)
+    for column, name in settings.columns.items():
+        contacts[:, column] = _table_contacts(example, name, shares, settings.cyclic)
+    return ClipContacts(contacts, paths[..., 1], rate)
 
 
 def canonical_labels(
@@ -97,7 +97,7 @@ def canonical_labels(
     """
     even = np.linspace(0.0, 1.0, frames)
     pairs = zip(clips, logs, strict=True)
-    return np.stack([own.at(basis.invert(log, even)) for own, log in pairs])
+    return np.stack([contacts.at(basis.invert(log, even)) for contacts, log in pairs])
 
 
 def _table_contacts(
@@ -107,12 +107,12 @@ def _table_contacts(
     # The table counts in the clip as it was cut, before its cycle was shifted.
     cut = (shares + example.shift) % 1.0 if cyclic else shares
     spans = example.contacts[joint]
-    found = np.zeros(len(shares), dtype=np.bool_)
+    contacts = np.zeros(len(shares), dtype=np.bool_)
     for first, last in spans:
-        found |= (cut >= first) & (cut <= last)
+        contacts |= (cut >= first) & (cut <= last)
     if cyclic:
-        found[-1] = found[0]
-    return found
+        contacts[-1] = contacts[0]
+    return contacts
 
 
 USUAL_SWING, USUAL_CLEARANCE = 0.4, 0.05
@@ -139,27 +139,27 @@ def contact_statistics(
 
     A joint without a whole swing between two contacts takes the swings of all others.
     """
-    swings = [_swings(clips, place, cyclic) for place in range(len(joints))]
-    durations = np.concatenate([own.durations for own in swings])
-    lifts = np.concatenate([own.lifts for own in swings])
+    swings = [_swings(clips, column, cyclic) for column in range(len(joints))]
+    durations = np.concatenate([joint_swings.durations for joint_swings in swings])
+    lifts = np.concatenate([joint_swings.lifts for joint_swings in swings])
     if not len(durations):
         durations, lifts = np.array([USUAL_SWING]), np.array([USUAL_CLEARANCE])
     return tuple(
         None
-        if own.height is None
+        if joint_swings.height is None
         else _contact(
             joint,
-            own.height,
-            own.durations if len(own.durations) else durations,
-            own.lifts if len(own.lifts) else lifts,
+            joint_swings.height,
+            joint_swings.durations if len(joint_swings.durations) else durations,
+            joint_swings.lifts if len(joint_swings.lifts) else lifts,
         )
-        for joint, own in zip(joints, swings, strict=True)
+        for joint, joint_swings in zip(joints, swings, strict=True)
     )
 
 
-def without_swings(clips: Sequence[ClipContacts], place: int, cyclic: bool) -> bool:
+def without_swings(clips: Sequence[ClipContacts], column: int, cyclic: bool) -> bool:
     """Return True if the joint at a place in the labels makes no whole swing in any clip."""
-    return len(_swings(clips, place, cyclic).durations) == 0
+    return len(_swings(clips, column, cyclic).durations) == 0
 
 
 def _contact(joint: int, height: float, durations: Floats, lifts: Floats) -> FootContact:
@@ -172,10 +172,10 @@ def _contact(joint: int, height: float, durations: Floats, lifts: Floats) -> Foo
     )
 
 
-def _swings(clips: Sequence[ClipContacts], place: int, cyclic: bool) -> _Swings:
+def _swings(clips: Sequence[ClipContacts], column: int, cyclic: bool) -> _Swings:
     durations, lifts, heights = [], [], []
     for clip in clips:
-        contacts, height = clip.contacts[:, place], clip.heights[:, place]
+        contacts, height = clip.contacts[:, column], clip.heights[:, column]
         if cyclic:
             contacts, height = contacts[:-1], height[:-1]
         if not contacts.any():
@@ -187,5 +187,5 @@ def _swings(clips: Sequence[ClipContacts], place: int, cyclic: bool) -> _Swings:
             if cyclic or (run[0] > 0 and run[-1] < len(contacts) - 1):
                 durations.append(len(run) / clip.rate)
                 lifts.append(max(float(height[run].max()) - standing, 0.0))
-    own = float(np.median(heights)) if heights else None
-    return _Swings(np.array(durations), np.array(lifts), own)
+    median_height = float(np.median(heights)) if heights else None
+    return _Swings(np.array(durations), np.array(lifts), median_height)

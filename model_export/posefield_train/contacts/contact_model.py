@@ -32,13 +32,13 @@ class ContactTable:
     values: Annotated[Floats, "modes joints frames"]
 
     def numpy(
-        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+        self, coefficients: Annotated[Floats, "clips modes"], frames: ClipFrames
     ) -> Annotated[Floats, "clips frames joints"]:
         """Return probabilities (B, S, K) of contacts at canonical frames (B, S).
 
         coefficients: (B, r). As for poses, the functions are interpolated linearly between frames.
         """
-        rows = quat.interpolate_rows(self._rows, place).reshape(*place.shape, *self._shape)
+        rows = quat.interpolate_rows(self._rows, frames).reshape(*frames.shape, *self._shape)
         return np.clip(np.einsum("bskr,br->bsk", rows, coefficients), 0.0, 1.0)
 
     def labels(
@@ -47,15 +47,15 @@ class ContactTable:
         """Return the labels (N, T, K) of coefficients (N, r), not clipped."""
         return np.einsum("rkt,nr->ntk", self.values, coefficients)
 
-    def onnx(self, net: GraphBuilder, coefficients: str, place: str) -> str:
+    def onnx(self, net: GraphBuilder, coefficients: str, frames: str) -> str:
         """Build `numpy` in a graph, from canonical frames (B, S)."""
         table, last = net.weights("contact_table", self.values), self.values.shape[2] - 1
         zero, one, time = net.indices(0), net.indices(1), net.indices(2)
         first = net("Slice", table, zero, net.indices(last), time)
         steps = net("Sub", net("Slice", table, one, net.indices(last + 1), time), first)
-        before = net("Min", net("Floor", place), net.number(last - 1.0))
+        before = net("Min", net("Floor", frames), net.number(last - 1.0))
         column = net("Cast", before, to=6)
-        rise = net("Mul", net("Gather", steps, column, axis=2), net("Sub", place, before))
+        rise = net("Mul", net("Gather", steps, column, axis=2), net("Sub", frames, before))
         functions = net("Add", net("Gather", first, column, axis=2), rise)
         # (r, 1, B, 1) beside functions (r, K, B, S).
         weights = net("Unsqueeze", net("Transpose", coefficients, perm=[1, 0]), net.indices(1, 3))
@@ -151,21 +151,23 @@ def fit_contacts(
     (N, knots) of each clip's warp.
     """
     names = examples[0].clip.skeleton.names
-    asked = contact_labels.settings(recipe, names)
-    if not asked.joints:
+    settings = contact_labels.settings(recipe, names)
+    if not settings.joints:
         return None, []
-    clips = [contact_labels.clip_contacts(example, asked) for example in examples]
-    every = contact_labels.contact_statistics(clips, asked.joints, asked.cyclic)
-    notes = _notes(clips, every, [names[joint] for joint in asked.joints], asked.cyclic)
-    kept = [place for place, own in enumerate(every) if own is not None]
-    if not kept:
+    clips = [contact_labels.clip_contacts(example, settings) for example in examples]
+    found_statistics = contact_labels.contact_statistics(clips, settings.joints, settings.cyclic)
+    notes = _notes(
+        clips, found_statistics, [names[joint] for joint in settings.joints], settings.cyclic
+    )
+    columns = [column for column, contact in enumerate(found_statistics) if contact is not None]
+    if not columns:
         return None, notes
     timing, logs = warps
-    labels = contact_labels.canonical_labels(clips, logs, timing.basis, timing.frames)[..., kept]
+    labels = contact_labels.canonical_labels(clips, logs, timing.basis, timing.frames)[..., columns]
     table, coefficients = reduce_labels(labels)
     solved = universal_kriging.solve_samples(pose, samples, coefficients)
     accuracy = left_out_accuracy(labels, table.labels(coefficients), pose, samples)
-    statistics = tuple(own for own in every if own is not None)
+    statistics = tuple(contact for contact in found_statistics if contact is not None)
     fitted = FittedContacts(table, solved, statistics, accuracy)
     return fitted, [*notes, *_accuracy_notes(accuracy)]
 
@@ -174,38 +176,38 @@ def left_out_accuracy(
     labels: Labels, reduced: Labels, pose: Hyper, samples: SamplePoints
 ) -> ContactAccuracy:
     """Return the errors of labels (N, T, K) predicted from reduced ones of other recordings."""
-    rows, known = labels.reshape(len(labels), -1), reduced.reshape(len(labels), -1)
+    rows, reduced_rows = labels.reshape(len(labels), -1), reduced.reshape(len(labels), -1)
     left_out = universal_kriging.leave_out_samples(pose, samples)
-    predicted = np.clip(known - left_out @ known, 0.0, 1.0)
+    predicted = np.clip(reduced_rows - left_out @ reduced_rows, 0.0, 1.0)
     return ContactAccuracy.measure(predicted, rows, samples.from_mean(rows))
 
 
 def _notes(
     clips: Sequence[ClipContacts],
-    found: Sequence[FootContact | None],
+    statistics: Sequence[FootContact | None],
     names: Sequence[str],
     cyclic: bool,
 ) -> list[str]:
     notes = []
-    for place, (own, name) in enumerate(zip(found, names, strict=True)):
-        if own is None:
+    for column, (contact, name) in enumerate(zip(statistics, names, strict=True)):
+        if contact is None:
             notes.append(f"{name} contacts nothing in any clip: the model has no contacts of it")
-        elif contact_labels.without_swings(clips, place, cyclic):
+        elif contact_labels.without_swings(clips, column, cyclic):
             notes.append(
                 f"{name} makes no whole swing between two contacts in any clip: its swings are "
-                f"taken to last {own.swing:g} s, as those of the other joints or as usual"
+                f"taken to last {contact.swing:g} s, as those of the other joints or as usual"
             )
     return notes
 
 
-def _accuracy_notes(own: ContactAccuracy) -> list[str]:
+def _accuracy_notes(accuracy: ContactAccuracy) -> list[str]:
     """Return a note if the controls hardly say when joints are in contact."""
-    if own.brier < PREDICTED * own.climatology:
+    if accuracy.brier < PREDICTED * accuracy.climatology:
         return []
     return [
         "when the feet stand hardly follows from the controls: contacts are plausible rather than "
-        f"predicted (Brier score {own.brier:.3f} of clips left out, {own.climatology:.3f} of the "
-        "mean over the others)"
+        f"predicted (Brier score {accuracy.brier:.3f} of clips left out, "
+        f"{accuracy.climatology:.3f} of the mean over the others)"
     ]
 
 
@@ -222,7 +224,7 @@ class HeldOutClips:
     """Clips that a model was trained on, and clips that were held out."""
 
     rest: Sequence[Example]
-    held: Sequence[Example]
+    held_out: Sequence[Example]
 
 
 def held_out_accuracies(
@@ -237,29 +239,33 @@ def held_out_accuracies(
     if recipe.alignment.begin == "in_phase" and recipe.motion.cyclic:
         return []
     mean = _labels_at_shares(recipe, clips.rest, joints).mean(axis=0)
-    pairs = zip(_labels_at_shares(recipe, clips.held, joints), predict(SHARES), strict=True)
-    return [ContactAccuracy.measure(predicted, own, own - mean) for own, predicted in pairs]
+    pairs = zip(_labels_at_shares(recipe, clips.held_out, joints), predict(SHARES), strict=True)
+    return [
+        ContactAccuracy.measure(predicted, labels, labels - mean) for labels, predicted in pairs
+    ]
 
 
-def mean_accuracy(found: Sequence[ContactAccuracy]) -> dict[str, Any]:
+def mean_accuracy(accuracies: Sequence[ContactAccuracy]) -> dict[str, Any]:
     """Return the means over clips by name, rounded."""
     names = ("agreement", "brier", "climatology")
-    return {name: float(f"{np.mean([getattr(one, name) for one in found]):.4g}") for name in names}
+    return {
+        name: float(f"{np.mean([getattr(one, name) for one in accuracies]):.4g}") for name in names
+    }
 
 
-def accuracy_text(found: Sequence[ContactAccuracy]) -> str:
+def accuracy_text(accuracies: Sequence[ContactAccuracy]) -> str:
     """Return a sentence on the means over clips."""
-    own = mean_accuracy(found)
+    means = mean_accuracy(accuracies)
     return (
-        f"contacts: {own['agreement']:.1%} of frames agree, Brier score {own['brier']:.3f}; by the "
-        f"mean of the other clips {own['climatology']:.3f}"
+        f"contacts: {means['agreement']:.1%} of frames agree, Brier score {means['brier']:.3f}; by "
+        f"the mean of the other clips {means['climatology']:.3f}"
     )
 
 
 def _labels_at_shares(
     recipe: Recipe, examples: Sequence[Example], joints: Sequence[int]
 ) -> Annotated[Floats, "clips frames joints"]:
-    asked = contact_labels.settings(recipe, examples[0].clip.skeleton.names)
-    places = [asked.joints.index(joint) for joint in joints]
-    clips = (contact_labels.clip_contacts(example, asked) for example in examples)
-    return np.stack([clip.at(SHARES)[:, places] for clip in clips])
+    settings = contact_labels.settings(recipe, examples[0].clip.skeleton.names)
+    columns = [settings.joints.index(joint) for joint in joints]
+    clips = (contact_labels.clip_contacts(example, settings) for example in examples)
+    return np.stack([clip.at(SHARES)[:, columns] for clip in clips])

@@ -28,15 +28,15 @@ MANY, PARTS = 40, 12
 
 @dataclass(frozen=True)
 class Fold:
-    """Examples that are held out together. held: their indices."""
+    """Examples that are held out together. held_out: their indices."""
 
-    held: tuple[int, ...]
+    held_out: tuple[int, ...]
 
     def split(self, examples: Sequence[Example]) -> tuple[list[Example], list[Example]]:
         """Return the examples to train from, and those held out."""
-        held = set(self.held)
+        held = set(self.held_out)
         rest = [example for i, example in enumerate(examples) if i not in held]
-        return rest, [examples[i] for i in self.held]
+        return rest, [examples[i] for i in self.held_out]
 
 
 def clip_folds(examples: Sequence[Example]) -> list[Fold]:
@@ -99,7 +99,7 @@ def measure_flags(controls: Floats, names: Sequence[str], parts: Sequence[Fold])
     """Return the flags over controls (N, d) of clips held out by folds."""
     alarms, beyond = [], []
     for fold in parts:
-        is_held = np.isin(np.arange(len(controls)), fold.held)
+        is_held = np.isin(np.arange(len(controls)), fold.held_out)
         held, fitted = controls[is_held], support.fit_support(controls[~is_held])
         alarms.append(~fitted.supported(held))
         flagged = [_flagged_beyond(fitted, held, control) for control in range(len(names))]
@@ -174,16 +174,16 @@ class PartialResult:
 
 @dataclass(frozen=True)
 class TrainedFold:
-    """A model that was trained without the clips of a fold, and what it is asked.
+    """A model that was trained without the clips of a fold, and the queries about them.
 
-    rest, held: clips that it was trained on, and those held out. captured: motions of the latter.
+    rest: clips that it was trained on. captured: motions of those held out.
     """
 
     recipe: Recipe
     trained: TrainedModel
     fold: Fold
     rest: Sequence[Example]
-    held: Sequence[Example]
+    held_out: Sequence[Example]
     queries: Queries
     captured: Sequence[ComparedMotion]
 
@@ -250,7 +250,9 @@ def compare_fold(fold: TrainedFold, predicted: Predictions) -> PartialResult:
     feet = tuple(map(fold.trained.skeleton.names.index, fold.recipe.motion.feet))
     errors = motion_errors.compare_methods(predicted.motions, fold.captured, feet)
     contacts = _contact_accuracies(fold)
-    return PartialResult(fold.fold.held, errors, predicted.sigma, predicted.joint_sigma, contacts)
+    return PartialResult(
+        fold.fold.held_out, errors, predicted.sigma, predicted.joint_sigma, contacts
+    )
 
 
 def _contact_accuracies(fold: TrainedFold) -> list[ContactAccuracy]:
@@ -266,7 +268,7 @@ def _contact_accuracies(fold: TrainedFold) -> list[ContactAccuracy]:
         return np.zeros((len(durations), len(shares), 0)) if contacts is None else contacts
 
     joints = [statistics.joint for statistics in fitted.statistics]
-    clips = HeldOutClips(fold.rest, fold.held)
+    clips = HeldOutClips(fold.rest, fold.held_out)
     return contact_model.held_out_accuracies(fold.recipe, clips, joints, predict)
 
 

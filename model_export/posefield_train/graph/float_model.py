@@ -43,12 +43,12 @@ class ModelOutputs:
         translations = skeleton.translations(self.bone_offsets, self.root_position)
         return skeleton.positions(parents, self.rotations, translations)
 
-    def points(self, parents: tuple[int, ...], own: tuple[Curve, ...]) -> Floats:
+    def points(self, parents: tuple[int, ...], curves: tuple[Curve, ...]) -> Floats:
         """Return joint positions and, behind them, the points of curves (B, S, J + C, 3), m."""
         joints = self.positions(parents)
         if self.curves is None:
             return joints
-        return np.concatenate([joints, as_points(own, self.curves)], axis=-2)
+        return np.concatenate([joints, as_points(curves, self.curves)], axis=-2)
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,13 @@ class FloatModel:
         """
         none = np.zeros((len(controls), self.bank.label_count))
         fields = self.fields(controls, none if labels is None else labels, level)
-        found = self.outputs_at_times(fields, time, level)
+        outputs = self.outputs_at_times(fields, time, level)
         if self.contacts is None or self.bank.contacts is None:
-            return found
+            return outputs
         points = self.bank.points(controls, none if labels is None else labels)
-        _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
-        contacts = self.contacts.numpy(self.bank.contacts.predict(points), place)
-        return replace(found, contacts=contacts)
+        _, frames = self.timing.numpy(fields["duration"], fields["warp"], time)
+        contacts = self.contacts.numpy(self.bank.contacts.predict(points), frames)
+        return replace(outputs, contacts=contacts)
 
     def fields(self, controls: Floats, labels: Floats, level: int) -> dict[str, Floats]:
         """Return the values (B, m) of all kriged quantities by name."""
@@ -89,18 +89,18 @@ class FloatModel:
 
     def outputs_at_times(self, fields: dict[str, Floats], time: Floats, level: int) -> ModelOutputs:
         """Return the outputs for `fields` at times (B, S), s."""
-        _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
-        return self._decode(fields, place, level)
+        _, frames = self.timing.numpy(fields["duration"], fields["warp"], time)
+        return self._decode(fields, frames, level)
 
     def durations(self, controls: Floats, labels: Floats) -> Floats:
         """Return the durations (B,), s, at the finest level."""
         return self.bank.durations(self.bank.points(controls, labels))
 
     def outputs_at_frames(
-        self, controls: Floats, place: Floats, labels: Floats, level: int
+        self, controls: Floats, frames: Floats, labels: Floats, level: int
     ) -> ModelOutputs:
         """Return outputs at canonical frames (B, S)."""
-        return self._decode(self.fields(controls, labels, level), place, level)
+        return self._decode(self.fields(controls, labels, level), frames, level)
 
     def joint_at_frame(
         self, fields: dict[str, Floats], chain: Sequence[int], frame: int, level: int
@@ -110,44 +110,44 @@ class FloatModel:
         chain: joints from the root on, each the parent of the next.
         """
         decoder = self.decoder.at_level(level).select_joints(chain)
-        rotations, root = (found[:, None] for found in decoder.at_frame(fields[POSE], frame))
+        rotations, root = (values[:, None] for values in decoder.at_frame(fields[POSE], frame))
         if self.travel:
-            place = np.full((len(root), 1), float(frame))
-            rotations, root, _ = self.travel.numpy(rotations, root, fields["travel"], place)
+            frames = np.full((len(root), 1), float(frame))
+            rotations, root, _ = self.travel.numpy(rotations, root, fields["travel"], frames)
         offsets = self.proportions.numpy(fields["offsets"])[:, list(chain)]
         translations = skeleton.translations(offsets, root)
         parents = tuple(range(-1, len(chain) - 1))
         return skeleton.positions(parents, rotations, translations)[:, 0, -1]
 
-    def _decode(self, fields: dict[str, Floats], place: Floats, level: int) -> ModelOutputs:
+    def _decode(self, fields: dict[str, Floats], frames: Floats, level: int) -> ModelOutputs:
         decoder = self.decoder.at_level(level)
-        rotations, root = decoder.numpy(fields[POSE], place)
-        gone, duration = np.zeros((*place.shape, 3)), np.exp(fields["duration"][:, 0])
+        rotations, root = decoder.numpy(fields[POSE], frames)
+        gone, duration = np.zeros((*frames.shape, 3)), np.exp(fields["duration"][:, 0])
         if self.travel:
-            rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], place)
+            rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], frames)
         offsets = self.proportions.numpy(fields["offsets"])
         sigma = self.bank.sigma(fields[VARIANCE])
-        curves = decoder.curve_values(fields[POSE], place) if decoder.curves else None
+        curves = decoder.curve_values(fields[POSE], frames) if decoder.curves else None
         return ModelOutputs(rotations, root, offsets, duration, sigma, gone, curves)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
         """Return the file of the model: one graph with metadata, producer fields and a checksum."""
         net = GraphBuilder()
-        ranks = [rung.ranks[2] for rung in self.decoder.level_sizes]
+        ranks = [size.ranks[2] for size in self.decoder.level_sizes]
         ladder = LevelTables(
             {**kriging_graph.entries(self.bank, ranks), **decoder_graph.entries(self.decoder)}
         )
-        ends = ladder.onnx(net)
-        fields = kriging_graph.onnx(self.bank, net, "controls", ends)
+        tables = ladder.onnx(net)
+        fields = kriging_graph.onnx(self.bank, net, "controls", tables)
         # service/posefield/constraints reads the coefficients by this name.
         fields[POSE] = net.rename_value("coefficients", fields[POSE])
-        duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
-        place = net.rename_value("frame", place)
-        decoded = decoder_graph.onnx(self.decoder, net, fields[POSE], place, ends)
+        duration, frames = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
+        frames = net.rename_value("frame", frames)
+        decoded = decoder_graph.onnx(self.decoder, net, fields[POSE], frames, tables)
         planes, root = decoded.planes, decoded.root
         if self.travel:
-            way = net.rename_value("way", fields["travel"])
-            planes, root, gone = self.travel.onnx(net, planes, root, way, place)
+            coefficients = net.rename_value("way", fields["travel"])
+            planes, root, gone = self.travel.onnx(net, planes, root, coefficients, frames)
         joints = len(self.decoder.means)
         rows = {
             "rotations": decoder_graph.rows_of_poses(net, planes, joints),
@@ -163,12 +163,14 @@ class FloatModel:
         # A difference of equal numbers costs less than a product with three zeros per pose.
         still = gone if self.travel else net("Sub", rows["root_position"], rows["root_position"])
         rows["travel"] = net.rename_value(ROW_VALUES["travel"], still)
-        self._add_outputs(net, rows, place)
+        self._add_outputs(net, rows, frames)
         if self.contacts and self.bank.contacts:
             # Built last, so that a graph pruned of them is the graph of a model without them.
             field = self.bank.contacts
-            found = kriging_graph.contact_coefficients(self.bank, field, net, "controls")
-            net.add_output("contacts", self.contacts.onnx(net, found, place))
+            contact_coefficients = kriging_graph.contact_coefficients(
+                self.bank, field, net, "controls"
+            )
+            net.add_output("contacts", self.contacts.onnx(net, contact_coefficients, frames))
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.labels:
             # Its default has one row, so its axis must not share the name "batch".
@@ -188,16 +190,16 @@ class FloatModel:
             outputs["contacts"] = ["batch", "steps", self.contacts.values.shape[1]]
         return checked_file.append_checksum(net.model(inputs, outputs, metadata, about))
 
-    def _add_outputs(self, net: GraphBuilder, rows: dict[str, str], place: str) -> None:
-        """Add the outputs in their shapes, from rows by output; place: canonical frames (B, S)."""
-        sizes = net("Shape", place)
+    def _add_outputs(self, net: GraphBuilder, rows: dict[str, str], frames: str) -> None:
+        """Add the outputs in their shapes, from rows by output; frames: canonical frames (B, S)."""
+        sizes = net("Shape", frames)
         first = net.weights("first", np.array(0))
-        ends = {"rotations": (len(self.decoder.means), 4), "root_position": (3,), "travel": (3,)}
+        axes = {"rotations": (len(self.decoder.means), 4), "root_position": (3,), "travel": (3,)}
         if self.decoder.curves:
-            ends["curves"] = (len(self.decoder.curves),)
+            axes["curves"] = (len(self.decoder.curves),)
         for name, value in rows.items():
-            if name in ends:
-                shape = net("Concat", sizes, net.indices(*ends[name]), axis=0)
+            if name in axes:
+                shape = net("Concat", sizes, net.indices(*axes[name]), axis=0)
                 net.add_output(name, net("Reshape", value, shape))
             elif name == "bone_offsets":
                 shape = net.indices(-1, len(self.decoder.means), 3)

@@ -21,7 +21,6 @@ from posefield_train.graph.truncation_cost import ParetoFront, RankTriple
 from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.thinning import ThinningData
-from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import Detail
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.decoder import LevelSize, build_blend
@@ -70,7 +69,7 @@ class LevelErrors:
 class LevelTest:
     """Random test inputs with the output of the model before truncation.
 
-    controls: (Q, d). labels: (Q, p). times: (Q, 1), s. whole: joint positions (Q, J, 3), m, and
+    controls: (Q, d). labels: (Q, p). times: (Q, 1), s. points: joint positions (Q, J, 3), m, and
     points of the curves behind them. at_event: position (Q, 3) of the event's joint at the event,
     m.
     """
@@ -80,7 +79,7 @@ class LevelTest:
     times: Floats
     parents: tuple[int, ...]
     moment: EventFrame | None
-    whole: Floats
+    points: Floats
     at_event: Floats
 
     def outputs(self, model: FloatModel, level: int) -> "LevelOutputs":
@@ -94,11 +93,11 @@ class LevelTest:
         """
         last = len(model.decoder.coarse)
         answers = self.outputs(model, last)
-        found = answers.errors(model.decoder.level_sizes[last].joints)
-        if "rms" in allowed and found.pose > TAIL_RATIO * allowed["rms"]:
+        errors = answers.errors(model.decoder.level_sizes[last].joints)
+        if "rms" in allowed and errors.pose > TAIL_RATIO * allowed["rms"]:
             return False
-        joints = {name: most for name, most in allowed.items() if name != "effector"}
-        if any(getattr(found, name) > most for name, most in joints.items()):
+        joints = {name: limit for name, limit in allowed.items() if name != "effector"}
+        if any(getattr(errors, name) > limit for name, limit in joints.items()):
             return False
         effector = answers.effector if "effector" in allowed else None
         return effector is None or effector <= allowed["effector"]
@@ -115,42 +114,42 @@ class LevelOutputs:
 
     def errors(self, joints: Sequence[int]) -> LevelErrors:
         """Return the errors over some joints and all curves."""
-        found = self.model.outputs_at_times(self.fields, self.test.times, self.level)
-        points = found.points(self.test.parents, self.model.decoder.curves)[:, 0]
-        gaps = np.linalg.norm(points - self.test.whole, axis=-1)
+        outputs = self.model.outputs_at_times(self.fields, self.test.times, self.level)
+        points = outputs.points(self.test.parents, self.model.decoder.curves)[:, 0]
+        gaps = np.linalg.norm(points - self.test.points, axis=-1)
         return LevelErrors(gaps[:, [*joints, *range(len(self.test.parents), gaps.shape[1])]])
 
     @property
     def effector(self) -> float | None:
         """Return the RMS distance, m, of the event's joint at the event; None without event."""
-        exam = self.test
-        if exam.moment is None:
+        test = self.test
+        if test.moment is None:
             return None
-        found = _event_positions(self.model, self.fields, self.level, exam.moment, exam.parents)
-        return float(np.sqrt(np.mean(np.sum(np.square(found - exam.at_event), axis=-1))))
+        positions = _event_positions(self.model, self.fields, self.level, test.moment, test.parents)
+        return float(np.sqrt(np.mean(np.sum(np.square(positions - test.at_event), axis=-1))))
 
 
-def level_test(recipe: Recipe, trained: TrainedModel, questions: int) -> LevelTest:
-    """Return an exam of a trained model's levels with the given number of inputs."""
-    moment = truncation_error.event_frame(recipe, trained.examples)
-    whole = untruncated(trained.model, trained.full, trained.samples)
-    return level_test_against(whole, trained.skeleton.parents, moment, questions)
+def level_test(trained: TrainedModel, questions: int) -> LevelTest:
+    """Return a test of a trained model's levels with the given number of inputs."""
+    moment = truncation_error.event_frame(trained.recipe, trained.examples)
+    model = untruncated(trained.model, trained.full, trained.samples)
+    return level_test_against(model, trained.skeleton.parents, moment, questions)
 
 
 def level_test_against(
-    whole: FloatModel, parents: tuple[int, ...], moment: EventFrame | None, questions: int
+    model: FloatModel, parents: tuple[int, ...], moment: EventFrame | None, questions: int
 ) -> LevelTest:
-    """Return an exam with outputs of a model before truncation."""
-    bank = whole.bank
+    """Return a test with outputs of a model before truncation."""
+    bank = model.bank
     points, d = thinning.random_points(bank, 1.0, questions), len(bank.low)
     controls = (points[:, :d] * (bank.high - bank.low) + bank.high + bank.low) / 2.0
     labels = points[:, d:]
     rng = np.random.Generator(np.random.PCG64(len(points)))
-    fields = whole.fields(controls, labels, 0)
+    fields = model.fields(controls, labels, 0)
     times = rng.uniform(0.0, 1.0, (len(points), 1)) * np.exp(fields["duration"])
-    joints = whole.outputs_at_times(fields, times, 0).points(parents, whole.decoder.curves)[:, 0]
+    joints = model.outputs_at_times(fields, times, 0).points(parents, model.decoder.curves)[:, 0]
     event = (
-        _event_positions(whole, fields, 0, moment, parents)
+        _event_positions(model, fields, 0, moment, parents)
         if moment
         else np.zeros((len(points), 3))
     )
@@ -176,10 +175,10 @@ def untruncated(model: FloatModel, full: TuckerTensor, samples: SamplePoints) ->
     decoder = replace(model.decoder, reduced=full)
     event, blend = bank.event, model.decoder.event
     if event and blend:
-        whole = build_blend(blend.count, blend.weights, full.core, full.bases[1])
-        decoder = replace(decoder, event=whole)
+        longer = build_blend(blend.count, blend.weights, full.core, full.bases[1])
+        decoder = replace(decoder, event=longer)
         event = universal_kriging.solve_samples(
-            event.hyper, samples, full.bases[2][:, : whole.count]
+            event.hyper, samples, full.bases[2][:, : longer.count]
         )
     return replace(model, bank=replace(bank, pose=pose, event=event), decoder=decoder)
 
@@ -193,21 +192,13 @@ SAMPLE_COUNTS = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96)
 
 
 @dataclass(frozen=True)
-class ModelLevels:
-    """A model of several levels of detail and the description of each, the finest first."""
-
-    model: FloatModel
-    levels: tuple[Level, ...]
-
-
-@dataclass(frozen=True)
 class LevelBuilder:
     """Inputs of the construction of levels.
 
     full: decomposition of the tensor at full rank. model: finest level alone, with its samples
     sorted by how much they explain of the pose. budgets: allowed errors of the finest level, m, by
-    name. judge: errors of truncations. exam: errors of a level under construction. finals: errors
-    of a finished level. lesson: data that a level's weights are fitted to.
+    name. reference: for the errors of truncations. draft_test, final_test: for the errors of a
+    level under construction, and of a finished one. thinning_data: that weights are fitted to.
     """
 
     full: TuckerTensor
@@ -226,18 +217,18 @@ class LevelBuilder:
         joints: those that move. If no level stays within the budgets, the last one tried is used.
         """
         allowed = {name: times * budget for name, budget in self.budgets.items()}
-        price = truncation_cost.operation_cost(self.reference.own_tensor, len(self.model.bank.low))
+        price = truncation_cost.operation_cost(self.reference.tensor, len(self.model.bank.low))
         front = truncation_cost.pareto_front(
             self.full.core, price, model.decoder.level_sizes[-1].ranks
         )
-        kept = []
+        within_limits = []
         for share in TRUNCATION_SHARES:
-            parts = {name: share * most for name, most in allowed.items()}
-            rung = LevelSize(self._ranks(front, parts), joints)
-            lowered, keeps = self._thinned(model, rung, allowed)
-            kept += [lowered] if keeps else []
+            rank_limits = {name: share * limit for name, limit in allowed.items()}
+            size = LevelSize(self._ranks(front, rank_limits), joints)
+            lowered, keeps = self._thinned(model, size, allowed)
+            within_limits += [lowered] if keeps else []
         chosen = min(
-            kept or [lowered],
+            within_limits or [lowered],
             key=lambda m: truncation_cost.count_operations(m, len(m.bank.coarse)),
         )
         # The last level's error relative to the full model belongs to its sigma.
@@ -249,22 +240,22 @@ class LevelBuilder:
 
     def level(self, model: FloatModel, level: int) -> Level:
         """Return the description of a level of a model."""
-        rung = model.decoder.level_sizes[level]
+        size = model.decoder.level_sizes[level]
         numbers = truncation_cost.count_numbers(model, level)
         answers = self.final_test.outputs(model, level)
-        found = answers.errors(range(len(model.decoder.means)))
+        errors = answers.errors(range(len(model.decoder.means)))
         effector = answers.effector
         return Level(
-            rung.ranks,
+            size.ranks,
             model.bank.columns(level),
-            rung.joints,
+            size.joints,
             numbers,
             4 * numbers,
             truncation_cost.count_operations(model, level),
-            rms=rounded(found.rms),
-            p99=rounded(found.p99),
-            max=rounded(found.max),
-            pose=rounded(found.pose),
+            rms=rounded(errors.rms),
+            p99=rounded(errors.p99),
+            max=rounded(errors.max),
+            pose=rounded(errors.pose),
             effector=None if effector is None else rounded(effector),
             event=0 if level else model.bank.event_columns,
         )
@@ -275,24 +266,24 @@ class LevelBuilder:
         def strain(triple: RankTriple) -> float:
             return self.reference.strain(self.full.truncated(triple), allowed)
 
-        places = self.reference.own_tensor.weight * np.prod(self.reference.whole.shape[:2])
-        aim = min(allowed.values()) ** 2 * float(places)
+        point_count = self.reference.tensor.weight * np.prod(self.reference.points.shape[:2])
+        aim = min(allowed.values()) ** 2 * float(point_count)
         return truncation_cost.cheapest_within(front, strain, aim)
 
     def _thinned(
-        self, model: FloatModel, rung: LevelSize, allowed: dict[str, float]
+        self, model: FloatModel, size: LevelSize, allowed: dict[str, float]
     ) -> tuple[FloatModel, bool]:
         """Return the model with one more level of the fewest covariances within the allowed errors.
 
         The second value is False if no number of covariances suffices.
         """
         bank, decoder = model.bank, model.decoder
-        decoder = replace(decoder, coarse=(*decoder.coarse, rung))
+        decoder = replace(decoder, coarse=(*decoder.coarse, size))
         # Some samples of the pose's model, or whole models.
         n = len(bank.pose.samples)
         counts = [*(m for m in SAMPLE_COUNTS if m < n), n]
         for columns in (m for m in counts if m <= bank.columns(len(bank.coarse))):
-            weights = self.thinning_data.weights(columns, rung.ranks[2], error=0.0)
+            weights = self.thinning_data.weights(columns, size.ranks[2], error=0.0)
             coarse = (*bank.coarse, weights)
             tried = replace(model, bank=replace(bank, coarse=coarse), decoder=decoder)
             if self.draft_test.keeps(tried, allowed):
@@ -300,30 +291,30 @@ class LevelBuilder:
         return tried, False
 
 
-def build_levels(recipe: Recipe, trained: TrainedModel) -> ModelLevels:
-    """Return the model with the levels of a recipe.
+def build_levels(trained: TrainedModel) -> tuple[FloatModel, tuple[Level, ...]]:
+    """Return the model with the levels of its recipe, and their descriptions, the finest first.
 
     Raises TrainingError for unknown joints to fix, and for the root.
     """
-    shop = level_builder(recipe, trained)
-    model = shop.model
-    for detail in recipe.size.details:
+    builder = level_builder(trained)
+    model = builder.model
+    for detail in trained.recipe.size.details:
         joints = _moving_joints(trained, model.decoder.level_sizes[-1], detail)
-        model = shop.with_coarser_level(model, joints, detail.times)
-    every = range(len(model.decoder.level_sizes))
-    return ModelLevels(model, tuple(shop.level(model, level) for level in every))
+        model = builder.with_coarser_level(model, joints, detail.times)
+    indices = range(len(model.decoder.level_sizes))
+    return model, tuple(builder.level(model, level) for level in indices)
 
 
-def level_builder(recipe: Recipe, trained: TrainedModel) -> LevelBuilder:
+def level_builder(trained: TrainedModel) -> LevelBuilder:
     """Return the inputs of the construction of levels for a trained model."""
-    bank = thinning.sort_samples(trained.model.bank)
+    recipe, bank = trained.recipe, thinning.sort_samples(trained.model.bank)
     return LevelBuilder(
         trained.full,
         replace(trained.model, bank=bank),
         recipe.size.budgets or {"rms": trained.truncation_errors.rms},
         truncation_error.truncation_reference(recipe, trained.examples, trained.tensor),
-        level_test(recipe, trained, TEST_INPUTS),
-        level_test(recipe, trained, FINALS),
+        level_test(trained, TEST_INPUTS),
+        level_test(trained, FINALS),
         thinning.thinning_data(bank),
     )
 

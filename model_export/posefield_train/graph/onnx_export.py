@@ -28,29 +28,29 @@ PARITY_LIMIT = 1e-4
 CONTACT_LIMIT = 2e-3
 
 
-def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> float:
+def check_parity(model: FloatModel, content: bytes, card: ModelCard) -> float:
     """Return the largest joint distance, m, between file and reference at random inputs.
 
     Every level is checked. Raises ExportRefused, naming the joint and the input, if the distance
     exceeds PARITY_LIMIT.
     """
-    opened = session.open_bytes(content, f"{own_card.name}.onnx")
+    opened = session.open_bytes(content, f"{card.name}.onnx")
     rng = np.random.Generator(np.random.PCG64(10_000))
     worst = 0.0
     for question in range(POINTS // BATCH):
-        asked = _draw_inputs(rng, model, own_card, question % len(own_card.levels))
-        gaps = _joint_distances(model, opened, asked)
-        _check_contacts(model, opened, asked)
+        inputs = _draw_inputs(rng, model, card, question % len(card.levels))
+        gaps = _joint_distances(model, opened, inputs)
+        _check_contacts(model, opened, inputs)
         at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         worst = max(worst, float(gaps[at]))
         if worst > PARITY_LIMIT:
-            named = [*own_card.skeleton.names, *(curve.name for curve in own_card.curves)]
-            notes = own_card.diagnostics.get("notes", ())
+            point_names = [*card.skeleton.names, *(curve.name for curve in card.curves)]
+            notes = card.diagnostics.get("notes", ())
             doubts = [note for note in notes if note.endswith("?")]
             raise ExportRefused(
-                f"the graph puts {named[at[2]]} {100 * worst:.4f} cm from where "
+                f"the graph puts {point_names[at[2]]} {100 * worst:.4f} cm from where "
                 f"the reference does, expected at most {100 * PARITY_LIMIT:g} cm; at "
-                f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
+                f"{inputs.said(card, int(at[0]))}. Fewer controls, or a larger nugget, "
                 f"condition it better{''.join(f'; {doubt}' for doubt in doubts)}"
             )
     return worst
@@ -69,54 +69,54 @@ class _ParityInputs:
     labels: Floats
     level: int
 
-    def said(self, own_card: ModelCard, row: int) -> str:
+    def said(self, card: ModelCard, row: int) -> str:
         """Describe one of the inputs in words."""
-        controls = (control.name for control in own_card.controls)
+        controls = (control.name for control in card.controls)
         point = dict(zip(controls, self.points[row].tolist(), strict=True))
-        names = [name for own in own_card.labels for name in own.names]
-        who = "".join(f"{names[i]}, " for i in np.flatnonzero(self.labels[row]))
-        return f"{who}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
+        names = [name for label_set in card.labels for name in label_set.names]
+        label_text = "".join(f"{names[i]}, " for i in np.flatnonzero(self.labels[row]))
+        return f"{label_text}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
 
 
 def _draw_inputs(
-    rng: np.random.Generator, model: FloatModel, own_card: ModelCard, level: int
+    rng: np.random.Generator, model: FloatModel, card: ModelCard, level: int
 ) -> _ParityInputs:
     """Draw random controls, labels and times of their clips.
 
     In each label set no name is as likely as each of the names.
     """
-    low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
+    low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
     points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
-    drawn = thinning.random_labels(rng, model.bank.labels, BATCH)
-    labels = np.hstack([np.zeros((BATCH, 0)), *drawn])
+    weights = thinning.random_labels(rng, model.bank.labels, BATCH)
+    labels = np.hstack([np.zeros((BATCH, 0)), *weights])
     durations = model.durations(points, labels)
     times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
     return _ParityInputs(points, times.astype(np.float32).astype(np.float64), labels, level)
 
 
-def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -> Floats:
+def _joint_distances(model: FloatModel, opened: Session, inputs: _ParityInputs) -> Floats:
     """Return distances (B, 1, J + C), m, between joints and curves of graph and reference."""
-    question, card = (asked.points, asked.times), opened.card
+    question, card = (inputs.points, inputs.times), opened.card
     parents, names = card.skeleton.parents, onnx_runtime.outputs(card)
-    expected = model.evaluate(*question, asked.labels, asked.level).points(parents, card.curves)
-    answers = opened.run(*question, *names, labels=asked.labels, level=asked.level)
-    found = ModelOutputs(*answers).points(parents, card.curves)
-    return np.asarray(np.linalg.norm(found - expected, axis=-1))
+    expected = model.evaluate(*question, inputs.labels, inputs.level).points(parents, card.curves)
+    answers = opened.run(*question, *names, labels=inputs.labels, level=inputs.level)
+    points = ModelOutputs(*answers).points(parents, card.curves)
+    return np.asarray(np.linalg.norm(points - expected, axis=-1))
 
 
-def _check_contacts(model: FloatModel, opened: Session, asked: _ParityInputs) -> None:
+def _check_contacts(model: FloatModel, opened: Session, inputs: _ParityInputs) -> None:
     """Raise ExportRefused where the graph's contacts differ from the reference's."""
-    question, level = (asked.points, asked.times), asked.level
-    expected = model.evaluate(*question, asked.labels, level).contacts
+    question, level = (inputs.points, inputs.times), inputs.level
+    expected = model.evaluate(*question, inputs.labels, level).contacts
     if expected is None:
         return
-    (found,) = opened.run(*question, onnx_runtime.CONTACTS, labels=asked.labels, level=level)
-    gaps = np.abs(found - expected)
+    (contacts,) = opened.run(*question, onnx_runtime.CONTACTS, labels=inputs.labels, level=level)
+    gaps = np.abs(contacts - expected)
     if gaps.max() > CONTACT_LIMIT:
         row = int(np.unravel_index(int(np.argmax(gaps)), gaps.shape)[0])
         raise ExportRefused(
             f"the graph's probability of a contact is {gaps.max():.5f} off the reference's, "
-            f"expected at most {CONTACT_LIMIT:g}; at {asked.said(opened.card, row)}"
+            f"expected at most {CONTACT_LIMIT:g}; at {inputs.said(opened.card, row)}"
         )
 
 
@@ -181,13 +181,15 @@ def take_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
     """
     if "travel" not in trained.residuals:
         return ()
-    beside = np.hstack([trained.residuals["duration"], trained.residuals["travel"]])
-    strays = np.hstack([_left_out(trained) @ trained.model.decoder.reduced.bases[2], beside])
-    standard = strays / np.sqrt(trained.model.bank.sill * trained.pose.variances)[:, None]
+    duration_and_travel = np.hstack([trained.residuals["duration"], trained.residuals["travel"]])
+    residuals = np.hstack(
+        [_left_out(trained) @ trained.model.decoder.reduced.bases[2], duration_and_travel]
+    )
+    standard = residuals / np.sqrt(trained.model.bank.sill * trained.pose.variances)[:, None]
     covariance = standard.T @ standard / len(standard)
     sizes = np.sqrt(np.diagonal(covariance)) + JITTER
     root = np.linalg.cholesky(covariance / np.outer(sizes, sizes) + JITTER * np.eye(len(sizes)))
-    rows = (sizes[:, None] * root)[-beside.shape[1] :]
+    rows = (sizes[:, None] * root)[-duration_and_travel.shape[1] :]
     return tuple(tuple(map(rounded, row)) for row in rows)
 
 
@@ -198,7 +200,7 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
     """
     if "travel" not in trained.residuals:
         return None
-    found = _harmonic_deviations(trained)
+    deviations = _harmonic_deviations(trained)
     captured = _accelerations(trained, trained.tensor.values).mean()
     # The left-out predictions of the finest level.
     first, times, samples = trained.model.decoder.reduced.bases
@@ -207,12 +209,15 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
     without = _accelerations(trained, predicted).mean() / captured
     gain = reached = 1.0
     for _ in range(ROUNDS):
-        drawn = [_sampled(trained, predicted, gain * found, draw) for draw in range(DRAWS)]
-        reached = float(np.mean([_accelerations(trained, own).mean() for own in drawn])) / captured
+        detailed = [_sampled(trained, predicted, gain * deviations, draw) for draw in range(DRAWS)]
+        reached = (
+            float(np.mean([_accelerations(trained, sample).mean() for sample in detailed]))
+            / captured
+        )
         if without >= 1.0 or reached <= without:
             return None
         last, gain = gain, gain * np.sqrt((1.0 - without**2) / (reached**2 - without**2))
-    return DetailFit(last * found, float(without), reached)
+    return DetailFit(last * deviations, float(without), reached)
 
 
 def _left_out(trained: TrainedModel) -> Floats:
@@ -226,22 +231,22 @@ def _harmonic_deviations(trained: TrainedModel) -> Deviations:
     Of the part alone that the time functions cannot follow: takes vary the rest.
     """
     first, times, _ = trained.model.decoder.reduced.bases
-    missed = np.tensordot(first.T, trained.full.slices(trained.pose.residuals), axes=1)
-    missed = missed - np.einsum("dtn,tk,sk->dsn", missed, times, times)
+    residuals = np.tensordot(first.T, trained.full.slices(trained.pose.residuals), axes=1)
+    residuals = residuals - np.einsum("dtn,tk,sk->dsn", residuals, times, times)
     # The last frame is the first one of the next cycle.
-    period = missed.shape[1] - 1
+    period = residuals.shape[1] - 1
     harmonics = min(MAX_HARMONICS, (period - 1) // 2)
     waves = reduced_motion.waves(period + 1, harmonics)[:-1]
-    parts = 2.0 / period * np.einsum("dtn,tw->wdn", missed[:, :-1], waves)
-    powers = np.mean(np.square(parts), axis=2).reshape(2, harmonics, -1)
+    amplitudes = 2.0 / period * np.einsum("dtn,tw->wdn", residuals[:, :-1], waves)
+    powers = np.mean(np.square(amplitudes), axis=2).reshape(2, harmonics, -1)
     return np.asarray(np.sqrt(powers.mean(axis=0)))
 
 
-def _sampled(trained: TrainedModel, predicted: Floats, found: Deviations, draw: int) -> Floats:
+def _sampled(trained: TrainedModel, predicted: Floats, deviations: Deviations, draw: int) -> Floats:
     """Return predictions (D', T, N) with detail, a seed of its own for each clip and draw."""
     frames, clips = predicted.shape[1:]
     seeds = 1 + draw * clips + np.arange(clips)
-    detail = [reduced_motion.sample(found, frames, int(seed)) for seed in seeds]
+    detail = [reduced_motion.sample(deviations, frames, int(seed)) for seed in seeds]
     first = trained.model.decoder.reduced.bases[0]
     return predicted + np.tensordot(first, np.stack(detail, axis=2), axes=(1, 1))
 
@@ -282,28 +287,28 @@ def export_model(trained: TrainedModel) -> ExportedModel:
     check fails.
     """
     notes = trained_card.training_notes(trained)
-    laddered = levels.build_levels(trained.recipe, trained)
-    takes = estimate(trained)
-    found = laddered.levels
+    model, model_levels = levels.build_levels(trained)
+    statistics = estimate(trained)
 
-    def own_card(parity: float) -> ModelCard:
-        return takes.on_card(trained_card.build_card(trained.recipe, trained, found, notes, parity))
+    def make_card(parity: float) -> ModelCard:
+        card = trained_card.build_card(trained, model_levels, notes, parity)
+        return statistics.on_card(card)
 
-    return check_and_export(laddered.model, own_card)
+    return check_and_export(model, make_card)
 
 
-def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) -> ExportedModel:
+def check_and_export(model: FloatModel, make_card: Callable[[float], ModelCard]) -> ExportedModel:
     """Check a model of all its levels and return it with its file.
 
-    own_card: makes the model card from the parity error, m. Raises ExportRefused as
+    make_card: makes the model card from the parity error, m. Raises ExportRefused as
     `check_parity` does.
     """
     about = _producer()
     # The card contains the parity error, so the weights are checked with a draft of the card.
-    draft = own_card(0.0)
+    draft = make_card(0.0)
     parity = check_parity(model, model.onnx(model_card.dump(draft), about), draft)
-    written = own_card(parity)
-    return ExportedModel(model, model.onnx(model_card.dump(written), about), written, parity)
+    card = make_card(parity)
+    return ExportedModel(model, model.onnx(model_card.dump(card), about), card, parity)
 
 
 @single_threaded()
@@ -312,11 +317,11 @@ def export_finest(trained: TrainedModel) -> bytes:
     recipe = trained.recipe
     size = recipe.size.model_copy(update={"levels": []})
     # Held-out clips narrow the sampled ranges, which presets have to lie in.
-    alone = recipe.model_copy(update={"size": size, "presets": {}})
-    laddered = levels.build_levels(alone, trained)
-    own_card = trained_card.build_card(alone, trained, laddered.levels, [], parity=0.0)
-    own_card = estimate(trained).on_card(own_card)
-    return laddered.model.onnx(model_card.dump(own_card), _producer())
+    trained = replace(trained, recipe=recipe.model_copy(update={"size": size, "presets": {}}))
+    model, model_levels = levels.build_levels(trained)
+    card = trained_card.build_card(trained, model_levels, [], parity=0.0)
+    card = estimate(trained).on_card(card)
+    return model.onnx(model_card.dump(card), _producer())
 
 
 def _producer() -> dict[str, str]:

@@ -75,21 +75,21 @@ def training_notes(trained: TrainedModel) -> list[str]:
 
 def disagreement_notes(trained: TrainedModel) -> list[str]:
     """Return a note if parameters tuned on two draws of a large family predict unequally well."""
-    apart = trained.pose.disagreement
-    if apart is None or apart <= LARGEST_DISAGREEMENT:
+    disagreement = trained.pose.disagreement
+    if disagreement is None or disagreement <= LARGEST_DISAGREEMENT:
         return []
     tuned = sample_points.tuned_count(len(trained.examples))
     return [
         f"parameters tuned on two draws of {tuned} of {len(trained.examples)} clips differ: with "
-        f"one a clip left out lies {100 * apart:.1f} % farther away than with the other, which is "
-        "used"
+        f"one a clip left out lies {100 * disagreement:.1f} % farther away than with the other, "
+        "which is used"
     ]
 
 
 def repeat_notes(trained: TrainedModel) -> list[str]:
     """Return a note if clips of equal controls differ about as much as any clips do."""
-    own = trained.tensor
-    motions = trained.values["pose"] / np.sqrt(own.weight * own.values.shape[1])
+    tensor = trained.tensor
+    motions = trained.values["pose"] / np.sqrt(tensor.weight * tensor.values.shape[1])
     points = trained.samples.points
     _, groups, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     groups = np.ravel(groups)
@@ -100,14 +100,14 @@ def repeat_notes(trained: TrainedModel) -> list[str]:
     freedoms = repeated.sum() - np.sum(counts > 1)
     within = float(np.sqrt(np.sum(np.square(motions - means[groups])) / freedoms))
     about = motions - motions.mean(axis=0)
-    usual = float(np.sqrt(np.sum(np.square(about)) / (len(motions) - 1)))
-    if within < max(SAME_MOTION * usual, LEAST_DIFFERENCE):
+    spread = float(np.sqrt(np.sum(np.square(about)) / (len(motions) - 1)))
+    if within < max(SAME_MOTION * spread, LEAST_DIFFERENCE):
         return []
     example = trained.examples[int(np.flatnonzero(repeated)[0])]
     return [
         f"{repeated.sum()} of {len(motions)} clips share their controls with others, such as "
         f"{example.row.named}, and differ from them by {100 * within:.1f} cm where all clips "
-        f"differ by {100 * usual:.1f} cm: a control that tells them apart may be missing"
+        f"differ by {100 * spread:.1f} cm: a control that tells them apart may be missing"
     ]
 
 
@@ -117,17 +117,17 @@ def finding_notes(
     """Return notes on joints by kind of finding: one per clip if they are few, else one in all."""
     notes = []
     for kind, meaning in MEANINGS.items():
-        own = [finding for finding in findings if finding.kind == kind]
-        clips = sorted({finding.clip for finding in own})
+        of_kind = [finding for finding in findings if finding.kind == kind]
+        clips = sorted({finding.clip for finding in of_kind})
         if len(clips) > MOST_ALIKE:
-            largest = max(own, key=lambda finding: finding.angle)
+            largest = max(of_kind, key=lambda finding: finding.angle)
             notes.append(
                 f"{meaning} in {len(clips)} of {len(examples)} clips, the largest in "
                 f"{examples[largest.clip].row.named}: {_turned(largest, names)}"
             )
             continue
         for clip in clips:
-            entries = ", ".join(_turned(each, names) for each in own if each.clip == clip)
+            entries = ", ".join(_turned(turned, names) for turned in of_kind if turned.clip == clip)
             notes.append(f"{examples[clip].row.named}: {meaning}: {entries}")
     return notes
 
@@ -141,15 +141,12 @@ MAX_LISTED_VALUES = 10
 
 
 def build_card(
-    recipe: Recipe,
-    trained: TrainedModel,
-    ladder: tuple[Level, ...],
-    notes: list[str],
-    parity: float,
+    trained: TrainedModel, levels: tuple[Level, ...], notes: list[str], parity: float
 ) -> ModelCard:
     """Return the card of a trained model. parity: largest joint error of the parity check, m."""
-    examples, durations, listed = trained.examples, trained.aligned.durations, trained.listed
-    shown = [examples[clip] for clip in listed]
+    recipe, examples, listed = trained.recipe, trained.examples, trained.listed
+    durations = trained.aligned.durations
+    listed_examples = [examples[clip] for clip in listed]
     return ModelCard(
         name=recipe.name,
         description=recipe.description,
@@ -159,15 +156,15 @@ def build_card(
         root=recipe.motion.root,
         rate=float(np.median([example.clip.rate for example in examples])),
         frames=recipe.motion.frames,
-        samples=len(shown),
-        levels=ladder,
+        samples=len(listed_examples),
+        levels=levels,
         durations=(float(durations.min()), float(durations.max())),
-        examples=tuple(tuple(map(float, example.controls)) for example in shown),
+        examples=tuple(tuple(map(float, example.controls)) for example in listed_examples),
         labels=card_labels(trained.model.bank.labels, trained.samples.subset(listed)),
         feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
-        sources=tuple(example.row.source for example in shown),
+        sources=tuple(example.row.source for example in listed_examples),
         kriging=plain_parameters(trained.pose.hyper),
         roles=_roles(recipe, trained),
         left_out=tuple(map(rounded, np.sqrt(trained.left_out_errors[listed]))),
@@ -196,12 +193,12 @@ def captured_acceleration(examples: Sequence[Example]) -> CapturedAcceleration |
 
     Cycles count as they were before their seams were closed, which bends their ends.
     """
-    found = [clip_accelerations(own.captured or own.clip) for own in examples]
-    every = np.concatenate(found)
-    if len(every) == 0:
+    accelerations = [clip_accelerations(example.captured or example.clip) for example in examples]
+    values = np.concatenate(accelerations)
+    if len(values) == 0:
         return None
     return CapturedAcceleration(
-        rounded(np.median(every)), rounded(np.percentile(every, USUAL_PERCENTILE))
+        rounded(np.median(values)), rounded(np.percentile(values, USUAL_PERCENTILE))
     )
 
 
@@ -211,16 +208,16 @@ def clip_accelerations(clip: Clip) -> Frames:
     Between its frames the joints move along cubic splines: straight lines would have all of their
     acceleration in the frames.
     """
-    places = clip.positions()
-    places = places - places[:, :1]
+    positions = clip.positions()
+    positions = positions - positions[:, :1]
     step = clip.rate / ACCELERATION_RATE
     # Tolerance of a millionth of a frame for the rounding of products.
-    times = step * np.arange(int((len(places) - 1) / step + 1e-6) + 1)
+    times = step * np.arange(int((len(positions) - 1) / step + 1e-6) + 1)
     if step == round(step):
-        found = places[:: round(step)]
+        sampled = positions[:: round(step)]
     else:
-        found = CubicSpline(np.arange(len(places)), places, axis=0)(times)
-    return mean_accelerations(found, ACCELERATION_RATE)
+        sampled = CubicSpline(np.arange(len(positions)), positions, axis=0)(times)
+    return mean_accelerations(sampled, ACCELERATION_RATE)
 
 
 def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
@@ -243,7 +240,7 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
     marks = [example.landmarks for example in trained.examples]
     times = np.array(marks).reshape(len(marks), -1).mean(axis=0)
     bank = trained.model.bank
-    fields = {**bank.others, EVENT: bank.event}.items()
+    fields = {**bank.other_models, EVENT: bank.event}.items()
     return TrainingParameters(
         {
             name: kriging_settings(field.hyper)
@@ -259,10 +256,10 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
     )
 
 
-def card_labels(known: LabelNames, samples: SamplePoints) -> tuple[LabelSet, ...]:
+def card_labels(label_names: LabelNames, samples: SamplePoints) -> tuple[LabelSet, ...]:
     """Return the label sets of a card from their names and the samples."""
-    pairs = zip(known.items(), samples.label_indices, strict=True)
-    return tuple(LabelSet(name, names, tuple(own.tolist())) for (name, names), own in pairs)
+    pairs = zip(label_names.items(), samples.label_indices, strict=True)
+    return tuple(LabelSet(name, names, tuple(indices.tolist())) for (name, names), indices in pairs)
 
 
 def _recordings(examples: Sequence[Example]) -> tuple[int, ...]:
@@ -276,7 +273,7 @@ def _recordings(examples: Sequence[Example]) -> tuple[int, ...]:
 
 def kriging_settings(hyper: Hyper) -> tuple[float, ...]:
     """Return nugget, trend and offsets with six digits, as adaptation reads them."""
-    offsets = (own.offset for own in hyper.labels)
+    offsets = (kernel.offset for kernel in hyper.labels)
     return tuple(float(f"{x:.6g}") for x in (hyper.nugget, hyper.trend, *offsets))
 
 
@@ -285,18 +282,18 @@ def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
     landmarks = np.array([example.landmarks for example in trained.examples])
     controls = []
     typical = typical_controls(values)
-    for asked, own, default in zip(recipe.controls, values.T, typical, strict=True):
-        distinct = np.unique(own)
+    for control, column, default in zip(recipe.controls, values.T, typical, strict=True):
+        distinct = np.unique(column)
         controls.append(
             Control(
-                asked.name,
-                asked.unit,
-                asked.description,
+                control.name,
+                control.unit,
+                control.description,
                 float(distinct[0]),
                 float(distinct[-1]),
                 float(default),
                 tuple(map(float, distinct)) if len(distinct) <= MAX_LISTED_VALUES else (),
-                measured_controls.card_measure(recipe, asked, trained.skeleton, landmarks),
+                measured_controls.card_measure(recipe, control, trained.skeleton, landmarks),
             )
         )
     return tuple(controls)
@@ -304,8 +301,8 @@ def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
 
 def typical_controls(values: Floats) -> Floats:
     """Return the controls (d,) of the medoid of captured clips with controls (N, d)."""
-    places = half_ranges(values, values.min(axis=0), values.max(axis=0))
-    return values[typical_clip.medoid(places)]
+    points = half_ranges(values, values.min(axis=0), values.max(axis=0))
+    return values[typical_clip.medoid(points)]
 
 
 def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict[str, Any]:
@@ -315,13 +312,13 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         for k, v in asdict(trained.truncation_errors).items()
         if v is not None
     }
-    kept, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
-    compression = asdict(truncation_cost.tensor_compression(trained.tensor, kept, controls))
+    ranks, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
+    compression = asdict(truncation_cost.tensor_compression(trained.tensor, ranks, controls))
     hyper = trained.pose.hyper
     contacts = {}
     if trained.contacts is not None:
         accuracy = asdict(trained.contacts.accuracy).items()
-        contacts["contacts"] = {name: rounded(own) for name, own in accuracy}
+        contacts["contacts"] = {name: rounded(value) for name, value in accuracy}
     return {
         **{name: rounded(distance) for name, distance in cut.items()},
         "compression": {name: rounded(ratio) for name, ratio in compression.items()},
@@ -333,8 +330,8 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         "nugget": rounded(hyper.nugget),
         "trend": rounded(hyper.trend),
         "labels": {
-            name: {"correlation": rounded(own.correlation), "offset": rounded(own.offset)}
-            for name, own in zip(trained.model.bank.labels, hyper.labels, strict=True)
+            name: {"correlation": rounded(value.correlation), "offset": rounded(value.offset)}
+            for name, value in zip(trained.model.bank.labels, hyper.labels, strict=True)
         },
         "tensor": [*trained.tensor.values.shape[:2], len(trained.listed)],
         **_large_family(trained),
@@ -348,8 +345,8 @@ def _large_family(trained: TrainedModel) -> dict[str, Any]:
     """Return the numbers of inducing and tuned clips of a large family; empty for others."""
     if trained.samples.inducing is None:
         return {}
-    apart = trained.pose.disagreement
-    tuned = {} if apart is None else {"disagreement": rounded(apart)}
+    disagreement = trained.pose.disagreement
+    tuned = {} if disagreement is None else {"disagreement": rounded(disagreement)}
     clips = len(trained.examples)
     counts = {"clips": clips, "tuned": sample_points.tuned_count(clips)}
     return {"projected": {**counts, "inducing": len(trained.listed), **tuned}}
@@ -362,8 +359,8 @@ def plain_parameters(hyper: Hyper) -> Hyper:
         nugget=float(hyper.nugget),
         trend=float(hyper.trend),
         labels=tuple(
-            LabelKernel(own.count, float(own.correlation), float(own.offset))
-            for own in hyper.labels
+            LabelKernel(kernel.count, float(kernel.correlation), float(kernel.offset))
+            for kernel in hyper.labels
         ),
     )
 
@@ -384,11 +381,11 @@ def data_digest(files: Mapping[str, Example]) -> str:
     files: clips by the names of their motion files. Files of curves count as well.
     """
     total = hashlib.sha256()
-    places = {name: example.row.place for name, example in files.items()}
+    locations = {name: example.row.place for name, example in files.items()}
     curves = (example.row.curve_place for example in files.values())
-    places |= {place.name: place for place in curves if place is not None}
-    for name in sorted(places):
-        with places[name].open("rb") as file:
-            own = hashlib.file_digest(file, "sha256").digest()
-        total.update(name.encode() + b"\0" + own)
+    locations |= {location.name: location for location in curves if location is not None}
+    for name in sorted(locations):
+        with locations[name].open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").digest()
+        total.update(name.encode() + b"\0" + digest)
     return total.hexdigest()

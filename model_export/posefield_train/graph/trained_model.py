@@ -79,22 +79,22 @@ class TrainedModel:
     @property
     def listed(self) -> Annotated[Indices, "listed"]:
         """Return the clips that the model card lists: the inducing ones of a large family."""
-        own = self.samples.inducing
-        return np.arange(len(self.examples)) if own is None else own
+        inducing = self.samples.inducing
+        return np.arange(len(self.examples)) if inducing is None else inducing
 
     def outlier_notes(self) -> list[str]:
         """Return one note per clip with evidence against it, the worst kinds first.
 
         Of many clips with the same worst kind of evidence the last ones are only named.
         """
-        said: dict[int, list[Outlier]] = {}
+        by_clip: dict[int, list[Outlier]] = {}
         for one in sorted(self.outliers, key=lambda one: KINDS.index(one.kind)):
-            said.setdefault(one.clip, []).append(one)
+            by_clip.setdefault(one.clip, []).append(one)
         notes = []
         for kind in KINDS:
-            clips = sorted(clip for clip, own in said.items() if own[0].kind == kind)
+            clips = sorted(clip for clip, outliers in by_clip.items() if outliers[0].kind == kind)
             for clip in clips[:MOST_ALIKE]:
-                evidence = "; ".join(one.evidence for one in said[clip])
+                evidence = "; ".join(one.evidence for one in by_clip[clip])
                 notes.append(f"{self.examples[clip].row.named}: {evidence}")
             if more := [self.examples[clip].row.named for clip in clips[MOST_ALIKE:]]:
                 notes.append(f"{len(more)} more clips with such evidence: {', '.join(more)}")

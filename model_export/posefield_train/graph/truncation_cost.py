@@ -36,7 +36,7 @@ class RankCost:
         return r1 * r2 * r3 + self.pair * r1 * r2 + alone
 
 
-def storage_cost(own_tensor: MotionTensor, controls: int) -> RankCost:
+def storage_cost(tensor: MotionTensor, controls: int) -> RankCost:
     """Return the price in numbers stored for the motion: core, bases and kriging weights.
 
     A rank of the first mode is a direction of the D' degrees of freedom that vary, one of the
@@ -44,7 +44,7 @@ def storage_cost(own_tensor: MotionTensor, controls: int) -> RankCost:
     function. Parts that do not grow with the ranks are left out: the means, the samples' controls,
     the coefficient models of duration, warp and bones, and sigma's matrix.
     """
-    return stored(own_tensor.values.shape, controls)
+    return stored(tensor.values.shape, controls)
 
 
 def stored(shape: Sequence[int], controls: int) -> RankCost:
@@ -53,22 +53,22 @@ def stored(shape: Sequence[int], controls: int) -> RankCost:
     return RankCost((freedoms, frames, samples + controls + 1))
 
 
-def operation_cost(own_tensor: MotionTensor, controls: int) -> RankCost:
+def operation_cost(tensor: MotionTensor, controls: int) -> RankCost:
     """Return the price in multiply-adds of one pose, counting terms that grow with the ranks.
 
     Counted are the kriging weights, the core, the interpolation between two frames, its product
     with the motion, and directions of three numbers for the root, a quaternion for each joint and a
     number for each curve.
     """
-    joints, samples = len(own_tensor.chart.means), own_tensor.values.shape[2]
-    directions = 4 * joints + 3 + len(own_tensor.curves)
+    joints, samples = len(tensor.chart.means), tensor.values.shape[2]
+    directions = 4 * joints + 3 + len(tensor.curves)
     return RankCost((directions, 1, samples + controls + 1), pair=1)
 
 
 def count_numbers(model: FloatModel, level: int) -> int:
     """Return how many numbers a level reads: core, bases, kriging weights and samples."""
-    bank, rung = model.bank, model.decoder.level_sizes[level]
-    r1, r2, r3 = rung.ranks
+    bank, size = model.bank, model.decoder.level_sizes[level]
+    r1, r2, r3 = size.ranks
     samples = bank.columns(level)
     varies = np.any(model.decoder.at_level(level).unwhiten != 0.0, axis=1)
     bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
@@ -76,8 +76,8 @@ def count_numbers(model: FloatModel, level: int) -> int:
     if blend and not level:
         bases += blend.times.size + blend.mixing.size
     rows = _form_rows(bank, level)
-    asked = samples * len(bank.low) + rows * (rows + 1) // 2
-    return int(r1 * r2 * r3 + bases + asked + _weights_size(bank, level))
+    numbers = samples * len(bank.low) + rows * (rows + 1) // 2
+    return int(r1 * r2 * r3 + bases + numbers + _weights_size(bank, level))
 
 
 def _form_rows(bank: KrigingBank, level: int) -> int:
@@ -88,7 +88,7 @@ def _form_rows(bank: KrigingBank, level: int) -> int:
 def _weights_size(bank: KrigingBank, level: int) -> int:
     if level:
         return bank.coarse[level - 1].size
-    fields = [*bank.others.values(), bank.pose, *([bank.event] if bank.event else [])]
+    fields = [*bank.other_models.values(), bank.pose, *([bank.event] if bank.event else [])]
     near = [field.dual for field in fields if isinstance(field, UniversalKriging)]
     return bank.linear * sum(map(kriging_bank.width, fields)) + sum(
         len(bank.pose.samples) * dual.shape[1] for dual in near
@@ -97,12 +97,12 @@ def _weights_size(bank: KrigingBank, level: int) -> int:
 
 def count_operations(model: FloatModel, level: int) -> int:
     """Return the multiply-adds of one pose of a level, from controls to quaternions."""
-    bank, rung = model.bank, model.decoder.level_sizes[level]
+    bank, size = model.bank, model.decoder.level_sizes[level]
     columns = bank.columns(level)
-    r1, r2, r3 = rung.ranks if level else model.decoder.blended[0].shape
+    r1, r2, r3 = size.ranks if level else model.decoder.blended[0].shape
     distances = columns * (2 + 2 * len(bank.low) + len(bank.labels) * bank.label_count)
     values = (bank.linear + columns) * sum(bank.sizes(r3))
-    decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3 + len(model.decoder.curves))
+    decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(size.joints) + 3 + len(model.decoder.curves))
     return distances + values + _form_rows(bank, level) ** 2 + decoding
 
 
@@ -120,20 +120,18 @@ class Compression:
     stored: float
 
 
-def tensor_compression(
-    own_tensor: MotionTensor, ranks: Sequence[int], controls: int
-) -> Compression:
+def tensor_compression(tensor: MotionTensor, ranks: Sequence[int], controls: int) -> Compression:
     """Return the compression at ranks (r1, r2, r3).
 
     `storage_cost` defines what counts as stored.
     """
-    return shape_compression(own_tensor.values.shape, ranks, controls)
+    return shape_compression(tensor.values.shape, ranks, controls)
 
 
 def shape_compression(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
     """Return the compression of a tensor of shape (D', T, N) at ranks (r1, r2, r3)."""
-    raw, held = float(np.prod(shape)), stored(shape, controls).evaluate(*ranks)
-    return Compression(raw / float(np.prod(ranks)), raw / float(held))
+    raw, numbers = float(np.prod(shape)), stored(shape, controls).evaluate(*ranks)
+    return Compression(raw / float(np.prod(ranks)), raw / float(numbers))
 
 
 RankTriple = tuple[int, int, int]
@@ -151,21 +149,21 @@ class ParetoFront:
     triples: npt.NDArray[np.int64]
     errors: Floats
 
-    def __getitem__(self, place: int) -> RankTriple:
-        r1, r2, r3 = (int(rank) for rank in self.triples[place])
+    def __getitem__(self, index: int) -> RankTriple:
+        r1, r2, r3 = (int(rank) for rank in self.triples[index])
         return r1, r2, r3
 
     def near(self, error: float, low: int, high: int) -> int:
         """Return the index of the first triple within an error, strictly between low and high."""
-        place = int(np.searchsorted(-self.errors, -error))
-        return min(max(place, low + 1), high - 1)
+        index = int(np.searchsorted(-self.errors, -error))
+        return min(max(index, low + 1), high - 1)
 
 
 def choose_ranks(
     size: Size,
     full: TuckerTensor,
     price: RankCost,
-    judge: TruncationReference,
+    reference: TruncationReference,
     limits: Mapping[str, float],
 ) -> RankTriple:
     """Return the ranks of a recipe, or the cheapest whose true errors stay within its budgets.
@@ -180,10 +178,10 @@ def choose_ranks(
         budgets[name] = min(budget, limits.get(name, budget))
 
     def strain(triple: RankTriple) -> float:
-        return judge.strain(full.truncated(triple), budgets)
+        return reference.strain(full.truncated(triple), budgets)
 
-    places = judge.own_tensor.weight * np.prod(judge.whole.shape[:2])
-    aim = min(budgets.values()) ** 2 * float(places)
+    point_count = reference.tensor.weight * np.prod(reference.points.shape[:2])
+    aim = min(budgets.values()) ** 2 * float(point_count)
     return cheapest_within(pareto_front(full.core, price), strain, aim)
 
 
@@ -200,9 +198,9 @@ def pareto_front(core: Floats, price: RankCost, within: RankTriple | None = None
     order = np.lexsort((errors.ravel(), costs.ravel()))
     ordered = errors.ravel()[order]
     best_before = np.minimum.accumulate(np.concatenate([[np.inf], ordered[:-1]]))
-    places = order[ordered < best_before]
-    triples = np.stack(np.unravel_index(places, errors.shape), axis=1) + 1
-    return ParetoFront(triples, errors.ravel()[places])
+    indices = order[ordered < best_before]
+    triples = np.stack(np.unravel_index(indices, errors.shape), axis=1) + 1
+    return ParetoFront(triples, errors.ravel()[indices])
 
 
 def cheapest_within(pareto_front: ParetoFront, strain: BudgetRatio, aim: float) -> RankTriple:
@@ -214,9 +212,9 @@ def cheapest_within(pareto_front: ParetoFront, strain: BudgetRatio, aim: float) 
     low, high, guess = -1, len(pareto_front.errors) - 1, True
     while high - low > 1:
         tried = pareto_front.near(aim, low, high) if guess else (low + high) // 2
-        found = strain(pareto_front[tried])
-        low, high = (low, tried) if found <= 1.0 else (tried, high)
-        aim, guess = pareto_front.errors[tried] / found**2, not guess
+        ratio = strain(pareto_front[tried])
+        low, high = (low, tried) if ratio <= 1.0 else (tried, high)
+        aim, guess = pareto_front.errors[tried] / ratio**2, not guess
     return pareto_front[high]
 
 

@@ -45,19 +45,23 @@ def captured_positions(examples: Sequence[Example]) -> Floats:
 
     Points of the curves follow those of the joints.
     """
-    found = []
+    points = []
     for example in examples:
         poses = motion_tensor.captured_poses(example.clip)
-        own = skeleton.positions(example.clip.skeleton.parents, *poses)
+        joints = skeleton.positions(example.clip.skeleton.parents, *poses)
         clip = example.clip
         values = time_alignment.interpolate(clip.curve_values, UNIFORM_SHARES)
-        found.append(_with_curves(own, clip.curves.curves if clip.curves else (), values))
-    return np.stack(found)
+        points.append(_with_curves(joints, clip.curves.curves if clip.curves else (), values))
+    return np.stack(points)
 
 
-def _with_curves(joints: Floats, own: tuple[Curve, ...], values: Floats) -> Floats:
+def _with_curves(joints: Floats, curves_of_family: tuple[Curve, ...], values: Floats) -> Floats:
     """Return positions (..., J, 3) with the points of curves of values (..., C) behind them."""
-    return np.concatenate([joints, curves.as_points(own, values)], axis=-2) if own else joints
+    return (
+        np.concatenate([joints, curves.as_points(curves_of_family, values)], axis=-2)
+        if curves_of_family
+        else joints
+    )
 
 
 def predicted_positions(
@@ -73,9 +77,9 @@ def predicted_positions(
     slices: of the whitened tensor (D', T, N). values: of the other quantities by name. Points of
     the curves follow those of the joints.
     """
-    found = motion_tensor.predicted_poses(
+    poses = motion_tensor.predicted_poses(
         timing, tensor, tensor.numbers(slices), values["warp"], values.get("travel")
     )
-    translations = skeleton.translations(proportions.numpy(values["offsets"]), found.path)
-    joints = skeleton.positions(parents, found.rotations, translations)
-    return _with_curves(joints, tensor.curves, found.curves)
+    translations = skeleton.translations(proportions.numpy(values["offsets"]), poses.path)
+    joints = skeleton.positions(parents, poses.rotations, translations)
+    return _with_curves(joints, tensor.curves, poses.curves)

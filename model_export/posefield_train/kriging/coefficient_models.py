@@ -80,8 +80,10 @@ def compare_models(
     pose, second = (model.residuals for model in models)
     blended = pose.copy()
     blended[:, :COEFFICIENTS] = second[:, :COEFFICIENTS]
-    found = (event_distances(reference, full, event, residuals) for residuals in (pose, blended))
-    return EventErrors(*(float(np.sqrt(np.mean(np.square(one)))) for one in found))
+    distances = (
+        event_distances(reference, full, event, residuals) for residuals in (pose, blended)
+    )
+    return EventErrors(*(float(np.sqrt(np.mean(np.square(one)))) for one in distances))
 
 
 # Largest error of bone offsets that a model may make, m.
@@ -124,11 +126,11 @@ def choose_covariance(
     problem = TuningProblem(
         samples, values, settings.nugget, effector, strength, unnamed=samples.unnamed
     )
-    first, *others = (
+    first, *alternatives = (
         kriging_tuning.tune(problem, name, settings.fixed_degree, jobs=jobs)
         for name in settings.covariances
     )
-    best = min(others, key=lambda field: field.unexplained, default=first)
+    best = min(alternatives, key=lambda field: field.unexplained, default=first)
     chosen = best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
     if len(samples.points) > sample_points.LARGEST_TUNED:
         # The better of the model and of one tuned on other clips, with their disagreement.
@@ -136,9 +138,9 @@ def choose_covariance(
             problem, chosen.hyper.covariance, settings.fixed_degree, draw=1, jobs=jobs
         )
         errors = np.sqrt([chosen.unexplained, second.unexplained])
-        apart = float(errors.max() / max(errors.min(), TINY) - 1.0)
+        disagreement = float(errors.max() / max(errors.min(), TINY) - 1.0)
         better = min(chosen, second, key=lambda field: field.unexplained)
-        chosen = replace(better, disagreement=apart)
+        chosen = replace(better, disagreement=disagreement)
     return chosen if samples.inducing is None else _smoothest(chosen, samples, values)
 
 
@@ -151,16 +153,16 @@ def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues)
     """
     squares = _take_squares(samples, tuned.residuals)
     limit = float(np.mean(squares) + np.std(squares) / np.sqrt(len(squares)))
-    found, least = tuned.hyper, np.exp(SCALE_PRIOR.low)
+    smoothest, smallest = tuned.hyper, np.exp(SCALE_PRIOR.low)
     for share in LONGER:
-        longer = replace(tuned.hyper, scales=np.maximum(share * tuned.hyper.scales, least))
+        longer = replace(tuned.hyper, scales=np.maximum(share * tuned.hyper.scales, smallest))
         residuals = universal_kriging.left_out_residuals(longer, samples, values)
         if float(np.mean(_take_squares(samples, residuals))) > limit:
             break
-        found = longer
-    if found is tuned.hyper:
+        smoothest = longer
+    if smoothest is tuned.hyper:
         return tuned
-    evaluated = kriging_tuning.evaluate_fixed(found, samples, values)
+    evaluated = kriging_tuning.evaluate_fixed(smoothest, samples, values)
     return replace(evaluated, disagreement=tuned.disagreement)
 
 
@@ -185,9 +187,9 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
     loss = PredictiveDensityLoss if values.shape[1] == 1 else LeaveOneOutLoss
-    found = kriging_tuning.tune_beside(problem, pose, loss)
+    tuned = kriging_tuning.tune_beside(problem, pose, loss)
     from_mean, mean = samples.from_mean(values), values.mean(axis=0)
-    predicted = from_mean - found.residuals
+    predicted = from_mean - tuned.residuals
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
     share = 1.0 if settings.nugget is not None else _explained_share(predicted, from_mean)
     if share == 0.0:
@@ -196,22 +198,22 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     explained = 1.0 - float(np.sum(np.square(residuals)) / np.sum(np.square(from_mean)))
     shrunk = mean + share * (values - mean)
     return FittedModel(
-        universal_kriging.solve_samples(found.hyper, samples, shrunk), explained, residuals
+        universal_kriging.solve_samples(tuned.hyper, samples, shrunk), explained, residuals
     )
 
 
 def factor_of(
-    found: PowerLawFit,
+    fitted: PowerLawFit,
     samples: SamplePoints,
     controls: SampleControls,
     logs: Annotated[Floats, "samples 1"],
 ) -> FittedModel:
     """Return the model of what a power law of controls (N, d) leaves of logarithms (N, 1)."""
-    left = logs - found.law.logarithms(controls)
+    left = logs - fitted.law.logarithms(controls)
     total = float(np.sum(np.square(samples.from_mean(logs))))
-    explained = 1.0 - float(np.sum(np.square(found.residuals))) / total
-    solved = universal_kriging.solve_samples(found.hyper, samples, left)
-    return FittedModel(solved, explained, found.residuals)
+    explained = 1.0 - float(np.sum(np.square(fitted.residuals))) / total
+    solved = universal_kriging.solve_samples(fitted.hyper, samples, left)
+    return FittedModel(solved, explained, fitted.residuals)
 
 
 def _explained_share(predicted: SampleValues, from_mean: SampleValues) -> float:
@@ -255,5 +257,5 @@ def _largest_residual(
     right: Annotated[Floats, "rank numbers"],
     rank: int,
 ) -> float:
-    kept = (left[:, :rank] * values[:rank]) @ right[:rank]
-    return float(np.abs(centred - kept).max())
+    reduced = (left[:, :rank] * values[:rank]) @ right[:rank]
+    return float(np.abs(centred - reduced).max())

@@ -151,7 +151,7 @@ class KrigingBank:
     high: PerControl
     labels: LabelNames
     pose: UniversalKriging
-    others: dict[str, CoefficientModel]
+    other_models: dict[str, CoefficientModel]
     sill: float
     coarse: tuple[Annotated[Floats, "rows columns"], ...] = ()
     power_law: PowerLaw | None = None
@@ -179,7 +179,7 @@ class KrigingBank:
 
     def sample_values(self, name: str) -> SampleValues:
         """Return the values (n, m) that a model interpolates, or its mean in every row."""
-        field = self.others[name]
+        field = self.other_models[name]
         if isinstance(field, ConstantModel):
             return field.predict(self.pose.samples)
         return field.values
@@ -189,7 +189,7 @@ class KrigingBank:
 
         pose: number of pose coefficients.
         """
-        return [1, *map(width, self.others.values()), pose]
+        return [1, *map(width, self.other_models.values()), pose]
 
     def points(self, controls: PointControls, labels: PointLabels) -> Points:
         """Return points (B, d + p): controls (B, d) in half-ranges of their samples, and labels."""
@@ -202,7 +202,7 @@ class KrigingBank:
 
     def durations(self, points: Points) -> PerPoint:
         """Return the durations (B,), s, at points (B, d + p), at the finest level."""
-        logs = self.others[DURATION].predict(points) + self.power_logarithms(points)
+        logs = self.other_models[DURATION].predict(points) + self.power_logarithms(points)
         return np.asarray(np.exp(logs[:, 0]))
 
     def power_logarithms(self, points: Points) -> Annotated[Floats, "points 1"]:
@@ -217,21 +217,21 @@ class KrigingBank:
 
         The pose's coefficients are followed by what the event's model adds to the leading ones.
         """
-        own = self.pose.variance(points)[:, None] + self.pose.hyper.nugget
-        values = {name: field.predict(points) for name, field in self.others.items()}
+        variances = self.pose.variance(points)[:, None] + self.pose.hyper.nugget
+        values = {name: field.predict(points) for name, field in self.other_models.items()}
         pose = self.pose.predict(points)
         if self.event:
             shifts = self.event.predict(points) - pose[:, : self.event_columns]
             pose = np.hstack([pose, shifts])
-        return {VARIANCE: own, **values, POSE: pose}
+        return {VARIANCE: variances, **values, POSE: pose}
 
     def _thinned(
         self, points: Points, weights: Annotated[Floats, "rows columns"]
     ) -> dict[str, Annotated[Floats, "points _"]]:
         basis = self.basis(points, len(weights) - self.linear)
-        ends = np.cumsum([0, *self.sizes(0)[:-1], weights.shape[1]])
-        parts = (basis @ weights[:, start:end] for start, end in pairwise(ends))
-        values = dict(zip([VARIANCE, *self.others, POSE], parts, strict=True))
+        bounds = np.cumsum([0, *self.sizes(0)[:-1], weights.shape[1]])
+        products = (basis @ weights[:, start:end] for start, end in pairwise(bounds))
+        values = dict(zip([VARIANCE, *self.other_models, POSE], products, strict=True))
         return {**values, VARIANCE: np.exp(values[VARIANCE])}
 
     def basis(self, points: Points, columns: int) -> Annotated[Floats, "points rows"]:
@@ -271,11 +271,11 @@ class KrigingBank:
         terms = kriging_model.linear_terms(hyper, self.pose.samples)
         near = np.eye(len(self.pose.samples), terms.shape[1])
         both = np.vstack([terms, near])
-        found = -both @ self.pose.form @ both.T
-        found[p, p] += 1.0 + sum(own.offset for own in hyper.labels) + hyper.nugget
+        form = -both @ self.pose.form @ both.T
+        form[p, p] += 1.0 + sum(kernel.offset for kernel in hyper.labels) + hyper.nugget
         controls = np.arange(p + 1, self.linear)
-        found[controls, controls] += hyper.trend
-        return found
+        form[controls, controls] += hyper.trend
+        return form
 
     def sigma(self, variance: Annotated[Floats, "points 1"]) -> PerPoint:
         """Return the standard deviation (B,), m, of a captured clip from the prediction.

@@ -110,17 +110,17 @@ def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:
     ranks: number of pose coefficients of each level.
     """
     samples = len(bank.pose.samples)
-    own = [ranks[0] + bank.event_columns, *ranks[1:]]
-    sizes = [bank.sizes(rank) for rank in own]
+    column_counts = [ranks[0] + bank.event_columns, *ranks[1:]]
+    sizes = [bank.sizes(rank) for rank in column_counts]
     columns = [bank.columns(level) for level in range(len(ranks))]
     shapes = [(bank.linear + n, sum(size)) for n, size in zip(columns, sizes, strict=True)]
-    ends = np.cumsum([0, *(rows * values for rows, values in shapes)]).tolist()
+    bounds = np.cumsum([0, *(rows * values for rows, values in shapes)]).tolist()
     # Coarser levels have no quadratic form; they use a single zero behind the finest's.
     rows, coarser = bank.linear + samples, len(ranks) - 1
     return {
         "columns": [[n] for n in columns],
-        "from": [[start] for start in ends[:-1]],
-        "to": [[end] for end in ends[1:]],
+        "from": [[start] for start in bounds[:-1]],
+        "to": [[end] for end in bounds[1:]],
         "weighing": list(shapes),
         "sizes": list(sizes),
         "curved_from": [[0, 0], *([rows, rows] for _ in range(coarser))],
@@ -131,7 +131,7 @@ def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:
 
 
 def onnx(
-    bank: KrigingBank, net: GraphBuilder, controls: str, ends: dict[str, str]
+    bank: KrigingBank, net: GraphBuilder, controls: str, tables: dict[str, str]
 ) -> dict[str, str]:
     """Build values (B, m) of each quantity by name, with `sigma` (B, 2) in place of the variance.
 
@@ -139,15 +139,15 @@ def onnx(
     of each set. Its default is zeros, which leave all sets open.
     """
     linear = _linear(bank, net, controls)
-    near = _covariances(bank, net, linear, ends["columns"])
+    near = _covariances(bank, net, linear, tables["columns"])
     basis = net("Concat", linear, near, axis=1)
-    start, shape = ends["from"], ends["weighing"]
-    weights = net("Slice", _weights(bank, net), start, ends["to"], net.indices(0))
+    start, shape = tables["from"], tables["weighing"]
+    weights = net("Slice", _weights(bank, net), start, tables["to"], net.indices(0))
     values = net("MatMul", basis, net("Reshape", weights, shape))
-    names = [VARIANCE, *bank.others, POSE]
-    parts = net.multi_output("Split", len(names), values, ends["sizes"], axis=1)
-    fields = dict(zip(names, parts, strict=True))
-    sigma = _sigma(bank, net, basis, fields.pop(VARIANCE), ends)
+    names = [VARIANCE, *bank.other_models, POSE]
+    quantities = net.multi_output("Split", len(names), values, tables["sizes"], axis=1)
+    fields = dict(zip(names, quantities, strict=True))
+    sigma = _sigma(bank, net, basis, fields.pop(VARIANCE), tables)
     if bank.power_law:
         fields[DURATION] = net("Add", fields[DURATION], bank.power_law.onnx(net, controls))
     return {**fields, "sigma": sigma}
@@ -184,9 +184,9 @@ def _linear(bank: KrigingBank, net: GraphBuilder, controls: str) -> str:
 
 def _identity(net: GraphBuilder, rows: int, columns: int) -> str:
     """Build the first rows of an identity matrix, without storing it."""
-    places = net.weights("label_places", np.arange(rows))
+    label_rows = net.weights("label_places", np.arange(rows))
     states = net.weights("label_states", np.array([0.0, 1.0]))
-    return net("OneHot", places, net.indices(columns), states, axis=1)
+    return net("OneHot", label_rows, net.indices(columns), states, axis=1)
 
 
 def _covariances(bank: KrigingBank, net: GraphBuilder, linear: str, columns: str) -> str:
@@ -201,8 +201,8 @@ def _covariances(bank: KrigingBank, net: GraphBuilder, linear: str, columns: str
     zero, one = net.indices(0), net.indices(1)
     factors = net("Slice", _factors(bank, net, covariance.gain), zero, columns, one)
     near = covariance.onnx(net, net("MatMul", both, factors))
-    for every in _label_shares(bank, net):
-        shares = net("Slice", every, zero, columns, one)
+    for label_shares in _label_shares(bank, net):
+        shares = net("Slice", label_shares, zero, columns, one)
         near = net("Mul", near, net("MatMul", linear, shares))
     return near
 
@@ -218,13 +218,13 @@ def _factors(bank: KrigingBank, net: GraphBuilder, gain: float) -> str:
     samples = net.weights("samples", bank.pose.samples[:, :d].T)
     cross = net("Mul", net("Mul", worth, samples), net.number(-2.0))
     squares = net("Mul", net("Mul", samples, samples), worth)
-    own = net("ReduceSum", squares, net.indices(0))
+    squared_norm = net("ReduceSum", squares, net.indices(0))
     everywhere = net("Expand", worth, net.indices(d, n))
     before = net("Expand", net.number(0.0), net.indices(count + 1, n))
-    parts = [before, everywhere, own, cross]
+    factors = [before, everywhere, squared_norm, cross]
     if count:
-        parts.insert(2, net("Expand", net.number(0.0), net.indices(count, n)))
-    return net("Concat", *parts, axis=0)
+        factors.insert(2, net("Expand", net.number(0.0), net.indices(count, n)))
+    return net("Concat", *factors, axis=0)
 
 
 def _label_shares(bank: KrigingBank, net: GraphBuilder) -> list[str]:
@@ -232,18 +232,18 @@ def _label_shares(bank: KrigingBank, net: GraphBuilder) -> list[str]:
 
     Between two names of a set its correlation remains, and the whole of it for one name.
     """
-    found, d, n, counts = [], len(bank.low), len(bank.pose.samples), bank.pose.hyper.label_counts
+    shares, d, n, counts = [], len(bank.low), len(bank.pose.samples), bank.pose.hyper.label_counts
     for index, columns in enumerate(kriging_model.label_columns(d, counts)):
         correlation = bank.pose.hyper.labels[index].correlation
-        own = np.argmax(bank.pose.samples[:, columns], axis=1) + columns.start - d
-        whose = net.weights(f"whose_{index}", own)
+        names = np.argmax(bank.pose.samples[:, columns], axis=1) + columns.start - d
+        whose = net.weights(f"whose_{index}", names)
         states = net.weights(f"states_{index}", np.array([0.0, 1.0 - correlation]))
         same = net("OneHot", whose, net.indices(bank.label_count), states, axis=0)
-        kept = net.weights(f"correlation_{index}", np.array([[correlation]]))
-        kept = net("Expand", kept, net.indices(1, n))
+        floor = net.weights(f"correlation_{index}", np.array([[correlation]]))
+        floor = net("Expand", floor, net.indices(1, n))
         controls = net("Expand", net.number(0.0), net.indices(d, n))
-        found.append(net("Concat", same, kept, controls, axis=0))
-    return found
+        shares.append(net("Concat", same, floor, controls, axis=0))
+    return shares
 
 
 def _weights(bank: KrigingBank, net: GraphBuilder) -> str:
@@ -251,9 +251,9 @@ def _weights(bank: KrigingBank, net: GraphBuilder) -> str:
 
     Columns: the logarithm of the variance, m², the other quantities, the pose.
     """
-    others = [bank.linear_weights(field) for field in bank.others.values()]
+    other_weights = [bank.linear_weights(field) for field in bank.other_models.values()]
     # The first column is not used: files of earlier versions have it, and readers skip two.
-    stored = np.hstack([np.zeros((bank.linear, 2)), *others, bank.pose_weights()[0]])
+    stored = np.hstack([np.zeros((bank.linear, 2)), *other_weights, bank.pose_weights()[0]])
     stored[bank.label_count, 1] = _log_sill(bank)
     one, end = net.indices(1), net.indices(stored.shape[1])
     linear = net("Slice", net.weights("linear_weights", stored), one, end, one)
@@ -273,7 +273,7 @@ def _duals(bank: KrigingBank, net: GraphBuilder) -> str:
     n = len(bank.pose.samples)
     nothing = net("Expand", net.number(0.0), net.indices(n, 1))
     blocks = [nothing]
-    for name, field in bank.others.items():
+    for name, field in bank.other_models.items():
         if isinstance(field, ConstantModel):
             shape = net.indices(n, kriging_bank.width(field))
             blocks.append(net("Expand", net.number(0.0), shape))
@@ -284,21 +284,21 @@ def _duals(bank: KrigingBank, net: GraphBuilder) -> str:
 
 
 def _sigma(
-    bank: KrigingBank, net: GraphBuilder, basis: str, logarithm: str, ends: dict[str, str]
+    bank: KrigingBank, net: GraphBuilder, basis: str, logarithm: str, tables: dict[str, str]
 ) -> str:
     """Build sigma, m, twice (B, 2), from the variance: its logarithm's exponential and a form.
 
     The finest level's logarithm is that of the sill, so that its form lacks the sill; coarser
     levels have no form.
     """
-    own = net("Slice", basis, net.indices(0), ends["own"], net.indices(1))
-    whole = bank.variance_form
-    whole[bank.label_count, bank.label_count] -= 1.0
-    form = net("Pad", _symmetric(net, "precision", whole), net.indices(0, 0, 1, 1))
-    form = net("Slice", form, ends["curved_from"], ends["curved_to"], net.indices(0, 1))
+    level_basis = net("Slice", basis, net.indices(0), tables["own"], net.indices(1))
+    variance_form = bank.variance_form
+    variance_form[bank.label_count, bank.label_count] -= 1.0
+    form = net("Pad", _symmetric(net, "precision", variance_form), net.indices(0, 0, 1, 1))
+    form = net("Slice", form, tables["curved_from"], tables["curved_to"], net.indices(0, 1))
     # Two columns: see `GraphBuilder.row_sums`.
-    pairs = net("Expand", net.weights("sill", np.array([bank.sill])), ends["pairs"])
-    terms = net("Mul", net("MatMul", own, form), own)
+    pairs = net("Expand", net.weights("sill", np.array([bank.sill])), tables["pairs"])
+    terms = net("Mul", net("MatMul", level_basis, form), level_basis)
     # Not Relu, which onnxruntime-web 1.23 fuses with Gemm into an operator that it lacks.
     variance = net("Max", net("Gemm", terms, pairs, net("Exp", logarithm)), net.number(0.0))
     return net("Sqrt", variance)

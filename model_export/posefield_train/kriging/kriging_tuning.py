@@ -54,15 +54,15 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
     residuals, total = left_out @ values, _total(samples, values)
     if len(values) <= sample_points.LARGEST_DENSE:
         squares = np.sum(np.square(residuals), axis=1)
-        whole = float(np.sum(np.square(residuals)))
+        residual_sum = float(np.sum(np.square(residuals)))
     else:
         # A square of each residual would take as much memory as the motions.
         squares = np.einsum("nm,nm->n", residuals, residuals)
-        whole = float(np.sum(squares))
+        residual_sum = float(np.sum(squares))
     return TunedKriging(
         hyper,
         residuals,
-        whole / total if total > 0 else 1.0,
+        residual_sum / total if total > 0 else 1.0,
         variances,
         float(np.mean(squares / variances)),
     )
@@ -119,10 +119,12 @@ def tune_with_trend(problem: TuningProblem, hyper: Hyper) -> TunedKriging:
 def _tune_at_scales(
     problem: TuningProblem, hyper: Hyper, trend: bool, loss: type[LeaveOneOutLoss]
 ) -> TunedKriging:
-    names = tuple(own for own in _free(problem, trend) if own[0] != "correlation")
-    own = loss(problem.drawn(0), hyper.without_offsets(), names, own_scales=False)
-    starts = [own.start(0.0, np.log(nugget)) for _, nugget in STARTS]
-    return _best(own, starts, problem, SERIAL)
+    names = tuple(
+        with_nugget for with_nugget in _free(problem, trend) if with_nugget[0] != "correlation"
+    )
+    with_nugget = loss(problem.drawn(0), hyper.without_offsets(), names, own_scales=False)
+    starts = [with_nugget.start(0.0, np.log(nugget)) for _, nugget in STARTS]
+    return _best(with_nugget, starts, problem, SERIAL)
 
 
 def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
@@ -134,22 +136,22 @@ def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
 
 
 def _best(
-    loss: LeaveOneOutLoss, starts: Sequence[Floats], whole: TuningProblem, jobs: Jobs
+    loss: LeaveOneOutLoss, starts: Sequence[Floats], problem: TuningProblem, jobs: Jobs
 ) -> TunedKriging:
     """Return the model at the least loss that searches from the starts find.
 
-    whole: the problem that the loss is of, or of some of whose clips it is.
+    problem: the one that the loss is of, or of some of whose clips it is.
     """
     if not len(starts[0]):
-        return evaluate_fixed(loss.read(starts[0]), whole.samples, whole.values)
-    found = ordered_results(jobs, _search, ((start,) for start in starts), (loss,))
-    _, best = min(found, key=lambda result: result[0])
-    return evaluate_fixed(loss.read(best), whole.samples, whole.values)
+        return evaluate_fixed(loss.read(starts[0]), problem.samples, problem.values)
+    results = ordered_results(jobs, _search, ((start,) for start in starts), (loss,))
+    _, best = min(results, key=lambda result: result[0])
+    return evaluate_fixed(loss.read(best), problem.samples, problem.values)
 
 
 def _search(loss: LeaveOneOutLoss, start: Floats) -> tuple[float, Floats]:
     """Return the least loss that a search from a start finds, and where."""
-    found = minimize(
+    result = minimize(
         loss.value_and_slope,
         start,
         jac=True,
@@ -157,4 +159,4 @@ def _search(loss: LeaveOneOutLoss, start: Floats) -> tuple[float, Floats]:
         bounds=[(prior.low, prior.high) for prior in loss.priors],
         options={"maxiter": ITERATIONS},
     )
-    return float(found.fun), found.x
+    return float(result.fun), result.x

@@ -43,8 +43,8 @@ def choose_inducing(
     required: set[int] = set()
     for column in points[:, :controls].T:
         values, first = np.unique(column, return_index=True)
-        ends = {int(first[0]), int(first[-1])}
-        required |= {*first.tolist()} if len(values) <= FEW_VALUES else ends
+        extremes = {int(first[0]), int(first[-1])}
+        required |= {*first.tolist()} if len(values) <= FEW_VALUES else extremes
     needed = sorted(required | {int(np.argmax(column)) for column in points[:, controls:].T})
     count = max(INDUCING, len(needed))
     return np.sort(_pivoted(points, fixed_parameters(controls, labels), count, needed))
@@ -64,9 +64,9 @@ def choose_tuned(
     mixed = np.random.Generator(np.random.PCG64(len(points))).permutation(len(points))
     half = mixed[draw::2]
     hyper = fixed_parameters(controls, labels)
-    apart = half[_pivoted(points[half], hyper, LARGEST_TUNED // 2, ())]
-    others = half[~np.isin(half, apart)]
-    return np.sort(np.concatenate([apart, others[: LARGEST_TUNED - len(apart)]]))
+    spread = half[_pivoted(points[half], hyper, LARGEST_TUNED // 2, ())]
+    rest = half[~np.isin(half, spread)]
+    return np.sort(np.concatenate([spread, rest[: LARGEST_TUNED - len(spread)]]))
 
 
 def tuned_count(clips: int) -> int:
@@ -85,23 +85,23 @@ def _pivoted(
 ) -> Annotated[Indices, "chosen"]:
     """Return `count` samples, fewer where the rest repeats them: `first`, then the pivots."""
     unknown = kriging_model.prior_variances(hyper, points)
-    whole = float(unknown.max())
+    largest = float(unknown.max())
     columns: Annotated[Floats, "chosen samples"] = np.zeros((count, len(points)))
-    taken: list[int] = []
-    while len(taken) < min(count, len(points)):
-        at = len(taken)
+    pivots: list[int] = []
+    while len(pivots) < min(count, len(points)):
+        at = len(pivots)
         # Rounded, so that rounding errors do not break ties.
         chosen = first[at] if at < len(first) else int(np.argmax(np.round(unknown, 9)))
-        if at >= len(first) and unknown[chosen] < REPEATED * whole:
+        if at >= len(first) and unknown[chosen] < REPEATED * largest:
             break
-        taken.append(chosen)
+        pivots.append(chosen)
         left = kriging_model.covariances(hyper, points[[chosen]], points)[0]
         left = left - columns[:at, chosen] @ columns[:at]
-        if unknown[chosen] >= REPEATED * whole:
+        if unknown[chosen] >= REPEATED * largest:
             columns[at] = left / np.sqrt(unknown[chosen])
         unknown = unknown - np.square(columns[at])
-        unknown[taken] = 0.0
-    return np.array(taken)
+        unknown[pivots] = 0.0
+    return np.array(pivots)
 
 
 LabelNames = Mapping[str, tuple[str, ...]]
@@ -140,7 +140,7 @@ class SamplePoints:
     def label_indices(self) -> list[Annotated[Indices, "samples"]]:
         """Return the index (n,) of each sample's name in each label set."""
         columns = kriging_model.label_columns(self.controls, self.labels)
-        return [np.argmax(self.points[:, own], axis=1) for own in columns]
+        return [np.argmax(self.points[:, columns_of_set], axis=1) for columns_of_set in columns]
 
     def subset(self, rows: Annotated[Indices, "rows"]) -> "SamplePoints":
         """Return some of the samples, none of them inducing."""
@@ -150,24 +150,30 @@ class SamplePoints:
         """Return the differences of values (n, m) from the mean of all other groups."""
         _, inverse, counts = np.unique(self.groups, return_inverse=True, return_counts=True)
         sums = np.zeros((len(counts), values.shape[1]))
-        for group, own in zip(inverse, values, strict=True):
-            sums[group] += own
-        others = (values.sum(axis=0) - sums[inverse]) / (len(values) - counts[inverse])[:, None]
-        return values - others
+        for group, row in zip(inverse, values, strict=True):
+            sums[group] += row
+        other_means = (values.sum(axis=0) - sums[inverse]) / (len(values) - counts[inverse])[
+            :, None
+        ]
+        return values - other_means
 
 
 def label_weights(
-    asked: Sequence[Mapping[str, str]], known: LabelNames
-) -> Annotated[Floats, "{len(asked)} _"]:
+    labels: Sequence[Mapping[str, str]], label_names: LabelNames
+) -> Annotated[Floats, "{len(labels)} _"]:
     """Return weights (N, p) of the labels of N clips: one for a clip's name in each label set.
 
     Those of a set are zero for an unknown name, and for a set that a clip does not name.
     """
-    own = [
-        [float(one.get(label_set) == name) for label_set, names in known.items() for name in names]
-        for one in asked
+    rows = [
+        [
+            float(one.get(label_set) == name)
+            for label_set, names in label_names.items()
+            for name in names
+        ]
+        for one in labels
     ]
-    return np.array(own).reshape(len(asked), sum(map(len, known.values())))
+    return np.array(rows).reshape(len(labels), sum(map(len, label_names.values())))
 
 
 def make_samples(recipe: Recipe, examples: Sequence[Example]) -> tuple[SamplePoints, LabelNames]:
@@ -177,45 +183,45 @@ def make_samples(recipe: Recipe, examples: Sequence[Example]) -> tuple[SamplePoi
     depends on a single example.
     """
     points = _points(examples)
-    given = [example.row.labels for example in examples]
-    every = {
-        label_set: tuple(sorted({labels[label_set] for labels in given}))
+    row_labels = [example.row.labels for example in examples]
+    names_by_set = {
+        label_set: tuple(sorted({labels[label_set] for labels in row_labels}))
         for label_set in recipe.kriging.label
     }
-    known = {label_set: names for label_set, names in every.items() if len(names) > 1}
-    both = np.hstack([points, label_weights(given, known)])
-    counts = tuple(map(len, known.values()))
+    label_names = {label_set: names for label_set, names in names_by_set.items() if len(names) > 1}
+    both = np.hstack([points, label_weights(row_labels, label_names)])
+    counts = tuple(map(len, label_names.values()))
     groups = _groups(recipe, examples, points)
     several = len({example.row.performer for example in examples}) > 1
-    unnamed = several and PERFORMER not in known
+    unnamed = several and PERFORMER not in label_names
     # Without a nugget a model passes through every clip.
     exact = recipe.kriging.nugget == 0
     d = points.shape[1]
     inducing = None if exact else choose_inducing(both, d, counts)
-    return SamplePoints(both, d, groups, counts, unnamed, inducing), known
+    return SamplePoints(both, d, groups, counts, unnamed, inducing), label_names
 
 
 def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     """Return one note per setting of the recipe that the examples are too few for."""
-    laid, known = make_samples(recipe, examples)
-    said = [
+    samples, label_names = make_samples(recipe, examples)
+    notes = [
         f"all clips are of one {label_set}, {examples[0].row.labels[label_set]!r}: kriging.label "
         "has no effect"
         for label_set in recipe.kriging.label
-        if label_set not in known
+        if label_set not in label_names
     ]
-    said += _repeated_sets(laid, tuple(known))
-    if len(np.unique(laid.groups)) > len(np.unique(recording_numbers(examples))):
-        said.append(
+    notes += _repeated_sets(samples, tuple(label_names))
+    if len(np.unique(samples.groups)) > len(np.unique(recording_numbers(examples))):
+        notes.append(
             "clips of one recording are not left out together: those of the other recordings "
             "alone could not carry the drift"
         )
-    return said
+    return notes
 
 
-def _repeated_sets(laid: SamplePoints, names: Sequence[str]) -> list[str]:
+def _repeated_sets(samples: SamplePoints, names: Sequence[str]) -> list[str]:
     """Return a note for each two label sets that divide the samples alike."""
-    indices = dict(zip(names, laid.label_indices, strict=True))
+    indices = dict(zip(names, samples.label_indices, strict=True))
     return [
         f"label sets {one!r} and {other!r} divide the clips alike: nothing tells their effects "
         "apart, expected clips of one name in several of the other"

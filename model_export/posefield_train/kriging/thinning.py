@@ -32,29 +32,29 @@ RELATIVE_CUTOFF = 1e-5
 def sort_samples(bank: KrigingBank) -> KrigingBank:
     """Return the bank with its samples sorted by how much they explain of the pose."""
     order = pivoted_order(bank.pose)
-    others = {
+    other_models = {
         name: field if isinstance(field, ConstantModel) else _permute_kriging(field, order)
-        for name, field in bank.others.items()
+        for name, field in bank.other_models.items()
     }
     event = _permute_kriging(bank.event, order) if bank.event else None
     contacts = _permute_kriging(bank.contacts, order) if bank.contacts else None
     pose = _permute_kriging(bank.pose, order)
-    return replace(bank, pose=pose, others=others, event=event, contacts=contacts)
+    return replace(bank, pose=pose, other_models=other_models, event=event, contacts=contacts)
 
 
 def pivoted_order(pose: UniversalKriging) -> Annotated[Indices, "samples"]:
     """Return samples (n,), each the least determined by the previous ones (pivoted Cholesky)."""
     left = kriging_model.stationary_covariances(pose.hyper, pose.samples, pose.samples)
-    taken: list[int] = []
+    pivots: list[int] = []
     for _ in range(len(left)):
         unknown = np.diagonal(left).copy()
-        unknown[taken] = -1.0
+        unknown[pivots] = -1.0
         # Rounded, so that rounding errors do not break ties.
         chosen = int(np.argmax(np.round(unknown, 9)))
-        taken.append(chosen)
+        pivots.append(chosen)
         if unknown[chosen] > RELATIVE_CUTOFF:
             left = left - np.outer(left[chosen], left[chosen]) / unknown[chosen]
-    return np.array(taken)
+    return np.array(pivots)
 
 
 def _permute_kriging(
@@ -83,10 +83,10 @@ def random_points(
 
 
 def random_labels(
-    rng: np.random.Generator, known: LabelNames, count: int
+    rng: np.random.Generator, label_names: LabelNames, count: int
 ) -> list[Annotated[Floats, "{count} _"]]:
     """Return one-hot weights (Q, .) of random names for each label set; zeros for no name."""
-    sizes = map(len, known.values())
+    sizes = map(len, label_names.values())
     return [np.eye(size + 1, size)[rng.integers(0, size + 1, count)] for size in sizes]
 
 
@@ -107,12 +107,12 @@ class ThinningData:
 
         rank: number of pose coefficients. error: of the level, m, added to its variance.
         """
-        own = np.log(self.values[VARIANCE] + error**2 / self.bank.sill)
-        values = np.hstack(list({**self.values, VARIANCE: own}.values()))
-        kept = values.shape[1] - (self.values[POSE].shape[1] - rank)
-        known = self.basis[:, : self.bank.linear + columns]
-        found = np.linalg.lstsq(known, values[:, :kept], rcond=RELATIVE_CUTOFF)
-        return np.asarray(found[0], np.float64)
+        logarithms = np.log(self.values[VARIANCE] + error**2 / self.bank.sill)
+        values = np.hstack(list({**self.values, VARIANCE: logarithms}.values()))
+        count = values.shape[1] - (self.values[POSE].shape[1] - rank)
+        columns_of_basis = self.basis[:, : self.bank.linear + columns]
+        solution = np.linalg.lstsq(columns_of_basis, values[:, :count], rcond=RELATIVE_CUTOFF)
+        return np.asarray(solution[0], np.float64)
 
 
 def thinning_data(bank: KrigingBank) -> ThinningData:

@@ -97,15 +97,15 @@ class TuningProblem:
         draw: 0 or 1. The values keep their inner products, and the first those that the effector
         moves.
         """
-        own = self.samples
-        if len(own.points) <= sample_points.LARGEST_TUNED:
+        samples = self.samples
+        if len(samples.points) <= sample_points.LARGEST_TUNED:
             return self
-        rows = sample_points.choose_tuned(own.points, own.controls, own.labels, draw)
+        rows = sample_points.choose_tuned(samples.points, samples.controls, samples.labels, draw)
         effector = None if self.effector is None else self.effector[rows]
         first = 0 if effector is None else effector.shape[2]
         some = self.values[rows]
         values = np.hstack([some[:, :first], _compact(some[:, first:])])
-        return replace(self, samples=own.subset(rows), values=values, effector=effector)
+        return replace(self, samples=samples.subset(rows), values=values, effector=effector)
 
     def prior(self, name: str) -> ParameterPrior:
         """Return the prior of a parameter besides the scales."""
@@ -124,8 +124,8 @@ class LeaveOneOutLoss:
 
     def __post_init__(self) -> None:
         scales = [SCALE_PRIOR] * (self.problem.samples.controls if self.own_scales else 0)
-        own = (name for name, _ in self.names)
-        object.__setattr__(self, "priors", scales + list(map(self.problem.prior, own)))
+        parameters = (name for name, _ in self.names)
+        object.__setattr__(self, "priors", scales + list(map(self.problem.prior, parameters)))
 
     def start(self, scale: float, nugget: float) -> Annotated[Floats, "units"]:
         """Return a start of the search from the logarithms of a scale and a nugget."""
@@ -142,23 +142,23 @@ class LeaveOneOutLoss:
     def read(self, x: Annotated[Floats, "units"]) -> Hyper:
         """Return the parameters at a point of the search."""
         scales = len(self.priors) - len(self.names)
-        found = {name: _value(name, x[self._place(name)]) for name in self.names}
+        values = {name: _value(name, x[self._place(name)]) for name in self.names}
         if self.problem.nugget is not None:
-            found[NUGGET] = self.problem.nugget
-        own = self.hyper
+            values[NUGGET] = self.problem.nugget
+        hyper = self.hyper
         kernels = (
             LabelKernel(
                 kernel.count,
-                found.get(("correlation", index), kernel.correlation),
-                found.get(("offset", index), kernel.offset),
+                values.get(("correlation", index), kernel.correlation),
+                values.get(("offset", index), kernel.offset),
             )
-            for index, kernel in enumerate(own.labels)
+            for index, kernel in enumerate(hyper.labels)
         )
         return replace(
-            own,
-            scales=np.exp(x[:scales]) if self.own_scales else own.scales,
-            nugget=found.get(NUGGET, own.nugget),
-            trend=found.get(TREND, own.trend),
+            hyper,
+            scales=np.exp(x[:scales]) if self.own_scales else hyper.scales,
+            nugget=values.get(NUGGET, hyper.nugget),
+            trend=values.get(TREND, hyper.trend),
             labels=tuple(kernels),
         )
 
@@ -169,12 +169,12 @@ class LeaveOneOutLoss:
         hyper = self.read(x)
         value, slope = self.of_samples(hyper)
         deviations = np.array([prior.deviation for prior in self.priors])
-        apart = (x - [prior.mean for prior in self.priors]) / deviations
+        standardized = (x - [prior.mean for prior in self.priors]) / deviations
         strength = self.problem.strength
         changes = np.array([np.sum(slope * change) for change in self._changes(hyper)])
         return (
-            value + 0.5 * strength * float(apart @ apart),
-            changes + strength * apart / deviations,
+            value + 0.5 * strength * float(standardized @ standardized),
+            changes + strength * standardized / deviations,
         )
 
     def of_samples(self, hyper: Hyper) -> tuple[float, SampleMatrix]:
@@ -212,10 +212,10 @@ class LeaveOneOutLoss:
         effector = self.problem.effector
         if effector is None:
             return residuals
-        found, first = residuals.copy(), effector.shape[2]
-        moved = np.einsum("nkm,nm->nk", effector, residuals[:, :first])
-        found[:, :first] += np.einsum("nkm,nk->nm", effector, moved)
-        return found
+        weighted, first = residuals.copy(), effector.shape[2]
+        displacements = np.einsum("nkm,nm->nk", effector, residuals[:, :first])
+        weighted[:, :first] += np.einsum("nkm,nk->nm", effector, displacements)
+        return weighted
 
     @cached_property
     def values(self) -> Annotated[Floats, "samples _"]:
@@ -252,12 +252,12 @@ class LeaveOneOutLoss:
         controls, model = self.problem.samples.half_ranges, COVARIANCES[hyper.covariance]
         squared = np.tensordot(np.square(hyper.scales), self._gaps, axes=1)
         pairs = zip(hyper.labels, self._same, strict=True)
-        shares = [own.correlation + (1.0 - own.correlation) * same for own, same in pairs]
-        found: list[Floats] = []
+        shares = [kernel.correlation + (1.0 - kernel.correlation) * same for kernel, same in pairs]
+        changes: list[Floats] = []
         if self.own_scales:
             slope = 2.0 * model.slope(squared) * _product(shares)
             scaled = zip(hyper.scales, self._gaps, strict=True)
-            found += [scale**2 * gaps * slope for scale, gaps in scaled]
+            changes += [scale**2 * gaps * slope for scale, gaps in scaled]
         by_name: dict[str, Callable[[int], Floats]] = {
             "nugget": lambda _: hyper.nugget * np.eye(len(controls)),
             "correlation": lambda index: (
@@ -270,7 +270,7 @@ class LeaveOneOutLoss:
             "offset": lambda index: hyper.labels[index].offset * self._same[index],
             "trend": lambda _: hyper.trend * (controls @ controls.T),
         }
-        return found + [by_name[name](index) for name, index in self.names]
+        return changes + [by_name[name](index) for name, index in self.names]
 
 
 def _compact(values: SampleValues) -> Annotated[Floats, "samples _"]:
@@ -291,10 +291,10 @@ def _value(name: Parameter, unit: float) -> float:
 
 def _product(shares: Sequence[Floats]) -> Floats | float:
     """Return the product of matrices, 1.0 for none."""
-    found: Floats | float = 1.0
+    product: Floats | float = 1.0
     for share in shares:
-        found = found * share
-    return found
+        product = product * share
+    return product
 
 
 @dataclass(frozen=True)
@@ -316,11 +316,11 @@ class PredictiveDensityLoss(LeaveOneOutLoss):
         block = self.inverse(hyper)
         product = block @ self.values
         residuals = kriging_model.divide_groups(block, product, self.recordings)
-        own = np.where(self.together, block, 0.0)
+        diagonal = np.where(self.together, block, 0.0)
         squares, count = max(float(np.sum(residuals * product)), TINY), len(block)
-        loss = 0.5 * count * float(np.log(squares)) - 0.5 * float(np.linalg.slogdet(own)[1])
+        loss = 0.5 * count * float(np.log(squares)) - 0.5 * float(np.linalg.slogdet(diagonal)[1])
         paired = np.where(self.together, residuals @ residuals.T, 0.0)
         slope = block @ paired @ block - 2.0 * (block @ residuals) @ product.T
-        spread = block @ np.linalg.inv(own) @ block
+        spread = block @ np.linalg.inv(diagonal) @ block
         both = 0.5 * count / squares * slope + 0.5 * spread
         return loss, 0.5 * (both + both.T)

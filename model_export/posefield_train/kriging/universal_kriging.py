@@ -150,15 +150,15 @@ class ProjectedProcess:
 
     def __post_init__(self) -> None:
         if len(self.hyper.drifts) != 1 or self.hyper.nugget <= 0.0:
-            found = f"drifts {self.hyper.drifts} and nugget {self.hyper.nugget:g}"
-            raise ValueError(f"{found}, expected one drift and a nugget above zero")
+            parameters = f"drifts {self.hyper.drifts} and nugget {self.hyper.nugget:g}"
+            raise ValueError(f"{parameters}, expected one drift and a nugget above zero")
 
     def dual(self, values: SampleValues) -> Annotated[Floats, "system values"]:
         """Return the weights (m + k, v) of covariances and drift functions for values (n, v)."""
         left, right = self._factors
-        found = np.linalg.solve(right, left.T @ values)
+        weights = np.linalg.solve(right, left.T @ values)
         free = self._allowed.shape[1]
-        return np.vstack([self._allowed @ found[:free], found[free:]])
+        return np.vstack([self._allowed @ weights[:free], weights[free:]])
 
     def leave_out(self, groups: Annotated[Indices, "samples"]) -> SampleMatrix:
         """Return the matrix (n, n) from values to residuals of samples left out by groups (n,).
@@ -167,24 +167,29 @@ class ProjectedProcess:
         are (I - H)⁻¹ times its own, with the matrix H from values to predictions.
         """
         left = self._factors[0]
-        apart = np.eye(len(left)) - left @ left.T
-        return kriging_model.divide_groups(apart, apart, kriging_model.equal_sized_groups(groups))
+        complement = np.eye(len(left)) - left @ left.T
+        return kriging_model.divide_groups(
+            complement, complement, kriging_model.equal_sized_groups(groups)
+        )
 
     def residuals(
         self, values: SampleValues, groups: Annotated[Indices, "samples"]
     ) -> SampleValues:
         """Return `leave_out` times values (n, v), without a matrix (n, n)."""
         left = self._factors[0]
-        found: Floats = values - left @ (left.T @ values)
+        residuals: Floats = values - left @ (left.T @ values)
         several = kriging_model.equal_sized_groups(groups)
         grouped = [
-            np.linalg.solve(np.eye(own.shape[1]) - left[own] @ left[own].swapaxes(1, 2), found[own])
-            for own in several
+            np.linalg.solve(
+                np.eye(indices.shape[1]) - left[indices] @ left[indices].swapaxes(1, 2),
+                residuals[indices],
+            )
+            for indices in several
         ]
-        found /= (1.0 - np.sum(np.square(left), axis=1))[:, None]
-        for own, rows in zip(several, grouped, strict=True):
-            found[own] = rows
-        return found
+        residuals /= (1.0 - np.sum(np.square(left), axis=1))[:, None]
+        for indices, rows in zip(several, grouped, strict=True):
+            residuals[indices] = rows
+        return residuals
 
     @property
     def form(self) -> Annotated[Floats, "system system"]:
@@ -194,14 +199,14 @@ class ProjectedProcess:
         Rasmussen 2005): far from the inducing points nothing is subtracted from the prior.
         """
         nugget, m, near = self.hyper.nugget, len(self.inducing), self._near
-        own = self._inducing_covariances
-        inverse = np.linalg.inv(near.T @ near + nugget * own)
+        covariances = self._inducing_covariances
+        inverse = np.linalg.inv(near.T @ near + nugget * covariances)
         toward = -inverse @ (near.T @ self._drift)
         system = np.vstack([toward, np.eye(self._drift.shape[1])])
         unsure = (self._drift.T @ self._drift + self._drift.T @ near @ toward) / nugget
-        found = -system @ np.linalg.solve(unsure, system.T)
-        found[:m, :m] += np.linalg.inv(own) - nugget * inverse
-        return np.asarray(0.5 * (found + found.T))
+        form = -system @ np.linalg.solve(unsure, system.T)
+        form[:m, :m] += np.linalg.inv(covariances) - nugget * inverse
+        return np.asarray(0.5 * (form + form.T))
 
     @cached_property
     def _near(self) -> Annotated[Floats, "samples inducing"]:
@@ -213,8 +218,8 @@ class ProjectedProcess:
 
     @cached_property
     def _inducing_covariances(self) -> Annotated[Floats, "inducing inducing"]:
-        own = kriging_model.covariances(self.hyper, self.inducing, self.inducing)
-        return own + self.jitter * np.eye(len(own))
+        covariances = kriging_model.covariances(self.hyper, self.inducing, self.inducing)
+        return covariances + self.jitter * np.eye(len(covariances))
 
     @cached_property
     def _allowed(self) -> Annotated[Floats, "inducing free"]:
@@ -252,14 +257,14 @@ def solve_samples(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> 
 
 
 def leave_out_samples(
-    hyper: Hyper, samples: SamplePoints, kept: Annotated[Indices, "kept"] | None = None
+    hyper: Hyper, samples: SamplePoints, chosen: Annotated[Indices, "kept"] | None = None
 ) -> SampleMatrix:
     """Return the matrix (n, n) from values to leave-one-group-out residuals.
 
-    kept: samples that the family consists of; all if None. Inducing clips remain inducing.
+    chosen: samples that the family consists of; all if None. Inducing clips remain inducing.
     """
-    own = np.arange(len(samples.points)) if kept is None else kept
-    points, groups = samples.points[own], samples.groups[own]
+    indices = np.arange(len(samples.points)) if chosen is None else chosen
+    points, groups = samples.points[indices], samples.groups[indices]
     if samples.inducing is None:
         return leave_out(hyper, points, groups)
     process = ProjectedProcess(hyper, points, samples.points[samples.inducing])

@@ -20,7 +20,7 @@ _MEANING = {
 def quantity_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Chapter:
     """Return the explained share and the parameters of each kriged quantity, the pose first."""
     names, label_sets = [control.name for control in controls], tuple(trained.model.bank.labels)
-    bank = {POSE: trained.model.bank.pose, **trained.model.bank.others}
+    bank = {POSE: trained.model.bank.pose, **trained.model.bank.other_models}
     facts: dict[str, Any] = {}
     rows = []
     for name, share in trained.explained.items():

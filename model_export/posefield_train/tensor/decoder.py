@@ -52,19 +52,19 @@ class EventBlend:
         """Return the core (r1, r2 + q, r3 + count) with the blend's block in its last corner."""
         r1, r2, r3 = core.shape
         columns = self.mixing.shape[1]
-        found = np.zeros((r1, r2 + columns, r3 + self.count))
-        found[:, :r2, :r3] = core
+        blended = np.zeros((r1, r2 + columns, r3 + self.count))
+        blended[:, :r2, :r3] = core
         block = np.tensordot(core[:, :, : self.count], self.mixing, axes=(1, 0))
-        found[:, r2:, r3:] = block.swapaxes(1, 2)
-        return found
+        blended[:, r2:, r3:] = block.swapaxes(1, 2)
+        return blended
 
 
 def event_weights(frames: int, event: int, cyclic: bool) -> Frames:
     """Return the blend's weights (T,) of canonical frames, for an event at one of them."""
-    apart = np.abs(np.arange(frames) - event) / (frames - 1)
+    distances = np.abs(np.arange(frames) - event) / (frames - 1)
     if cyclic:
-        apart = np.minimum(apart, 1.0 - apart)
-    return np.exp(-0.5 * np.square(apart / WIDTH))
+        distances = np.minimum(distances, 1.0 - distances)
+    return np.exp(-0.5 * np.square(distances / WIDTH))
 
 
 def build_blend(
@@ -106,7 +106,7 @@ def effector_weights(
     """
     if reference.event_frame is None:
         return None
-    measure = EFFECTOR_WEIGHT * reference.own_tensor.weight * full.bases[1].shape[0]
+    measure = EFFECTOR_WEIGHT * reference.tensor.weight * full.bases[1].shape[0]
     return np.sqrt(measure) * event_jacobians(reference, full, reference.event_frame)
 
 
@@ -121,12 +121,12 @@ def event_jacobians(
     count = min(COEFFICIENTS, motions.shape[1])
     step = STEP * float(motions[:, 0].std())
     start = _positions(reference, full, motions, event)
-    found = np.empty((len(motions), 3, count))
+    jacobians = np.empty((len(motions), 3, count))
     for column in range(count):
-        moved = motions.copy()
-        moved[:, column] += step
-        found[:, :, column] = (_positions(reference, full, moved, event) - start) / step
-    return found
+        stepped = motions.copy()
+        stepped[:, column] += step
+        jacobians[:, :, column] = (_positions(reference, full, stepped, event) - start) / step
+    return jacobians
 
 
 def event_distances(
@@ -145,12 +145,12 @@ def _positions(
     reference: TruncationReference, full: TuckerTensor, motions: Floats, event: EventFrame
 ) -> Floats:
     """Return the positions (N, 3), m, of the event's joint for coefficients (N, N)."""
-    own = reference.own_tensor
+    tensor = reference.tensor
     first, second, _ = full.bases
     at_event = TuckerTensor(full.core, (first, second[[event.frame]], full.bases[2]))
     values = at_event.slices(motions)
-    found = truncation_error.positions(own, values, reference.parents, reference.offsets)
-    return found[:, 0, event.joint]
+    points = truncation_error.positions(tensor, values, reference.parents, reference.offsets)
+    return points[:, 0, event.joint]
 
 
 # Numbers of decoded motion per block: 16 MB.
@@ -212,14 +212,14 @@ class Decoder:
 
     def at_level(self, level: int) -> "Decoder":
         """Return the decoder of one level: truncated core and bases, and fixed joints."""
-        rung = self.level_sizes[level]
+        size = self.level_sizes[level]
         moves = np.zeros((1 + len(self.means), 3))
-        moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
-        moved = np.append(moves, np.ones(len(self.curves)))
+        moves[[0, *(1 + joint for joint in size.joints)]] = 1.0
+        factors = np.append(moves, np.ones(len(self.curves)))
         return replace(
             self,
-            reduced=self.reduced.truncated(rung.ranks),
-            unwhiten=self.unwhiten * moved[:, None],
+            reduced=self.reduced.truncated(size.ranks),
+            unwhiten=self.unwhiten * factors[:, None],
             coarse=(),
             event=None if level else self.event,
         )
@@ -230,25 +230,28 @@ class Decoder:
         return self.reduced.bases[0].T @ self.unwhiten.T
 
     def numpy(
-        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+        self, coefficients: Annotated[Floats, "clips modes"], frames: ClipFrames
     ) -> tuple[ClipRotations, ClipPaths]:
         """Return rotations (B, S, J, 4) and root positions (B, S, 3) at canonical frames (B, S).
 
         coefficients: (B, r3). The time basis is interpolated linearly between frames (Mukai &
         Kuriyama 2006, section 2).
         """
-        numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
+        numbers = self.mean + self.reduced_poses(coefficients, frames) @ self.directions
         return self.chart.poses(numbers)
 
     def curve_values(
-        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+        self, coefficients: Annotated[Floats, "clips modes"], frames: ClipFrames
     ) -> Annotated[Floats, "clips frames curves"]:
         """Return the values (B, S, C) of the curves at canonical frames (B, S).
 
         coefficients: (B, r3).
         """
-        own = self.chart.curve_numbers
-        numbers = self.mean[own] + self.reduced_poses(coefficients, place) @ self.directions[:, own]
+        columns = self.chart.curve_numbers
+        numbers = (
+            self.mean[columns]
+            + self.reduced_poses(coefficients, frames) @ self.directions[:, columns]
+        )
         return clamp(self.curves, numbers)
 
     def at_frame(
@@ -258,15 +261,15 @@ class Decoder:
 
         The core is contracted with that frame first, which saves nearly all of the work of `numpy`.
         """
-        whole, times = self.blended
-        core = np.tensordot(times[frame], whole, axes=(0, 1))
+        blended, times = self.blended
+        core = np.tensordot(times[frame], blended, axes=(0, 1))
         numbers = self.mean + coefficients @ (core.T @ self.directions)
         return self.chart.poses(numbers)
 
     def select_joints(self, joints: Sequence[int]) -> "Decoder":
         """Return the finest level's decoder of some joints, including the root, without curves."""
-        kept = [0, *(1 + joint for joint in joints)]
-        rows = np.ravel(np.arange(3 + 3 * len(self.means)).reshape(-1, 3)[kept])
+        blocks = [0, *(1 + joint for joint in joints)]
+        rows = np.ravel(np.arange(3 + 3 * len(self.means)).reshape(-1, 3)[blocks])
         return replace(
             self,
             mean=self.mean[rows],
@@ -277,17 +280,17 @@ class Decoder:
         )
 
     def reduced_poses(
-        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+        self, coefficients: Annotated[Floats, "clips modes"], frames: ClipFrames
     ) -> Annotated[Floats, "clips frames freedoms"]:
         """Return coefficients (B, S, r1) of the first mode."""
-        whole, table = self.blended
-        r1, r2, r3 = whole.shape
-        time = quat.interpolate_rows(table, place)
+        blended, table = self.blended
+        r1, r2, r3 = blended.shape
+        time = quat.interpolate_rows(table, frames)
         # Contracting the core first as a matrix product is 17 times as fast as one einsum.
-        core = whole.transpose(2, 0, 1).reshape(r3, -1)
-        poses = np.empty((*place.shape, r1))
+        core = blended.transpose(2, 0, 1).reshape(r3, -1)
+        poses = np.empty((*frames.shape, r1))
         step = max(1, BLOCK_NUMBERS // core.shape[1])
-        for start in range(0, len(place), step):
+        for start in range(0, len(frames), step):
             block = slice(start, start + step)
             motion = (coefficients[block] @ core).reshape(-1, r1, r2)
             poses[block] = time[block] @ motion.swapaxes(1, 2)

@@ -18,29 +18,31 @@ TINY = 1e-12
 
 
 def mean_products(
-    own: PoseChart, numbers: Annotated[Floats, "*batch numbers"]
+    chart: PoseChart, numbers: Annotated[Floats, "*batch numbers"]
 ) -> Annotated[Floats, "*batch products"]:
     """Return mean · s v of the numbers v (..., 3 J) of rotations, as (..., 4 J).
 
     mean · (c + k s v) = mean c + (mean · s v) k. The bracket is linear in v and as long as s v, so
     it is folded into the model's directions and the graph needs no quaternion products.
     """
-    pure = np.zeros((*numbers.shape[:-1], len(own.means), 4))
-    pure[..., 1:] = CHARTS[own.chart].share * numbers.reshape(*numbers.shape[:-1], -1, 3)
-    return quat.mul(own.means, pure).reshape(*numbers.shape[:-1], -1)
+    pure = np.zeros((*numbers.shape[:-1], len(chart.means), 4))
+    pure[..., 1:] = CHARTS[chart.chart].share * numbers.reshape(*numbers.shape[:-1], -1, 3)
+    return quat.mul(chart.means, pure).reshape(*numbers.shape[:-1], -1)
 
 
-def mean_products_onnx(net: GraphBuilder, own: PoseChart, columns: str) -> str:
+def mean_products_onnx(net: GraphBuilder, chart: PoseChart, columns: str) -> str:
     """Build `mean_products` in a graph: columns (3 J, r) to columns (4 J, r)."""
     # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
-    axes = CHARTS[own.chart].share * np.eye(4)[1:]
+    axes = CHARTS[chart.chart].share * np.eye(4)[1:]
     table = quat.mul(np.eye(4)[:, None], axes).swapaxes(1, 2).reshape(4, 12)
-    count = len(own.means)
-    rotations = net("Squeeze", net.weights("mean_rotations", own.means[:, :, None]), net.indices(2))
+    count = len(chart.means)
+    rotations = net(
+        "Squeeze", net.weights("mean_rotations", chart.means[:, :, None]), net.indices(2)
+    )
     products = net("MatMul", rotations, net.weights("number_axes", table))
     matrices = net("Reshape", products, net.indices(-1, 4, 3))
-    found = net("MatMul", matrices, net("Reshape", columns, net.indices(count, 3, -1)))
-    return net("Reshape", found, net.indices(4 * count, -1))
+    joint_products = net("MatMul", matrices, net("Reshape", columns, net.indices(count, 3, -1)))
+    return net("Reshape", joint_products, net.indices(4 * count, -1))
 
 
 def quaternions(net: GraphBuilder, chart: ChartName, rows: str, means: str, shape: str) -> str:
@@ -50,13 +52,13 @@ def quaternions(net: GraphBuilder, chart: ChartName, rows: str, means: str, shap
     of the stereographic chart with the means added. shape: graph value of the shape (J, 1, -1).
     """
     joints = net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
-    own = net("Reshape", rows, joints)
-    squares = net("ReduceSum", net("Mul", own, own), net.indices(1), keepdims=1)
+    vectors = net("Reshape", rows, joints)
+    squares = net("ReduceSum", net("Mul", vectors, vectors), net.indices(1), keepdims=1)
     if chart == "rotation_vector":
         cosine, share = _half_angle_terms(net, squares, shape)
-        return net("Add", net("Mul", means, cosine), net("Mul", own, share))
+        return net("Add", net("Mul", means, cosine), net("Mul", vectors, share))
     # 2 y / |y|² - mean with y = mean + mean · s v, whose squared length is 1 + |s v|².
-    return net("Sub", net("Mul", own, net("Div", net.number(2.0), squares)), means)
+    return net("Sub", net("Mul", vectors, net("Div", net.number(2.0), squares)), means)
 
 
 def _half_angle_terms(net: GraphBuilder, squares: str, shape: str) -> tuple[str, str]:
@@ -64,7 +66,7 @@ def _half_angle_terms(net: GraphBuilder, squares: str, shape: str) -> tuple[str,
     row = net.padded(net("Reshape", squares, net.indices(-1)))
     half = net("Sqrt", net("Add", row, net.number(TINY)))
     ratio = net("Div", net("Sin", half), half)
-    cosine, share = (net.unpadded(found) for found in (net("Cos", half), ratio))
+    cosine, share = (net.unpadded(term) for term in (net("Cos", half), ratio))
     return net("Reshape", cosine, shape), net("Reshape", share, shape)
 
 
@@ -76,7 +78,7 @@ def rows_of_poses(net: GraphBuilder, planes: str, joints: int) -> str:
 def entries(decoder: Decoder) -> dict[str, list[Integers]]:
     """Return the level-dependent slice ends and shapes of the decoder's graph, by name."""
     ranks, joints = (
-        [decoder.blended[0].shape, *(rung.ranks for rung in decoder.coarse)],
+        [decoder.blended[0].shape, *(size.ranks for size in decoder.coarse)],
         [len(r.joints) for r in decoder.level_sizes],
     )
     return {
@@ -107,73 +109,73 @@ class DecodedRows:
 
 
 def onnx(
-    decoder: Decoder, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
+    decoder: Decoder, net: GraphBuilder, coefficients: str, frames: str, tables: dict[str, str]
 ) -> DecodedRows:
     """Build `Decoder.numpy` and `curve_values` in a graph, from canonical frames (B, S).
 
-    ends: graph values of the level's slice ends, by the names of `entries`.
+    tables: graph values of the level's slice ends, by the names of `entries`.
     """
-    flat = _moves(decoder, net, coefficients, place, ends)
+    flat = _moves(decoder, net, coefficients, frames, tables)
     directions = _directions(decoder, net)
     three, end = net.indices(3), net.indices(3 + 3 * len(decoder.means))
-    of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
+    of_root = net("Slice", directions, net.indices(0, 0), tables["root"])
     mean = net.weights("root_mean", decoder.mean[:3])
     root = net("Gemm", flat, of_root, mean, transB=1)
     of_joints = net("Slice", directions, three, end, net.indices(0))
     return DecodedRows(
-        _rotations(decoder, net, flat, of_joints, ends),
+        _rotations(decoder, net, flat, of_joints, tables),
         root,
-        _curves(decoder, net, flat, directions, ends) if decoder.curves else None,
+        _curves(decoder, net, flat, directions, tables) if decoder.curves else None,
     )
 
 
 def _curves(
-    decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
+    decoder: Decoder, net: GraphBuilder, flat: str, directions: str, tables: dict[str, str]
 ) -> str:
     """Build the values (P, C) of the curves, clamped, from coefficients (P, r1)."""
-    own = decoder.chart.curve_numbers
-    of_curves = net("Slice", directions, net.indices(own.start, 0), ends["curves"])
-    mean = net.weights("curve_mean", decoder.mean[own])
+    columns = decoder.chart.curve_numbers
+    of_curves = net("Slice", directions, net.indices(columns.start, 0), tables["curves"])
+    mean = net.weights("curve_mean", decoder.mean[columns])
     values = net("Gemm", flat, of_curves, mean, transB=1)
     low, high = limits(decoder.curves)
-    least, most = net.weights("curve_minimum", low), net.weights("curve_maximum", high)
-    return net("Min", net("Max", values, least), most)
+    minimum, maximum = net.weights("curve_minimum", low), net.weights("curve_maximum", high)
+    return net("Min", net("Max", values, minimum), maximum)
 
 
 def _moves(
-    decoder: Decoder, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
+    decoder: Decoder, net: GraphBuilder, coefficients: str, frames: str, tables: dict[str, str]
 ) -> str:
     """Build the coefficients of the first mode (P, r1).
 
     Each clip is a product of its own, time coefficients (S, r2) with its motion (r2, r1), so
     that sums have the same order in every batch.
     """
-    core = net("Slice", _core(decoder, net), net.indices(0, 0, 0), ends["core"])
-    rows = net("Reshape", core, ends["core_rows"])
-    motion = net("Reshape", net("Gemm", coefficients, rows, transB=1), ends["motion"])
-    time = _time(decoder, net, place, ends["time"])
-    return net("Reshape", net("MatMul", time, motion), ends["flat"])
+    core = net("Slice", _core(decoder, net), net.indices(0, 0, 0), tables["core"])
+    rows = net("Reshape", core, tables["core_rows"])
+    motion = net("Reshape", net("Gemm", coefficients, rows, transB=1), tables["motion"])
+    time = _time(decoder, net, frames, tables["time"])
+    return net("Reshape", net("MatMul", time, motion), tables["flat"])
 
 
 def _core(decoder: Decoder, net: GraphBuilder) -> str:
     """Build the core (r2, r1, r3); the event's block is made when the session loads."""
-    whole = net.weights("core", decoder.reduced.core.transpose(1, 0, 2))
+    core = net.weights("core", decoder.reduced.core.transpose(1, 0, 2))
     if decoder.event is None:
-        return whole
+        return core
     (r1, r2, r3), count = decoder.reduced.core.shape, decoder.event.count
     columns = decoder.event.mixing.shape[1]
     zero, two = net.indices(0), net.indices(2)
-    leading = net("Slice", whole, zero, net.indices(count), two)
+    leading = net("Slice", core, zero, net.indices(count), two)
     flat = net("Reshape", leading, net.indices(r2, r1 * count))
     mixed = net("MatMul", net.weights("event_mixing", decoder.event.mixing.T), flat)
     block = net("Reshape", mixed, net.indices(columns, r1, count))
     before = net("Expand", net.number(0.0), net.indices(columns, r1, r3))
-    beside = net("Expand", net.number(0.0), net.indices(r2, r1, count))
-    upper = net("Concat", whole, beside, axis=2)
+    padding = net("Expand", net.number(0.0), net.indices(r2, r1, count))
+    upper = net("Concat", core, padding, axis=2)
     return net("Concat", upper, net("Concat", before, block, axis=2), axis=0)
 
 
-def _time(decoder: Decoder, net: GraphBuilder, place: str, end: str) -> str:
+def _time(decoder: Decoder, net: GraphBuilder, canonical: str, end: str) -> str:
     """Build time coefficients (B, S, r2), linearly interpolated between frames."""
     table = net.weights("time_basis", decoder.reduced.bases[1].T)
     if decoder.event:
@@ -181,17 +183,17 @@ def _time(decoder: Decoder, net: GraphBuilder, place: str, end: str) -> str:
     frames = len(decoder.reduced.bases[1])
     zero, one = net.indices(0), net.indices(1)
     # Rows of frames are copied whole. Behind the last frame nothing changes.
-    every = net("Transpose", table, perm=[1, 0])
+    rows = net("Transpose", table, perm=[1, 0])
     after = net(
-        "Gather", every, net.weights("next_frames", np.append(np.arange(1, frames), frames - 1))
+        "Gather", rows, net.weights("next_frames", np.append(np.arange(1, frames), frames - 1))
     )
-    kept = net("Slice", every, zero, end, one)
-    steps = net("Slice", net("Sub", after, every), zero, end, one)
-    before = net("Floor", place)
+    level_rows = net("Slice", rows, zero, end, one)
+    steps = net("Slice", net("Sub", after, rows), zero, end, one)
+    before = net("Floor", canonical)
     row = net("Cast", before, to=6)
-    share = net("Unsqueeze", net("Sub", place, before), net.indices(2))
+    share = net("Unsqueeze", net("Sub", canonical, before), net.indices(2))
     rise = net("Mul", net("Gather", steps, row), share)
-    return net("Add", net("Gather", kept, row), rise)
+    return net("Add", net("Gather", level_rows, row), rise)
 
 
 def _directions(decoder: Decoder, net: GraphBuilder) -> str:
@@ -205,17 +207,17 @@ def _directions(decoder: Decoder, net: GraphBuilder) -> str:
 
 
 def _rotations(
-    decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
+    decoder: Decoder, net: GraphBuilder, flat: str, directions: str, tables: dict[str, str]
 ) -> str:
     """Build quaternions (J, 4, P) from the first mode's coefficients (P, r1)."""
     turning = mean_products_onnx(net, decoder.chart, directions)
     offset = mean_products(decoder.chart, decoder.mean_turns)
-    if any(len(rung.joints) < len(decoder.means) for rung in decoder.level_sizes):
-        return _partly_fixed_rotations(decoder, net, flat, turning, offset, ends)
-    turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+    if any(len(size.joints) < len(decoder.means) for size in decoder.level_sizes):
+        return _partly_fixed_rotations(decoder, net, flat, turning, offset, tables)
+    turning = net("Slice", turning, net.indices(0, 0), tables["turning"])
     means = net.weights("mean_rotations", decoder.means[:, :, None])
     constant = net.weights("rotation_mean", offset[:, None])
-    return _chart_quaternions(decoder, net, (turning, flat, constant), means, ends)
+    return _chart_quaternions(decoder, net, (turning, flat, constant), means, tables)
 
 
 def _chart_quaternions(
@@ -223,7 +225,7 @@ def _chart_quaternions(
     net: GraphBuilder,
     rows: tuple[str, str, str],
     means: str,
-    ends: dict[str, str],
+    tables: dict[str, str],
 ) -> str:
     """Build quaternions (J, 4, P) of directions (4 J, r1), poses (P, r1), constant (4 J, 1)."""
     directions, poses, constant = rows
@@ -232,7 +234,7 @@ def _chart_quaternions(
     if chart != "rotation_vector":
         constant = net("Add", constant, net("Reshape", means, net.indices(-1, 1)))
     products = net("Gemm", directions, poses, constant, transB=1)
-    return quaternions(net, chart, products, means, ends["half_angles"])
+    return quaternions(net, chart, products, means, tables["half_angles"])
 
 
 def _partly_fixed_rotations(
@@ -241,7 +243,7 @@ def _partly_fixed_rotations(
     flat: str,
     turning: str,
     offset: Annotated[Floats, "..."],
-    ends: dict[str, str],
+    tables: dict[str, str],
 ) -> str:
     """Build quaternions where some level fixes joints.
 
@@ -252,24 +254,24 @@ def _partly_fixed_rotations(
     joints, zero = len(order), net.indices(0)
     rows = np.arange(4 * joints).reshape(joints, 4)[order].ravel()
     turning = net("Gather", turning, net.weights("turning_order", rows))
-    turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+    turning = net("Slice", turning, net.indices(0, 0), tables["turning"])
     constant = net.weights("rotation_mean", offset[rows][:, None])
-    constant = net("Slice", constant, zero, ends["quaternions"], zero)
+    constant = net("Slice", constant, zero, tables["quaternions"], zero)
     ordered = net.weights("mean_rotations", decoder.means[:, :, None])
     ordered = net("Gather", ordered, net.weights("joint_order", order))
-    moving = net("Slice", ordered, zero, ends["joints"], zero)
-    found = _chart_quaternions(decoder, net, (turning, flat, constant), moving, ends)
+    moving = net("Slice", ordered, zero, tables["joints"], zero)
+    turned = _chart_quaternions(decoder, net, (turning, flat, constant), moving, tables)
     still = decoder.chart.rotation_planes(decoder.mean_turns[:, None])[order]
     still_ones = net(
-        "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
+        "Slice", net.weights("still", still), tables["joints"], net.indices(joints), zero
     )
-    poses = net("Shape", found, start=2, end=3)
+    poses = net("Shape", turned, start=2, end=3)
     shape = net("Concat", net.indices(1, 1), poses, axis=0)
-    both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
+    both = net("Concat", turned, net("Expand", still_ones, shape), axis=0)
     return net("Gather", both, net.weights("joint_places", np.argsort(order)))
 
 
 def _order(decoder: Decoder) -> Annotated[Indices, "joints"]:
     """Return the joints sorted by the number of coarser levels that keep them, descending."""
-    kept = [[j in rung.joints for j in range(len(decoder.means))] for rung in decoder.coarse]
-    return np.argsort(-np.sum(kept, axis=0), kind="stable")
+    moving = [[j in size.joints for j in range(len(decoder.means))] for size in decoder.coarse]
+    return np.argsort(-np.sum(moving, axis=0), kind="stable")

@@ -106,15 +106,15 @@ def decompose_in_passes(
     blocks = canonical.clip_blocks(tensor.shape[2])
     bases = []
     for mode in (0, 1):
-        gram = sum(_gram(unfold(tensor[:, :, own], mode)) for own in blocks)
+        gram = sum(_gram(unfold(tensor[:, :, block], mode)) for block in blocks)
         sizes, vectors = np.linalg.eigh(np.asarray(gram))
         first = _negligible(np.maximum(sizes, 0.0), squared_error)
         bases.append(fix_signs(vectors[:, first:][:, ::-1]))
-    parts = [_projected(tensor[:, :, own], bases) for own in blocks]
-    some = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
+    projections = [_projected(tensor[:, :, block], bases) for block in blocks]
+    some = projections[0] if len(projections) == 1 else np.concatenate(projections, axis=2)
     left, lengths, _ = np.linalg.svd(unfold(some, 2), full_matrices=False)
-    kept = len(lengths) - _negligible(np.square(lengths[::-1]), squared_error)
-    last = fix_signs(left[:, :kept])
+    rank = len(lengths) - _negligible(np.square(lengths[::-1]), squared_error)
+    last = fix_signs(left[:, :rank])
     return TuckerTensor(some @ last, (*bases, last))
 
 

@@ -225,10 +225,10 @@ def _whiten(
     samples, frames, _ = numbers.shape
     values = np.empty((len(whiten), frames, samples))
     for rows in canonical.clip_blocks(samples):
-        own = numbers[rows]
-        flat = whiten @ own.reshape(len(own) * frames, -1).T
+        centred = numbers[rows]
+        flat = whiten @ centred.reshape(len(centred) * frames, -1).T
         flat -= (whiten @ mean)[:, None]
-        values[:, :, rows] = flat.reshape(-1, len(own), frames).swapaxes(1, 2)
+        values[:, :, rows] = flat.reshape(-1, len(centred), frames).swapaxes(1, 2)
     return values
 
 
@@ -286,12 +286,12 @@ def predicted_poses(
     logs: log increments (N, knots) of their warps. travels: (N, 3) of cycles.
     """
     steps = np.tile(UNIFORM_SHARES, (len(numbers), 1))
-    _, place = timing.numpy(np.zeros((len(steps), 1)), logs, steps)
-    share = place / (timing.frames - 1)
+    _, frames = timing.numpy(np.zeros((len(steps), 1)), logs, steps)
+    share = frames / (timing.frames - 1)
     pairs = zip(numbers, share, strict=True)
-    found = np.stack([time_alignment.interpolate(*pair) for pair in pairs])
-    rotations, path = tensor.chart.poses(found)
+    resampled = np.stack([time_alignment.interpolate(*pair) for pair in pairs])
+    rotations, path = tensor.chart.poses(resampled)
     if travels is not None:
         rotations, path = travel.put_back(rotations, path, travels, share)
-    own = curves.clamp(tensor.curves, found[..., tensor.chart.curve_numbers])
-    return UniformPoses(rotations, path, own)
+    values = curves.clamp(tensor.curves, resampled[..., tensor.chart.curve_numbers])
+    return UniformPoses(rotations, path, values)

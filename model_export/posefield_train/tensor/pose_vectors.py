@@ -60,14 +60,14 @@ class PoseChart:
 
         Raises TrainingError for a rotation beyond the chart's limit.
         """
-        found = np.empty((*root_path.shape[:2], self.joint_numbers.stop))
-        found[..., :3] = root_path
+        numbers = np.empty((*root_path.shape[:2], self.joint_numbers.stop))
+        numbers[..., :3] = root_path
         for rows in canonical.clip_blocks(len(rotations)):
             vectors = _unwrap(self.rotation_vectors(rotations[rows]))
             self._check_angles(vectors)
-            own = CHARTS[self.chart].numbers(vectors)
-            found[rows, :, self.joint_numbers] = own.reshape(*own.shape[:2], -1)
-        return found
+            joint_values = CHARTS[self.chart].numbers(vectors)
+            numbers[rows, :, self.joint_numbers] = joint_values.reshape(*joint_values.shape[:2], -1)
+        return numbers
 
     def poses(
         self, numbers: Annotated[Floats, "*poses dof"]
@@ -98,9 +98,9 @@ class PoseChart:
     def far_joints(self, rotations: ClipRotations) -> list[Finding]:
         """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
         return [
-            own
+            finding
             for rows in canonical.clip_blocks(len(rotations))
-            for own in _far_joints(self.rotation_vectors(rotations[rows]), rows.start)
+            for finding in _far_joints(self.rotation_vectors(rotations[rows]), rows.start)
         ]
 
     def _check_angles(self, vectors: ClipPositions) -> None:
@@ -108,10 +108,10 @@ class PoseChart:
         largest = np.linalg.norm(vectors, axis=-1).max(axis=(0, 1))
         joint = int(largest.argmax())
         if largest[joint] > limit:
-            found, most = np.degrees([largest[joint], limit])
+            angle, allowed = np.degrees([largest[joint], limit])
             raise TrainingError(
-                f"joint {joint} turns {found:.0f} degrees from its mean rotation, expected at most "
-                f"{most:.0f} in the {self.chart} chart of this model"
+                f"joint {joint} turns {angle:.0f} degrees from its mean rotation, expected at most "
+                f"{allowed:.0f} in the {self.chart} chart of this model"
             )
 
     def rotation_vectors(self, rotations: ClipRotations) -> ClipPositions:

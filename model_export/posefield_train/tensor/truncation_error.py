@@ -50,35 +50,35 @@ class EventFrame:
 class TruncationReference:
     """Joint positions of the full tensor, for measuring truncations.
 
-    whole: joint positions (N, T, J, 3), m, without a cycle's travel, and points of the curves
+    points: joint positions (N, T, J, 3), m, without a cycle's travel, and points of the curves
     behind them. offsets: (N, J, 3), m. weights: of joints and curves.
     """
 
-    own_tensor: MotionTensor
+    tensor: MotionTensor
     parents: tuple[int, ...]
     offsets: ClipBones
     weights: Annotated[Floats, "points"]
     event_frame: EventFrame | None
-    whole: Annotated[Floats, "clips frames points 3"]
+    points: Annotated[Floats, "clips frames points 3"]
 
     def evaluate(self, reduced: TuckerTensor) -> TruncationErrors:
         """Return the fidelity of a truncation of this tensor."""
-        found = self._distances(reduced)
-        return TruncationErrors(found.rms, found.p99, found.max, found.effector)
+        distances = self._distances(reduced)
+        return TruncationErrors(distances.rms, distances.p99, distances.max, distances.effector)
 
     def strain(self, reduced: TuckerTensor, budgets: Mapping[str, float]) -> float:
         """Return the largest ratio of an error of a truncation to its budget.
 
         budgets: m, by name in `TruncationErrors`.
         """
-        found = self._distances(reduced)
-        return max(getattr(found, name) / budget for name, budget in budgets.items())
+        distances = self._distances(reduced)
+        return max(getattr(distances, name) / budget for name, budget in budgets.items())
 
     def _distances(self, reduced: TuckerTensor) -> "_Distances":
-        parts = [
-            self._block_distances(reduced, rows) for rows in canonical.clip_blocks(len(self.whole))
+        blocks = [
+            self._block_distances(reduced, rows) for rows in canonical.clip_blocks(len(self.points))
         ]
-        distances = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        distances = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
         return _Distances(distances, self.weights, self.event_frame)
 
     def _block_distances(
@@ -87,10 +87,10 @@ class TruncationReference:
         """Return the distances of some clips: all at once would take as much memory as reading."""
         first, times, samples = reduced.bases
         # Restore pose vectors directly: the whitened tensor would be as large again.
-        bases = self.own_tensor.unwhiten @ first, times, samples[rows]
+        bases = self.tensor.unwhiten @ first, times, samples[rows]
         restored = TuckerTensor(reduced.core, bases).restored()
-        gaps = _joint_positions(self.own_tensor, restored, self.parents, self.offsets[rows])
-        gaps -= self.whole[rows]
+        gaps = _joint_positions(self.tensor, restored, self.parents, self.offsets[rows])
+        gaps -= self.points[rows]
         return np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
 
 
@@ -133,39 +133,41 @@ def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> JointWeights:
 
 
 def truncation_reference(
-    recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor
+    recipe: Recipe, examples: Sequence[Example], tensor: MotionTensor
 ) -> TruncationReference:
-    """Return a judge of the truncations of a recipe's tensor.
+    """Return the reference for truncations of a recipe's tensor.
 
     Raises TrainingError if the skeleton lacks the event's joint.
     """
     parents = examples[0].clip.skeleton.parents
-    weights = np.append(joint_weights(recipe, examples), np.ones(len(own_tensor.curves)))
+    weights = np.append(joint_weights(recipe, examples), np.ones(len(tensor.curves)))
     offsets = np.stack([example.offsets for example in examples])
-    whole = _all_positions(own_tensor, parents, offsets)
+    points = _all_positions(tensor, parents, offsets)
     return TruncationReference(
-        own_tensor, parents, offsets, weights, event_frame(recipe, examples), whole
+        tensor, parents, offsets, weights, event_frame(recipe, examples), points
     )
 
 
 def _all_positions(
-    own_tensor: MotionTensor, parents: tuple[int, ...], offsets: ClipBones
+    tensor: MotionTensor, parents: tuple[int, ...], offsets: ClipBones
 ) -> Annotated[Floats, "clips frames points 3"]:
     """Return the joint positions (N, T, J, 3), m, of a tensor, block by block of clips."""
-    values = own_tensor.values
+    values = tensor.values
     blocks = canonical.clip_blocks(values.shape[2])
-    found = (positions(own_tensor, values[:, :, own], parents, offsets[own]) for own in blocks)
+    block_points = (
+        positions(tensor, values[:, :, rows], parents, offsets[rows]) for rows in blocks
+    )
     if len(blocks) == 1:
-        return next(found)
-    shape = (values.shape[2], values.shape[1], len(parents) + len(own_tensor.curves), 3)
-    whole = np.empty(shape)
-    for own, block in zip(blocks, found, strict=True):
-        whole[own] = block
-    return whole
+        return next(block_points)
+    shape = (values.shape[2], values.shape[1], len(parents) + len(tensor.curves), 3)
+    points = np.empty(shape)
+    for rows, block in zip(blocks, block_points, strict=True):
+        points[rows] = block
+    return points
 
 
 def positions(
-    own_tensor: MotionTensor,
+    tensor: MotionTensor,
     values: Annotated[Floats, "varying frames clips"],
     parents: tuple[int, ...],
     offsets: ClipBones,
@@ -174,13 +176,11 @@ def positions(
 
     Points of the curves follow those of the joints. offsets: bone offsets (N, J, 3), m.
     """
-    return _joint_positions(
-        own_tensor, hosvd.mode_dot(values, own_tensor.unwhiten, 0), parents, offsets
-    )
+    return _joint_positions(tensor, hosvd.mode_dot(values, tensor.unwhiten, 0), parents, offsets)
 
 
 def _joint_positions(
-    own_tensor: MotionTensor,
+    tensor: MotionTensor,
     centred: Annotated[Floats, "dof frames clips"],
     parents: tuple[int, ...],
     offsets: ClipBones,
@@ -190,20 +190,20 @@ def _joint_positions(
     Points of the curves follow those of the joints.
     """
     _, frames, samples = centred.shape
-    chart, joints = own_tensor.chart, len(parents)
-    places = np.zeros((joints + len(own_tensor.curves), 3, frames, samples))
-    units = distances(own_tensor.curves)[:, None, None]
+    chart, joints = tensor.chart, len(parents)
+    points = np.zeros((joints + len(tensor.curves), 3, frames, samples))
+    units = distances(tensor.curves)[:, None, None]
     bones = offsets.transpose(1, 2, 0)[1:, :, None]
     step = max(1, skeleton.POSES_PER_BLOCK // samples)
     for start in range(0, frames, step):
         block = slice(start, start + step)
-        numbers = own_tensor.mean[:, None, None] + centred[:, block]
+        numbers = tensor.mean[:, None, None] + centred[:, block]
         rotations = chart.rotation_planes(numbers[chart.joint_numbers])
-        places[:joints, :, block] = skeleton.position_planes(
+        points[:joints, :, block] = skeleton.position_planes(
             parents, rotations, [numbers[:3], *bones]
         )
-        places[joints:, 0, block] = units * numbers[chart.curve_numbers]
-    return places.transpose(3, 2, 0, 1)
+        points[joints:, 0, block] = units * numbers[chart.curve_numbers]
+    return points.transpose(3, 2, 0, 1)
 
 
 def event_frame(recipe: Recipe, examples: Sequence[Example]) -> EventFrame | None:
@@ -223,10 +223,10 @@ def event_frame(recipe: Recipe, examples: Sequence[Example]) -> EventFrame | Non
 
 def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
     """Return the recipe's event: its joint and share of canonical time; None without event."""
-    found = event_frame(recipe, examples)
-    if found is None or recipe.event is None:
+    frame = event_frame(recipe, examples)
+    if frame is None or recipe.event is None:
         return None
-    return Event(found.joint, round(_event_share(recipe, recipe.event.at, examples), 4))
+    return Event(frame.joint, round(_event_share(recipe, recipe.event.at, examples), 4))
 
 
 def _event_share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:
