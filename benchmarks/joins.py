@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from rows import Row, record, table
 
+from posefield.common import frame_groups
 from posefield.feet import body_plans, foot_placement, footsteps, stance_rows
 from posefield.feet.footsteps import Character, SampledMotion
-from posefield.feet.stances import FootPath
 from posefield.motion import contact_detection
 from posefield.motion.clip import Clip
 from posefield.motion.contact_detection import FootContact
@@ -115,9 +115,9 @@ def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
     chosen = footsteps.choose_limbs(clip.skeleton.parents, bones, joints, ()).character
     known = []
     for foot, joint in enumerate(joints):
-        path = FootPath(paths[::every, foot], RATE)
-        down = stance_rows.from_probabilities([path], contacts[:, [foot]].astype(float))[0]
-        known.append(stance_rows.statistics(joint, path, down))
+        row = frame_groups.one_row(len(contacts), RATE)
+        down = stance_rows.from_probabilities(contacts[:, foot].astype(float), row).mask(row)
+        known.append(stance_rows.statistics(joint, paths[::every, foot, 1], RATE, down))
     passage = Passage(
         clip.rotations[::every],
         clip.root_path[::every],

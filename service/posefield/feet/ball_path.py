@@ -10,23 +10,24 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.frame_groups import FrameGroups
-from posefield.common.units import UP, Floats, Indices, RootPath
+from posefield.common.units import UP, Floats, Frames, Indices, RootPath
 from posefield.feet import stance_rows
 from posefield.feet.smooth_change import smooth_change
-from posefield.feet.stance_rows import FootRows, Mask, PerRun, Runs
-from posefield.feet.stances import (
-    FULL_STEP,
-    LEAST_LIFT,
-    UNEVEN,
-    Interval,
-    highest_lift,
-    lift_shares,
-)
+from posefield.feet.stance_rows import UNEVEN, FootRows, Interval, Mask, PerRun, Runs
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 
 # A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
 HOLD = 0.05
+# Step from which on a swing is lifted to the full clearance, m.
+FULL_STEP = 0.1
+# A foot leaves the floor, and comes back to it, over this time, s: the knee of a straight leg moves
+# several times as fast as its foot is lifted. The exponent of the lift between both.
+RISE, LIFT_EXPONENT = 0.09, 0.2
+# A foot in the middle of a full step is at least this high above its place, m.
+LEAST_LIFT = 0.025
+# Mean acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
+LIFT_ACCELERATION = 12.0
 
 
 @dataclass(frozen=True)
@@ -89,11 +90,11 @@ def lifts(
     first, last = (lowest[rows.flat(swings.rows, end)] for end in ends)
     begin, end = (stance_rows.places(feet, floor, swings.rows, edge) for edge in ends)
     least = feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
-    highest = highest_lift(swings.lengths / rows.rates[swings.rows])
+    highest = _highest_lift(swings.lengths / rows.rates[swings.rows])
     least = np.where(swings.inner(rows), np.minimum(least, highest), least)
     least = np.where(np.minimum(first, last) < -UNEVEN, 0.0, least)
     share, whole = _shares(swings, feet)
-    rise = lift_shares(share, whole[run] / rows.rates[swings.rows[run]])
+    rise = _lift_shares(share, whole[run] / rows.rates[swings.rows[run]])
     lifted = np.maximum(own.largest(heights[flat]) - feet.height[swings.rows], 0.0)
     extra = np.maximum(least * own.largest(rise) - lifted, 0.0)
     added[flat] = extra[run] * rise
@@ -196,3 +197,19 @@ def _led_distances(found: Runs, feet: FootRows, led: Mask) -> tuple[Indices, Ind
         np.where((before >= 0) & (last >= start), begins - 1 - last, far),
         np.where((after < len(frames)) & (first < stop), first - ends, far),
     )
+
+
+def _highest_lift(seconds: float | Floats) -> float | Floats:
+    """Return how high a foot is lifted at most in a swing of a duration, m: by a parabola."""
+    return LIFT_ACCELERATION * seconds**2 / 8.0
+
+
+def _lift_shares(share: Frames, seconds: float | Frames) -> Frames:
+    """Return the shares (S,) of a lift at shares of swings that last some seconds.
+
+    The foot leaves the floor, and comes to it, at rest.
+    """
+    quickest = np.maximum(seconds / RISE, 2.0)
+    soon = np.minimum(np.minimum(share, 1.0 - share) * quickest, 1.0)
+    found: Frames = np.sin(np.pi * share) ** LIFT_EXPONENT * soon**2 * (3.0 - 2.0 * soon)
+    return found

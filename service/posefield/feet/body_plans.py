@@ -5,7 +5,7 @@ of a motion depends on the others: sums are over its own frames, and products ar
 element.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -18,8 +18,7 @@ from posefield.feet import ball_path, footsteps, limbs, stance_rows, two_bone
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.footsteps import Character, FeetPlan, Led, PlanRequest, SampledMotion
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import FootRows, Runs
-from posefield.feet.stances import UNEVEN, Cycle, FootPath, Interval
+from posefield.feet.stance_rows import UNEVEN, Cycle, FootRows, Interval, Runs
 from posefield.locomotion import floor_plane
 from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor, Floors
@@ -72,32 +71,37 @@ class _Bodies:
     @classmethod
     def of(cls, requests: Sequence[PlanRequest]) -> "_Bodies":
         """Return the bodies of requests of one kind."""
-        character, motions = requests[0].character, [own.motion for own in requests]
-        groups = frame_groups.of_lengths([own.roots for own in motions])
+        character, motions = requests[0].character, [request.motion for request in requests]
+        groups = frame_groups.of_lengths([motion.roots for motion in motions])
         rotations, roots = (
-            np.concatenate([getattr(own, name) for own in motions])
+            np.concatenate([getattr(motion, name) for motion in motions])
             for name in ("rotations", "roots")
         )
-        bones = np.stack([own.character.bones for own in requests])
+        bones = np.stack([request.character.bones for request in requests])
         poses = limbs.evaluate_motions(
             character.parents, bones, character.limbs, rotations, roots, groups
         )
         rows = FrameRows(
             groups,
-            np.array([own.rate for own in motions], float),
-            np.array([own.cycle is not None for own in motions]),
+            np.array([motion.rate for motion in motions], float),
+            np.array([motion.cycle is not None for motion in motions]),
         )
         fixed, raised = (
-            np.array([getattr(own.character, name) for own in requests])
+            np.array([getattr(request.character, name) for request in requests])
             for name in ("fixed", "raised")
         )
-        room = footsteps.joined([own.leads for own in requests]).room(poses, character.limbs)
-        return cls(requests, poses, roots, rows, fixed, raised, room)
+        leads = footsteps.joined([request.leads for request in requests])
+        return cls(requests, poses, roots, rows, fixed, raised, leads.room(poses, character.limbs))
 
     @property
     def legs(self) -> tuple[Limb, ...]:
         """Return the legs of all characters."""
         return self.requests[0].character.legs
+
+    @property
+    def floors(self) -> Floors:
+        """Return the floors of the motions."""
+        return Floors([request.floor for request in self.requests], self.rows.groups)
 
     def plans(self) -> list[FeetPlan]:
         """Return the plans of all motions."""
@@ -106,41 +110,84 @@ class _Bodies:
         grounded = self._grounded(above.reshape(len(self.legs), -1))
         # Characters stand as high as their feet do: the ground first.
         lowered = np.tile(grounded, len(self.legs))
-        height = feet.height + np.clip(above - lowered, -UNEVEN, UNEVEN)
-        heights = feet.heights - lowered[feet.rows.groups.group]
-        feet = replace(feet, heights=heights, height=height)
-        found = self._led_stances(stance_rows.discipline(down, feet), feet)
-        body = _GroundedBodies(self, feet, grounded, self._follow(grounded))
-        return body.plans(found)
+        feet = replace(
+            feet,
+            heights=feet.heights - lowered[feet.rows.groups.group],
+            height=feet.height + np.clip(above - lowered, -UNEVEN, UNEVEN),
+        )
+        stances = self._led_stances(stance_rows.discipline(down, feet), feet)
+        followed = self._follow(grounded)
+        reachable, paths, lowered = self._reachable_steps(feet, grounded, followed, stances)
+        before, after = (runs.by_row(len(feet.height)) for runs in (stances, reachable))
+        return list(self._split(paths, before, after, grounded, followed, lowered))
+
+    def _split(
+        self,
+        paths: FootPaths,
+        before: Sequence[tuple[Interval, ...]],
+        after: Sequence[tuple[Interval, ...]],
+        grounded: PerMotion,
+        followed: Frames,
+        lowered: Frames,
+    ) -> Iterator[FeetPlan]:
+        """Yield the plan of each motion. before, after: stances of the rows, and those in reach."""
+        groups = self.rows.groups
+        by_leg = paths.reshape(len(self.legs), len(lowered), 3)
+        changes = np.empty(by_leg.shape)
+        for change, path, leg in zip(changes, by_leg, self.legs, strict=True):
+            change[:] = path - self.poses.position(leg.tip)
+        whole = followed + lowered
+        for motion, (request, poses) in enumerate(
+            zip(self.requests, self.poses.split(), strict=True)
+        ):
+            frames = slice(groups.starts[motion], groups.starts[motion] + groups.counts[motion])
+            stances = after[motion :: len(groups)]
+            yield FeetPlan(
+                request.character,
+                request.motion.rate,
+                request.motion.cycle,
+                tuple(
+                    Footsteps(path, row, path[[stance.begin for stance in row]].reshape(-1, 3))
+                    for path, row in zip(by_leg[:, frames], stances, strict=True)
+                ),
+                changes[:, frames],
+                whole[frames],
+                followed[frames],
+                float(grounded[motion]),
+                poses,
+                request.leads,
+                request.floor,
+                _unreached(request.floor, before[motion :: len(groups)], stances),
+            )
 
     def _feet(self) -> tuple[FootRows, Runs]:
         """Return the feet as predicted, and their contacts; rows are leg after leg."""
-        legs, motions = len(self.legs), [own.motion for own in self.requests]
+        legs, motions = len(self.legs), [request.motion for request in self.requests]
         groups = self.rows.groups.times(legs)
         rows = FrameRows(groups, np.tile(self.rows.rates, legs), np.tile(self.rows.cyclic, legs))
-        places = [self.poses.position(leg.tip) for leg in self.legs]
-        down, known = self._contacts(places, rows)
-        height, swing, longest, clearance = (
-            np.array([getattr(own, name) for own in known], float)
+        paths = [self.poses.position(leg.tip) for leg in self.legs]
+        points = np.concatenate([np.zeros((0, 3)), *paths])
+        down, contacts = self._contacts(points, rows)
+        height, swing, longest_swing, clearance = (
+            np.array([getattr(contact, name) for contact in contacts], float)
             for name in ("height", "swing", "longest_swing", "clearance")
         )
         walking = [
-            np.zeros(len(own.roots), bool) if own.walking is None else own.walking
-            for own in motions
+            np.zeros(len(motion.roots), bool) if motion.walking is None else motion.walking
+            for motion in motions
         ]
-        cycles = [own.cycle or Cycle(0.0, 0.0) for own in motions]
+        cycles = [motion.cycle or Cycle(0.0, 0.0) for motion in motions]
         ways, factors = (
-            np.tile(np.array([getattr(own, name) for own in cycles], complex), legs)
+            np.tile(np.array([getattr(cycle, name) for cycle in cycles], complex), legs)
             for name in ("way", "factor")
         )
-        whole = np.concatenate([np.zeros((0, 3)), *places])
         feet = FootRows(
             rows,
-            floor_plane.project(whole),
-            whole @ UP,
+            floor_plane.project(points),
+            points @ UP,
             height,
             swing,
-            longest,
+            longest_swing,
             clearance,
             ways,
             factors,
@@ -148,24 +195,25 @@ class _Bodies:
         )
         return feet, down
 
-    def _contacts(
-        self, places: Sequence[Annotated[Floats, "frames 3"]], rows: FrameRows
-    ) -> tuple[Runs, list[FootContact]]:
-        likely = [own.likely for own in self.requests if own.likely is not None]
+    def _contacts(self, points: FootPaths, rows: FrameRows) -> tuple[Runs, list[FootContact]]:
+        """Return the contacts of feet (K N, 3), m, and their statistics (K M)."""
+        likely = [request.likely for request in self.requests if request.likely is not None]
         if likely:
-            every = np.concatenate(likely).T.ravel()
-            known = [own.contacts[leg] for leg in range(len(places)) for own in self.requests]
-            return stance_rows.from_probabilities(every, rows), known
-        paths = [
-            FootPath(path, own.motion.rate, own.motion.cycle, own.motion.walking)
-            for leg in places
-            for path, own in zip(self.rows.groups.split(leg), self.requests, strict=True)
+            contacts = [
+                request.contacts[leg] for leg in range(len(self.legs)) for request in self.requests
+            ]
+            return stance_rows.from_probabilities(np.concatenate(likely).T.ravel(), rows), contacts
+        motions = [request.motion for _ in self.legs for request in self.requests]
+        paths = rows.groups.split(points)
+        down = [
+            stance_rows.detect(path, motion.rate, motion.cycle)
+            for path, motion in zip(paths, motions, strict=True)
         ]
-        down = stance_rows.from_motion(paths)
-        known = [
-            stance_rows.statistics(0, path, own) for path, own in zip(paths, down, strict=True)
+        contacts = [
+            stance_rows.statistics(0, path @ UP, motion.rate, standing, motion.cycle is not None)
+            for path, motion, standing in zip(paths, motions, down, strict=True)
         ]
-        return stance_rows.from_intervals(down), known
+        return stance_rows.runs(np.concatenate([np.zeros(0, bool), *down]), rows), contacts
 
     def _grounded(self, above: Annotated[Floats, "feet motions"]) -> PerMotion:
         """Return how far characters are lowered to the ground (M,), m: they float, or sink.
@@ -174,157 +222,97 @@ class _Bodies:
         """
         if not len(above):
             return np.zeros(len(self.requests))
-        mean = above.mean(axis=0)
-        up, down = self.room
-        wanted = np.sign(mean) * np.maximum(np.abs(mean) - UNEVEN, 0.0)
-        groups = self.rows.groups
-        lowered = np.clip(wanted, -groups.smallest(up), groups.smallest(down))
+        mean, (up, down), groups = above.mean(axis=0), self.room, self.rows.groups
+        lowered = np.sign(mean) * np.maximum(np.abs(mean) - UNEVEN, 0.0)
+        lowered = np.clip(lowered, -groups.smallest(up), groups.smallest(down))
         return np.where(self.fixed, 0.0, lowered)
 
-    def _led_stances(self, found: Runs, feet: FootRows) -> Runs:
+    def _led_stances(self, stances: Runs, feet: FootRows) -> Runs:
         """Return the stances that agree with where the feet are led."""
-        led = [own.leads.feet for own in self.requests]
-        if not any(own.any() for own in led):
-            return found
-        paths = feet.paths()
-        intervals: list[Sequence[Interval]] = list(found.by_row(len(paths)))
-        for row, path in enumerate(paths):
-            motion, leg = row % len(led), row // len(led)
-            goal = footsteps.goals(path, led[motion][leg])
-            intervals[row] = footsteps.lead_stances(intervals[row], path, feet.contact(row), goal)
-        return stance_rows.from_intervals(intervals)
+        leads = [request.leads.feet for request in self.requests]
+        if not any(led.any() for led in leads):
+            return stances
+        down, groups = stances.mask(feet.rows), feet.rows.groups
+        points = groups.split(feet.positions)
+        for row, standing in enumerate(groups.split(down)):
+            exact = np.flatnonzero(leads[row % len(leads)][row // len(leads)])
+            rate, contact = float(feet.rows.rates[row]), feet.contact(row)
+            footsteps.lead_stances(standing, points[row], rate, contact, exact)
+        led = stance_rows.runs(down, feet.rows)
+        return led.select(
+            ~led.inner(feet.rows) | (led.lengths >= stance_rows.shortest(feet.rows)[led.rows])
+        )
 
     def _follow(self, grounded: PerMotion) -> Frames:
         """Return how much the roots are lowered so that they follow the floor (N,), m.
 
         Limbs that keep their ends must reach them; the legs make up for the rest.
         """
-        wanted = grounded[self.rows.groups.group] - self.floors.heights(self.roots)
+        lowered = grounded[self.rows.groups.group] - self.floors.heights(self.roots)
         up, down = self.room
-        high = two_bone.cover(np.maximum(-wanted - up, 0.0), self.rows)
-        low = two_bone.cover(np.maximum(wanted - down, 0.0), self.rows)
+        high = two_bone.cover(np.maximum(-lowered - up, 0.0), self.rows)
+        low = two_bone.cover(np.maximum(lowered - down, 0.0), self.rows)
         stays = (self.fixed & ~self.raised)[self.rows.groups.group]
-        return np.where(stays, 0.0, wanted + high - low)
+        return np.where(stays, 0.0, lowered + high - low)
 
-    @property
-    def floors(self) -> Floors:
-        """Return the floors of the motions."""
-        return Floors([own.floor for own in self.requests], self.rows.groups)
-
-
-@dataclass(frozen=True)
-class _GroundedBodies:
-    """Characters on floors.
-
-    feet: predicted, on the ground. grounded: how much they are lowered to the level on which they
-    were captured (M,), m. followed: the same, and how their roots follow the floors (N,), m.
-    """
-
-    bodies: _Bodies
-    feet: FootRows
-    grounded: PerMotion
-    followed: Frames
-
-    def plans(self, found: Runs) -> list[FeetPlan]:
-        """Return the plans of all motions, whose feet stand in the runs if legs reach."""
-        legs, groups = len(self.bodies.legs), self.bodies.rows.groups
-        kept, paths, lowered = self._reachable_steps(found)
-        before, after = found.by_row(legs * len(groups)), kept.by_row(legs * len(groups))
-        every = paths.reshape(legs, len(lowered), 3)
-        split = [groups.split(own) for own in every]
-        predicted = [self.bodies.poses.position(leg.tip) for leg in self.bodies.legs]
-        changes = np.array([own - leg for own, leg in zip(every, predicted, strict=True)])
-        changes = changes.reshape(every.shape)
-        whole, followed = (groups.split(own) for own in (self.followed + lowered, self.followed))
-        plans = []
-        for motion, (own, poses) in enumerate(
-            zip(self.bodies.requests, self.bodies.poses.split(), strict=True)
-        ):
-            begin = groups.starts[motion]
-            stances = after[motion :: len(groups)]
-            plans.append(
-                FeetPlan(
-                    own.character,
-                    own.motion.rate,
-                    own.motion.cycle,
-                    tuple(
-                        Footsteps(
-                            leg[motion],
-                            found,
-                            leg[motion][[stance.begin for stance in found]].reshape(-1, 3),
-                        )
-                        for leg, found in zip(split, stances, strict=True)
-                    ),
-                    changes[:, begin : begin + groups.counts[motion]],
-                    whole[motion],
-                    followed[motion],
-                    float(self.grounded[motion]),
-                    poses,
-                    own.leads,
-                    own.floor,
-                    _unreached(own.floor, before[motion :: len(groups)], stances),
-                )
-            )
-        return plans
-
-    def _reachable_steps(self, found: Runs) -> tuple[Runs, FootPaths, Frames]:
+    def _reachable_steps(
+        self, feet: FootRows, grounded: PerMotion, followed: Frames, stances: Runs
+    ) -> tuple[Runs, FootPaths, Frames]:
         """Return the stances, the paths of feet (K N, 3), m, and how far pelvises are lowered, m.
 
-        Stances whose leg does not reach are shortened. The last are (N,).
+        feet: predicted, on the ground. grounded, followed: how much characters are lowered to the
+        level on which they were captured (M,), m, and with how their roots follow the floors (N,),
+        m. Stances whose leg does not reach are shortened. Pelvises are lowered (N,) beyond that.
         """
-        bodies, feet, legs = self.bodies, self.feet, len(self.bodies.legs)
-        slopes = np.array([own.floor.slope for own in bodies.requests])
-        deepest = (two_bone.MOST + STEP * slopes)[bodies.rows.groups.group]
-        most = np.clip(bodies.room[1] - self.followed, 0.0, deepest)
-        most[bodies.fixed[bodies.rows.groups.group]] = 0.0
-        goal = self._goal()
-        paths = ball_path.plan_paths(feet, found, goal)
-        needs = self._needs(paths)
+        legs, groups = len(self.legs), self.rows.groups
+        slopes = np.array([request.floor.slope for request in self.requests])
+        deepest = (two_bone.MOST + STEP * slopes)[groups.group]
+        limit = np.clip(self.room[1] - followed, 0.0, deepest)
+        limit[self.fixed[groups.group]] = 0.0
+        led = footsteps.joined([request.leads for request in self.requests]).feet.ravel()
+        goal = np.where(led[:, None], feet.positions, np.nan)
+        paths = ball_path.plan_paths(feet, stances, goal)
+        needs = self._needs(feet, paths, grounded, followed)
         for _ in range(ROUNDS):
             cancellation.check()
-            shorter = stance_rows.shortened(
-                found, two_bone.beyond(needs, np.tile(most, legs)), feet.rows
-            )
-            rows = stance_rows.changed_rows(found, shorter, feet.rows)
+            beyond = two_bone.beyond(needs, np.tile(limit, legs))
+            shorter = stance_rows.shortened(stances, beyond, feet.rows)
+            rows = stance_rows.changed_rows(stances, shorter, feet.rows)
             if not len(rows):
                 break
-            own = np.isin(feet.rows.groups.group, rows)
-            paths[own] = ball_path.plan_paths(feet.select(rows), shorter.of_rows(rows), goal[own])
-            needs, found = self._needs(paths), shorter
-        lowered = two_bone.lower(list(needs.reshape(legs, len(most))), most, bodies.rows)
-        return found, self._on_floors(paths), lowered
-
-    def _goal(self) -> FootPaths:
-        """Return where feet are led (K N, 3), m, as of `footsteps.goals`."""
-        led = footsteps.joined([own.leads for own in self.bodies.requests]).feet.ravel()
-        return np.where(led[:, None], self.feet.positions, np.nan)
+            changed = np.isin(feet.rows.groups.group, rows)
+            paths[changed] = ball_path.plan_paths(
+                feet.select(rows), shorter.of_rows(rows), goal[changed]
+            )
+            needs, stances = self._needs(feet, paths, grounded, followed), shorter
+        lowered = two_bone.lower(list(needs.reshape(legs, len(limit))), limit, self.rows)
+        return stances, self._on_floors(paths), lowered
 
     def _on_floors(self, paths: FootPaths) -> FootPaths:
         """Return paths of feet (K N, 3), m, on floors at height 0 on those of the motions."""
-        legs, floors = len(self.bodies.legs), self.bodies.floors
-        every = paths.reshape(legs, len(self.followed), 3)
-        heights = [floors.heights(own) for own in every]
+        by_leg = paths.reshape(len(self.legs), len(self.roots), 3)
+        heights = [self.floors.heights(path) for path in by_leg]
         return np.asarray(paths + np.concatenate([np.zeros(0), *heights])[:, None] * UP)
 
-    def _needs(self, paths: FootPaths) -> Annotated[Floats, "foot_frames"]:
+    def _needs(
+        self, feet: FootRows, paths: FootPaths, grounded: PerMotion, followed: Frames
+    ) -> Annotated[Floats, "foot_frames"]:
         """Return how much lower each leg needs the pelvis to be (K N,), m."""
-        poses, bodies = self.bodies.poses, self.bodies
-        moved = self._on_floors(paths) - self.feet.positions
-        sunk = self.grounded[bodies.rows.groups.group][:, None] * UP
+        changes = (self._on_floors(paths) - feet.positions).reshape(-1, *self.roots.shape)
+        sunk = grounded[self.rows.groups.group][:, None] * UP
         needs = [np.zeros(0)]
-        for leg, change in zip(bodies.legs, moved.reshape(-1, *bodies.roots.shape), strict=True):
-            target = poses.position(leg.lower) - sunk + change
-            arm = poses.position(leg.tip) - poses.position(leg.lower)
-            needs.append(
-                two_bone.need(poses, leg, target + (arm - bodies.floors.tilted(arm)), self.followed)
-            )
+        for leg, change in zip(self.legs, changes, strict=True):
+            ankle = self.poses.position(leg.lower)
+            arm = self.poses.position(leg.tip) - ankle
+            target = ankle - sunk + change + (arm - self.floors.tilted(arm))
+            needs.append(two_bone.need(self.poses, leg, target, followed))
         return np.concatenate(needs)
 
 
 def _unreached(
     floor: Floor, before: Sequence[tuple[Interval, ...]], after: Sequence[tuple[Interval, ...]]
 ) -> tuple[int, ...]:
-    """Return the legs, by place, that stood as predicted, but do not on a given floor."""
+    """Return the legs, by index, that stood as predicted, but do not on a given floor."""
     if floor == LEVEL_FLOOR:
         return ()
     pairs = zip(before, after, strict=True)

@@ -15,7 +15,7 @@ from posefield.common.units import UP, Floats, Frames, RootPath, Rotations
 from posefield.feet import limbs, two_bone
 from posefield.feet.footsteps import FeetPlan, evaluate_by_kind
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stances import Cycle
+from posefield.feet.stance_rows import Cycle
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton

@@ -11,11 +11,20 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
-from posefield.common.units import Bones, Booleans, Floats, Frames, RootPath, Rotations
-from posefield.feet import limbs, stances, two_bone
+from posefield.common.units import (
+    UP,
+    Bones,
+    Booleans,
+    Floats,
+    Frames,
+    Indices,
+    RootPath,
+    Rotations,
+)
+from posefield.feet import limbs, two_bone
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stances import LIFTED, SHORTEST_CONTACT, UNEVEN, Cycle, FootPath, Interval
+from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle
 from posefield.motion import skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor
@@ -81,50 +90,43 @@ def always(feet: int, limbs: int, frames: int) -> Led:
     return Led(np.zeros((feet, frames), bool), np.ones((limbs, frames)), np.zeros(frames, bool))
 
 
-def goals(path: FootPath, led: Annotated[Booleans, "frames"]) -> RootPath:
-    """Return where a foot is led (F, 3), m; not a number in other frames."""
-    return np.where(led[:, None], path.positions, np.nan)
-
-
 def lead_stances(
-    found: Sequence[Interval], path: FootPath, foot: FootContact, goal: RootPath
-) -> list[Interval]:
-    """Return the stances of a foot that agree with where it is led.
+    down: Annotated[Booleans, "frames"],
+    path: RootPath,
+    rate: float,
+    contact: FootContact,
+    exact: Annotated[Indices, "led"],
+) -> None:
+    """Change in which frames a foot stands (F,) so that they agree with where it is led.
 
-    goal: (F, 3), m, as of `goals`. Where the foot is led to a point above or below the floor it
-    swings, from when it leaves the floor until it is there again, and for the time of half a
-    captured swing before and after the point at least. Between two points on the floor it steps.
+    path: of the foot (F, 3), m. exact: frames in which the foot is led there. Where it is led to a
+    point above or below the floor it swings, from when it leaves the floor until it is there again,
+    and for the time of half a captured swing before and after the point at least. Between two
+    points on the floor it steps.
     """
-    exact = np.flatnonzero(~np.isnan(goal[:, 0]))
-    if not len(exact):
-        return list(found)
-    down = stances.mask(found, len(path))
-    for frame in exact[np.abs(goal[exact, 1] - foot.height) > UNEVEN].tolist():
-        swing = _swing_around(frame, path, foot)
-        down[swing.begin : swing.end] = False
-    for stance in stances.runs(down, False):
-        own = exact[(exact >= stance.begin) & (exact < stance.end)]
-        for last, frame in zip(own[:-1].tolist(), own[1:].tolist(), strict=True):
-            if np.linalg.norm(goal[frame] - goal[last]) > SAME_PLACE:
-                down[min(last + 1, frame - 1) : frame] = False
-    shortest = SHORTEST_CONTACT * path.rate
-    return [
-        own
-        for own in stances.runs(down, False)
-        if len(own) >= shortest or own.begin == 0 or own.end == len(path)
-    ]
+    heights = path @ UP
+    for frame in exact[np.abs(heights[exact] - contact.height) > UNEVEN].tolist():
+        begin, end = _swing_around(frame, heights, rate, contact)
+        down[begin:end] = False
+    standing = exact[down[exact]]
+    for last, frame in zip(standing[:-1].tolist(), standing[1:].tolist(), strict=True):
+        together = down[last:frame].all()
+        if together and np.linalg.norm(path[frame] - path[last]) > SAME_PLACE:
+            down[min(last + 1, frame - 1) : frame] = False
 
 
-def _swing_around(frame: int, path: FootPath, foot: FootContact) -> Interval:
-    """Return the frames around one in the air in which a foot swings."""
-    half = round(0.5 * foot.swing * path.rate)
-    begin, end = max(frame - half, 0), min(frame + half + 1, len(path))
-    high = path.heights >= foot.height + LIFTED
+def _swing_around(
+    frame: int, heights: Frames, rate: float, contact: FootContact
+) -> tuple[int, int]:
+    """Return the frames around one in the air in which a foot swings: first, and after the last."""
+    half, count = round(0.5 * contact.swing * rate), len(heights)
+    begin, end = max(frame - half, 0), min(frame + half + 1, count)
+    high = heights >= contact.height + LIFTED
     while begin > 0 and high[begin - 1 : frame].all():
         begin -= 1
-    while end < len(path) and high[frame : end + 1].all():
+    while end < count and high[frame : end + 1].all():
         end += 1
-    return Interval(begin, end)
+    return begin, end
 
 
 @dataclass(frozen=True)

@@ -11,25 +11,54 @@ from typing import Annotated
 
 import numpy as np
 
+from posefield.common import frame_groups
 from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import MICROMETRES, Booleans, Floats, Indices
-from posefield.feet import stances
-from posefield.feet.stances import (
-    LIFTED,
-    SHORTEST_CONTACT,
-    SHORTEST_GAP,
-    SHORTEST_STEP,
-    FootPath,
-    Interval,
-)
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import contact_detection
 from posefield.motion.contact_detection import CLEARANCE, LONG_SWING, FootContact
 
+# Contacts that are shorter are dropped, and gaps that are shorter are closed, s.
+SHORTEST_CONTACT = contact_detection.DEFAULT.shortest
+SHORTEST_GAP = contact_detection.DEFAULT.shortest_gap
+# A swing that goes less is none, m.
+SHORTEST_STEP = 0.03
+# A foot that is higher above the place where it stands is in the air whatever the plan says, m.
+LIFTED = contact_detection.DEFAULT.grown_height
+# A foot may stand this much higher or lower than captured feet do, m: soles differ.
+UNEVEN = 0.01
+
 Mask = Annotated[Booleans, "frames"]
 PerRow = Annotated[Floats, "rows"]
 PerRun = Annotated[Indices, "runs"]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Floor motion from the start of a cycle to its end.
+
+    way: displacement, m. turn: change of heading, rad.
+    """
+
+    way: complex
+    turn: float
+
+    @property
+    def factor(self) -> complex:
+        """Return the unit vector of the turn."""
+        return complex(np.exp(1j * self.turn))
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Frames `begin` to `end`, exclusive, of a stance or a swing; `end` may lie after a cycle."""
+
+    begin: int
+    end: int
+
+    def __len__(self) -> int:
+        return self.end - self.begin
 
 
 @dataclass(frozen=True)
@@ -117,13 +146,6 @@ class FootRows:
     def positions(self) -> Annotated[Floats, "frames 3"]:
         """Return the paths (N, 3), m."""
         return floor_plane.at_height(self.floor, self.heights)
-
-    def paths(self) -> list[FootPath]:
-        """Return the path of each row, of motions without cycles."""
-        parts = self.rows.groups.split(self.positions)
-        return [
-            FootPath(own, float(rate)) for own, rate in zip(parts, self.rows.rates, strict=True)
-        ]
 
     def contact(self, row: int) -> FootContact:
         """Return the statistics of one row's contacts."""
@@ -282,34 +304,31 @@ def from_probabilities(likely: Annotated[Floats, "frames"], rows: FrameRows) -> 
     return tidy(np.round(likely, DECIMALS) > STANDING, rows)
 
 
-def from_motion(paths: Sequence[FootPath]) -> list[list[Interval]]:
-    """Return the contacts of each foot, detected by its speed and height."""
-    return [stances.runs(detect(path), path.cycle is not None) for path in paths]
+def detect(path: Annotated[Floats, "frames 3"], rate: float, cycle: Cycle | None = None) -> Mask:
+    """Return whether a foot with a path (F, 3), m, is in contact, by its speed and height (F,)."""
+    if cycle is None:
+        return contact_detection.detect_contacts(path, rate, False)
+    floor, heights = floor_plane.project(path[:1]), path[:1, 1]
+    after = floor_plane.at_height(cycle.way + cycle.factor * floor, heights)
+    return contact_detection.detect_contacts(np.concatenate([path, after]), rate, True)[:-1]
 
 
-def detect(path: FootPath) -> Annotated[Booleans, "frames"]:
-    """Return whether the foot is in contact at each frame (F,)."""
-    if path.cycle is None:
-        return contact_detection.detect_contacts(path.positions, path.rate, False)
-    after = floor_plane.at_height(path.places([len(path)]), path.heights[:1])
-    whole = np.concatenate([path.positions, after])
-    return contact_detection.detect_contacts(whole, path.rate, True)[:-1]
+def statistics(
+    joint: int, heights: Annotated[Floats, "frames"], rate: float, down: Mask, cyclic: bool = False
+) -> FootContact:
+    """Return the statistics of a foot's contacts in one motion.
 
-
-def statistics(joint: int, path: FootPath, found: Sequence[Interval]) -> FootContact:
-    """Return the statistics of a foot's contacts in one motion."""
-    down, cyclic = stances.mask(found, len(path)), path.cycle is not None
-    heights = path.heights
+    heights: of the foot (F,), m. down: whether it stands (F,).
+    """
     height = float(np.median(heights[down])) if down.any() else float(heights.min())
-    swings = [
-        swing
-        for swing in stances.runs(~down, cyclic)
-        if cyclic or (swing.begin > 0 and swing.end < len(path))
-    ]
-    if not swings:
+    row = frame_groups.one_row(len(heights), rate, cyclic)
+    swings = runs(~down, row)
+    swings = swings.select(swings.inner(row))
+    if not len(swings.rows):
         return FootContact(joint, height, DEFAULT_SWING, DEFAULT_LONGEST, 0.0)
-    seconds = [len(swing) / path.rate for swing in swings]
-    lifts = [heights[np.arange(own.begin, own.end) % len(path)].max() - height for own in swings]
+    _, frames = swings.frames()
+    seconds = swings.lengths / rate
+    lifts = FrameGroups(swings.lengths).largest(heights[frames % len(heights)]) - height
     return FootContact(
         joint,
         height,

@@ -9,7 +9,6 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import Bones, Floats, Frames
 from posefield.feet import limbs, stance_rows
-from posefield.feet.stances import FootPath
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.motion import measures, quat, skeleton
@@ -145,8 +144,7 @@ def _contacts(
         if joint in known:
             found[:, foot] = likely[0][:, known[joint]]
         elif placed is not None:
-            path = FootPath(placed.position(joint), RATE)
-            found[:, foot] = stance_rows.detect(path)
+            found[:, foot] = stance_rows.detect(placed.position(joint), RATE)
     return found
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from posefield.common import frame_groups
 from posefield.common.units import UP, Booleans, Floats, Frames, Indices, RootPath, Rotations
-from posefield.feet import stance_rows, stances, two_bone
+from posefield.feet import stance_rows, two_bone
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stances import UNEVEN, FootPath, Interval
+from posefield.feet.stance_rows import UNEVEN, Interval
 from posefield.motion import quat, skeleton
 from posefield.question.results import StanceResult
 from posefield.retarget.role_map import SIDES, Body
@@ -44,8 +44,11 @@ class SourceFeet:
     @property
     def standing(self) -> Annotated[Booleans, "frames feet"]:
         """Return whether each foot stands in each frame (F, 2)."""
-        masks = [stances.mask(intervals, len(self.paths)) for intervals in self.stances]
-        return np.stack(masks, axis=1)
+        standing = np.zeros(self.paths.shape[:2], bool)
+        for foot, stances in enumerate(self.stances):
+            for stance in stances:
+                standing[stance.begin : stance.end, foot] = True
+        return standing
 
     @property
     def floors(self) -> Annotated[Floats, "frames feet"]:
@@ -83,20 +86,29 @@ def feet_of(
 ) -> SourceFeet:
     """Return the feet of a motion.
 
-    paths: of the joints that contact, in proportion to the rig. names: of these joints. told: their
-    stances; None to detect them.
+    paths: of the joints that contact, in proportion to the rig. names: of these joints.
+    stance_results: their stances; None to detect them.
     """
-    foot_paths = [FootPath(paths[:, foot], rate) for foot in range(2)]
-    if stance_results is None:
-        # A single pose has no speeds.
-        intervals = stance_rows.from_motion(foot_paths) if len(paths) > 1 else [[], []]
+    rows = frame_groups.FrameRows(
+        frame_groups.of_lengths([paths, paths]), np.full(2, rate), np.zeros(2, bool)
+    )
+    feet = [paths[:, foot] for foot in range(2)]
+    if stance_results is not None:
+        runs = stance_rows.from_intervals(
+            [_stances(stance_results, name, rate, len(paths)) for name in names]
+        )
     else:
-        intervals = [_stances(stance_results, name, rate, len(paths)) for name in names]
+        # A single pose has no speeds.
+        down = [
+            stance_rows.detect(foot, rate) if len(paths) > 1 else np.zeros(1, bool) for foot in feet
+        ]
+        runs = stance_rows.runs(np.concatenate(down), rows)
+    standing = rows.groups.split(runs.mask(rows))
     heights = [
-        stance_rows.statistics(foot, path, down).height
-        for foot, (path, down) in enumerate(zip(foot_paths, intervals, strict=True))
+        stance_rows.statistics(index, foot @ UP, rate, down).height
+        for index, (foot, down) in enumerate(zip(feet, standing, strict=True))
     ]
-    return SourceFeet(roles, paths, tuple(map(tuple, intervals)), np.array(heights))
+    return SourceFeet(roles, paths, tuple(runs.by_row(2)), np.array(heights))
 
 
 def _stances(

@@ -14,7 +14,7 @@ from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
-from posefield.feet.stances import Cycle
+from posefield.feet.stance_rows import Cycle
 from posefield.inference.onnx_runtime import CURVES
 from posefield.locomotion import stride
 from posefield.locomotion.stride import Strides

@@ -12,7 +12,7 @@ from posefield.constraints.targets import ConstraintSet
 from posefield.feet import body_plans, foot_placement, footsteps, limbs
 from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest, SampledMotion
 from posefield.feet.limbs import LimbPoses
-from posefield.feet.stances import Cycle
+from posefield.feet.stance_rows import Cycle
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides

@@ -1,14 +1,29 @@
 """Rows of feet for tests, and the functions of many feet for one foot."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from posefield.common.frame_groups import FrameRows, of_lengths
 from posefield.common.units import UP
 from posefield.feet import ball_path, smooth_change, stance_rows
 from posefield.feet.ball_path import Footsteps
-from posefield.feet.stance_rows import FootRows
-from posefield.feet.stances import Cycle, FootPath
+from posefield.feet.stance_rows import Cycle, FootRows, Interval
 from posefield.locomotion import floor_plane
+from posefield.motion import contact_detection
+
+
+@dataclass(frozen=True)
+class FootPath:
+    """Predicted path of one foot (F, 3), m, at a rate; whether its motion walks (F,)."""
+
+    positions: np.ndarray
+    rate: float
+    cycle: Cycle | None = None
+    walking: np.ndarray | None = None
+
+    def __len__(self):
+        return len(self.positions)
 
 
 def frame_rows(lengths, rate, cyclic=False):
@@ -59,3 +74,10 @@ def change_smoothly(path, held, rate, foot, cycle=None):
     whole = FootPath(floor_plane.at_height(path, np.zeros(len(path))), rate, cycle)
     feet = foot_rows([whole], foot)
     return smooth_change.smooth_change(feet, feet.floor, stance_rows.from_intervals([held]))
+
+
+def runs_alone(down, cyclic):
+    """Return the intervals of true frames of one row, in order."""
+    runs = contact_detection.runs(down, cyclic)
+    intervals = [Interval(int(run[0]), int(run[0]) + len(run)) for run in runs]
+    return sorted(intervals, key=lambda interval: interval.begin)

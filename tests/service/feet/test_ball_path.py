@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from few_feet import change_smoothly, foot_rows, plan_path
+from few_feet import FootPath, change_smoothly, foot_rows, plan_path
 
 from posefield.feet import ball_path, smooth_change, stance_rows
-from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.feet.stance_rows import Cycle, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.contact_detection import FootContact
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from few_feet import frame_rows
 
-from posefield.feet import body_plans, foot_placement, footsteps, limbs, stances, two_bone
+from posefield.feet import body_plans, foot_placement, footsteps, limbs, stance_rows, two_bone
 from posefield.feet.footsteps import Led, SampledMotion
-from posefield.feet.stances import Interval
+from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import Floor, at_height
@@ -108,9 +108,9 @@ def test_a_character_that_floats_is_moved_to_the_floor(floats):
     known = [contact(motion, foot) for foot in FEET]
     lifted = SampledMotion(motion.rotations, np.add(motion.roots, [0.0, floats, 0.0]), RATE)
     plan = body_plans.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
-    assert plan.grounded == pytest.approx(floats - np.sign(floats) * stances.UNEVEN)
+    assert plan.grounded == pytest.approx(floats - np.sign(floats) * stance_rows.UNEVEN)
     heights = feet_of(placed(lifted, plan))[..., 1]
-    assert np.abs(heights - known[0].height).max() <= stances.UNEVEN + 1e-9
+    assert np.abs(heights - known[0].height).max() <= stance_rows.UNEVEN + 1e-9
 
 
 FLOORS = [at_height(0.5), at_height(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]

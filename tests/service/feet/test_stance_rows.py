@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from few_feet import discipline, foot_rows, frame_rows
+from few_feet import FootPath, discipline, foot_rows, frame_rows, runs_alone
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from posefield.feet import stance_rows, stances
-from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.feet import stance_rows
+from posefield.feet.stance_rows import Cycle, Interval
 from posefield.motion.contact_detection import FootContact
 
 RATE, LENGTHS = 30.0, (60, 45, 70)
@@ -48,7 +48,7 @@ def listed(runs):
 @given(FLICKERS, CYCLIC)
 def test_runs_are_those_of_each_row(down, cyclic):
     found = stance_rows.runs(down, rows(cyclic))
-    assert listed(found) == [stances.runs(own, cyclic) for own in each(down)]
+    assert listed(found) == [runs_alone(own, cyclic) for own in each(down)]
     assert (found.mask(rows(cyclic)) == down).all()
 
 
@@ -56,7 +56,7 @@ def test_runs_are_those_of_each_row(down, cyclic):
 def test_no_stance_and_no_gap_within_a_motion_is_short(down, cyclic):
     found = stance_rows.tidy(down, rows(cyclic))
     gaps = stance_rows.runs(~found.mask(rows(cyclic)), rows(cyclic))
-    for own, least in ((found, stances.SHORTEST_CONTACT), (gaps, stances.SHORTEST_GAP)):
+    for own, least in ((found, stance_rows.SHORTEST_CONTACT), (gaps, stance_rows.SHORTEST_GAP)):
         assert (own.lengths[own.inner(rows(cyclic))] >= least * RATE).all()
     before = stance_rows.runs(down, rows(cyclic))
     long = before.select(before.lengths >= stance_rows.shortest(rows(cyclic))[before.rows])
@@ -103,15 +103,6 @@ def path_of(forward, height=0.04, cycle=None):
     places = np.zeros((len(forward), 3))
     places[:, 1], places[:, 2] = height, forward
     return FootPath(places, FOOT_RATE, cycle)
-
-
-@given(st.lists(st.booleans(), min_size=1, max_size=40), st.booleans())
-def test_runs_cover_their_frames_and_no_others(down, cyclic):
-    down = np.array(down)
-    found = stances.runs(down, cyclic)
-    assert (stances.mask(found, len(down)) == down).all()
-    assert all(0 <= run.begin < len(down) and len(run) > 0 for run in found)
-    assert sum(map(len, found)) == down.sum()
 
 
 def test_a_long_swing_is_cut_where_the_foot_goes_most():

@@ -6,7 +6,6 @@ import pytest
 
 from posefield.common.errors import InvalidField, OutOfReach
 from posefield.feet import stance_rows
-from posefield.feet.stances import FootPath
 from posefield.inference import session
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
@@ -80,7 +79,7 @@ def test_contacts_are_detected_where_the_model_has_none(reach):
     found = act_motion.act_passage(reach, MotionQuestion(controls=HIGH))
     toes = acting.joint_path(reach, found, "RightToeBase")
     assert found.passage.contacts.shape == (len(found.passage), 2)
-    detected = stance_rows.detect(FootPath(toes, RATE))
+    detected = stance_rows.detect(toes, RATE)
     assert np.array_equal(found.passage.contacts[:, 1], detected)
 
 

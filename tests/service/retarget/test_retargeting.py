@@ -8,7 +8,7 @@ import pytest
 import rig_files
 
 from posefield.common.errors import InvalidField
-from posefield.feet.stances import Interval
+from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
