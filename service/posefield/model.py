@@ -19,7 +19,7 @@ import msgspec
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, ModelError, UnknownFormat
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode import performance_files
+from posefield.encode import formats
 from posefield.encode.formats import encoder_for
 from posefield.encode.usd_crowd import FILES
 from posefield.locomotion import walking_crowd
@@ -90,7 +90,7 @@ class Performance(PerformanceAnswer):
         layout: animations in USD files. Raises as `Clip.save` does.
         """
         encoder = encoder_for(Path(path))
-        encode = performance_files.encoder(encoder, layout)
+        encode = formats.performance_encoder(encoder, layout)
         convention = encoder.convention(self.unit, self.up, self.body)
         atomic_files.write(encode(self, convention), Path(path))
 

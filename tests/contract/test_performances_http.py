@@ -2,7 +2,7 @@
 
 import bad_scripts
 
-from posefield.encode import performance_files
+from posefield.encode import formats
 
 ADDRESS = "/v1/performances.json"
 
@@ -27,7 +27,7 @@ def test_a_plan_is_json(ask):
 
 def test_segments_are_a_layout_of_usd(ask):
     script = bad_scripts.walk()
-    for form in performance_files.SEGMENTED:
+    for form in formats.SEGMENTED:
         whole, parts = (
             ask("POST", f"/v1/performances.{form}?layout={layout}", json=script)
             for layout in ("whole", "segments")

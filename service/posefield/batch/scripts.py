@@ -38,10 +38,9 @@ from posefield.characters.delivery import Delivery
 from posefield.characters.user_character import UserCharacter
 from posefield.common import cancellation
 from posefield.common.errors import FileError, InvalidField, QueryError
-from posefield.encode import performance_files
+from posefield.encode import formats
 from posefield.encode.conventions import Convention
-from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.performance_files import PerformanceEncoder
+from posefield.encode.formats import CLIP_ENCODERS, PerformanceEncoder
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question import json_decoding
@@ -207,7 +206,7 @@ class PerformanceBatch:
     character: UserCharacter | None = None
 
     def __post_init__(self) -> None:
-        performance_files.encoder(CLIP_ENCODERS[self.form], self.layout)
+        formats.performance_encoder(CLIP_ENCODERS[self.form], self.layout)
 
     def file(self, script: Script) -> tuple[PerformanceAnswer, bytes]:
         """Return the performance of a script, and its file."""
@@ -215,7 +214,7 @@ class PerformanceBatch:
         if self.character is None:
             convention = form.convention(question.unit, question.up, question.body)
             answer = composition.perform(script, MAX_FRAMES)
-            return answer, performance_files.encoder(form, self.layout)(answer, convention)
+            return answer, formats.performance_encoder(form, self.layout)(answer, convention)
         order = delivery.deliver(self.character, form, question)
         made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
         return made, order.encode(made)

@@ -16,7 +16,7 @@ from posefield.console.options import (
     with_question_options,
 )
 from posefield.console.output import as_json
-from posefield.encode import performance_files
+from posefield.encode import formats
 from posefield.encode.formats import encoder_for
 from posefield.question import json_decoding
 from posefield.question.performance_question import (
@@ -151,7 +151,7 @@ def _performed(
     from posefield.performance.script import resolve_script
 
     form = encoder_for(path)
-    encode = performance_files.encoder(form, one.layout)
+    encode = formats.performance_encoder(form, one.layout)
     script = resolve_script(script_question, find)
     question = script.question
     order = one.delivery(form, question, path)

@@ -1,4 +1,4 @@
-"""Tables of formats: encoders of clips, poses, crowds and grids by extension.
+"""Tables of formats: encoders of clips, performances, poses, crowds and grids by extension.
 
 The table of archives is `archives.ARCHIVE_WRITERS`.
 """
@@ -32,6 +32,8 @@ from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer, root_bone
 from posefield.motion.clip import CrowdClip, CrowdPoses
 from posefield.question.motion_question import BodyKind
+from posefield.question.performance_question import PerformanceLayout
+from posefield.question.performance_report import PerformanceAnswer
 from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, SigmaGrid
 
 
@@ -291,3 +293,37 @@ class CrowdWriter(Format):
 CROWD_WRITERS = by_extension(
     *(CrowdWriter(name, CLIP_ENCODERS[name].media_type) for name in STREAMS)
 )
+
+
+SEGMENTED = ("usda", "usdc", "usdz")
+"""Formats that have layouts."""
+
+PerformanceEncoder = Callable[[PerformanceAnswer, Convention], bytes]
+
+
+def performance_encoder(form: ClipEncoder, layout: PerformanceLayout) -> PerformanceEncoder:
+    """Return the function that encodes performances in a format and a layout.
+
+    Raises InvalidField for a layout of segments in a format that has none.
+    """
+    if layout == "whole":
+        return form.encode
+    if form.extension not in SEGMENTED:
+        raise InvalidField(
+            "layout",
+            f"{layout!r}, expected 'whole': {form.extension} files have no layouts, "
+            f"{', '.join(SEGMENTED[:-1])} and {SEGMENTED[-1]} do",
+        )
+
+    def encode(answer: PerformanceAnswer, convention: Convention) -> bytes:
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode.usd import performance_layer
+
+        writers = {
+            "usda": performance_layer.usda,
+            "usdc": performance_layer.usdc,
+            "usdz": performance_layer.usdz,
+        }
+        return writers[form.extension](answer, convention)
+
+    return encode

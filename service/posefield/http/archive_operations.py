@@ -18,7 +18,7 @@ from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError, did_you_mean
 from posefield.constraints import targets
-from posefield.encode import performance_files
+from posefield.encode import formats
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
 from posefield.http import responses
@@ -144,7 +144,7 @@ def script_order(
     """
     body = json_decoding.decode_question(PerformancesQuestion, content)
     encoder = _encoder(body.format)
-    encode = performance_files.encoder(encoder, body.layout)
+    encode = formats.performance_encoder(encoder, body.layout)
     _check_count("scripts", len(body.scripts), settings.performances_limit)
     segments = sum(len(script.segments) for script in body.scripts)
     if segments > settings.performances_segments:

@@ -8,7 +8,7 @@ from starlette.responses import Response
 from posefield.characters import delivery
 from posefield.characters.delivery import Delivery
 from posefield.common.errors import InvalidField
-from posefield.encode import performance_files
+from posefield.encode import formats
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
 from posefield.http import responses
 from posefield.http.api import problems
@@ -49,7 +49,7 @@ async def answer_performance(request: ServiceRequest) -> Response:
         detail = "character: given with plan=true, expected without: a plan moves no character"
         raise RequestError(BAD_PARAMETER, detail, {"parameter": "character"})
     try:
-        encode = performance_files.encoder(encoder, layout)
+        encode = formats.performance_encoder(encoder, layout)
     except InvalidField as fault:
         raise problems.parameter_error(fault) from None
     order = None

@@ -6,7 +6,7 @@ import crowds
 import numpy as np
 import pytest
 
-from posefield.encode.character import animation_samples, character
+from posefield.encode.character import character, extent
 from posefield.encode.character import extent as exact
 from posefield.encode.usd_crowd import crowd_scene
 from posefield.motion import clip as clips
@@ -51,7 +51,7 @@ def reached(person, rig, made):
 def holds(bounded, seed):
     person, rig, made = case(seed)
     found, least = (
-        crowd_scene.motion_boxes(bounded(rig), animation_samples.from_motions(made)),
+        crowd_scene.motion_boxes(bounded(rig), extent.samples_of_motions(made)),
         reached(person, rig, made),
     )
     return np.all(found[:, 0] <= least[:, 0]) and np.all(found[:, 1] >= least[:, 1])
@@ -112,7 +112,7 @@ def test_boxes_of_clips_are_exact(seed):
     person, made = ragged(seed)
     rig = character.rig(person)
     none = np.zeros((len(made), len(person) + len(person.tip_joints)))
-    found = exact.bounding_boxes(rig.tree, animation_samples.from_clips(made), none)
+    found = exact.bounding_boxes(rig.tree, extent.samples_of_clips(made), none)
     for clip, (low, high) in zip(made, found, strict=True):
         every = places(person, clip).reshape(-1, 3)
         for ours, theirs in ((low, every.min(axis=0)), (-high, -every.max(axis=0))):

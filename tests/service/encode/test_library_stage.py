@@ -102,10 +102,8 @@ def skinned(stage, code):
 def test_layers_are_as_usd_writes_them(answers, convention):
     many = [answers[index] for index in (0, 1, 0, 2, 1)]
     expected = [
-        usd_clip.AnimationLayerBuilder(take.rate, convention, take.rig.paths)
-        .layer(take.content)
-        .ExportToString()
-        for take in usd_clip.arrays_without_character(many, convention)
+        builder.layer(content).ExportToString()
+        for builder, content in usd_clip.animation_contents(many, convention)
     ]
     found = usd_clip.animation_usdc(many, convention)
     assert [layers.crate_text(each) for each in found] == expected

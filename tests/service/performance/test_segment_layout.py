@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdSkel, UsdValidation
 
-from posefield.encode import performance_files
+from posefield.encode import formats
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd.performance_layer import segment_frames
 from posefield.inference import session
@@ -51,7 +51,7 @@ def answer(perform):
 def encoded(answer, name, layout="segments", **measures):
     form = CLIP_ENCODERS[name]
     convention = form.convention(measures.get("unit"), measures.get("up"))
-    return performance_files.encoder(form, layout)(answer, convention)
+    return formats.performance_encoder(form, layout)(answer, convention)
 
 
 def opened(answer, path, **more):
@@ -59,7 +59,7 @@ def opened(answer, path, **more):
     return Usd.Stage.Open(str(path))
 
 
-@pytest.fixture(params=performance_files.SEGMENTED)
+@pytest.fixture(params=formats.SEGMENTED)
 def stage(request, answer, tmp_path):
     return opened(answer, tmp_path / f"performance.{request.param}")
 

@@ -1,14 +1,15 @@
-"""Body meshes skinned to a skeleton, which follow the bone lengths of each clip.
+"""Body meshes skinned to a skeleton, which follow the bone lengths of each clip; their bounds.
 
 The plain body is one tapered box along each bone, which shows the bones and their sides.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.units import Floats, Singles
+from posefield.common.units import Floats, Indices, Singles
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 
@@ -114,6 +115,142 @@ def vertex_normals(points: Floats, faces: Integers) -> Singles:
     return np.where(lengths > 0, summed / np.where(lengths > 0, lengths, 1.0), up).astype(
         np.float32
     )
+
+
+@dataclass(frozen=True)
+class BodyBounds:
+    """Points of a body in K groups, of which each is moved by one joint and near to one bone.
+
+    A joint moves a point rigidly, with its own bones: so in any pose the point stays as far from a
+    place along such a bone as at rest. A point that several joints move is the mean, by its
+    weights, of the points to which each would move it; so it is as far from the mean of those
+    places as the mean of those distances, at most. The body is therefore within the convex hull of
+    spheres about the ends of bones, whose radius is the largest such mean of the points near to
+    each.
+
+    joints, ends (K,): the joint, and where the bone that is near leads; the joint itself where none
+    is nearer. places (K,): the place among those of the body that the points of a group follow.
+    lowest, highest (K,): shares of the way along the bone between which the points lie. rest (K,):
+    largest mean distance of the points from their bones at rest, m.
+    """
+
+    skeleton: Skeleton
+    joints: Indices
+    ends: Indices
+    places: Indices
+    lowest: Floats
+    highest: Floats
+    rest: Floats
+
+    def displacements(self, offsets: Floats) -> Floats:
+        """Return how far bone offsets (M, J, 3) move joints and tips (M, J + E, 3) at rest, m."""
+        joints = self.skeleton
+        displaced = joints.at_rest(offsets - joints.offsets)
+        return np.concatenate([displaced, displaced.take(joints.tip_joints, axis=1)], axis=1)
+
+    def radii(self, displaced: Floats, along: Floats) -> Floats:
+        """Return the radii (M, J + E), m, of bodies made for bones of other lengths.
+
+        displaced: displacements of joints and tips (M, J + E, 3), m; along: of the body's places
+        (M, R, 3), m. A point and the place on the bone next to it move by different displacements,
+        which are linear in the share along the bone; so the largest difference is at one end.
+        """
+        start, end = displaced.take(self.joints, axis=1), displaced.take(self.ends, axis=1)
+        end -= start
+        start -= along.take(self.places, axis=1)
+        low, high = (start + share[:, None] * end for share in (self.lowest, self.highest))
+        return self._spheres(np.maximum(_lengths(low), _lengths(high)))
+
+    def radii_of_others(self, offsets: Floats | Singles) -> Floats:
+        """Return the radii (M, J + E), m, where bone offsets (M, J, 3) move a body made at rest."""
+        tips = np.zeros((len(offsets), len(self.skeleton.tip_joints), 3))
+        longer = np.concatenate([offsets - self.skeleton.offsets, tips], axis=1)
+        arms = longer.take(self.ends, axis=1)
+        arms[:, self.ends == self.joints] = 0.0
+        return self._spheres(self.highest * _lengths(arms))
+
+    @cached_property
+    def _groups_of_points(self) -> list[tuple[Indices, Indices, Indices]]:
+        """Return, for each end of the bones, the groups in the order of its points (K,).
+
+        With the points (P,), and the place in that order of each one's first group (P,).
+        """
+        groups = []
+        for indices in (self.joints, self.ends):
+            order = np.argsort(indices, kind="stable")
+            groups.append((order, *np.unique(indices[order], return_index=True)))
+        return groups
+
+    def _spheres(self, differences: Floats) -> Floats:
+        """Return the radius (M, J + E) about each joint and tip.
+
+        differences (M, K): by how much the points of each group may be further away than at rest,
+        m. A point may belong to several groups, so the largest counts for all.
+        """
+        radii_of_points = np.zeros(
+            (len(differences), len(self.skeleton) + len(self.skeleton.tip_joints))
+        )
+        if not len(self.joints):
+            return radii_of_points
+        radii = self.rest + differences.max(axis=1, keepdims=True)
+        for order, points, firsts in self._groups_of_points:
+            largest = np.maximum.reduceat(radii.take(order, axis=1), firsts, axis=1)
+            radii_of_points[:, points] = np.maximum(radii_of_points[:, points], largest)
+        return radii_of_points
+
+
+def body_bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
+    """Return the bounds of a body; None for no body."""
+    if body is None:
+        none = np.empty(0, np.intp)
+        share = np.empty(0)
+        return BodyBounds(skeleton, none, none, none, share, share, share)
+    points, influences = np.nonzero(body.weights)
+    joints = body.joints[points, influences].astype(np.intp)
+    tips, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
+    means = np.zeros(len(body.points))
+    np.add.at(means, points, far * body.weights[points, influences] / FULL_WEIGHT)
+    far = means[points]
+    keys = np.stack([joints, tips, body.place[points]])
+    order = np.lexsort(keys)
+    keys, shares, far = keys[:, order], shares[order], far[order]
+    new = np.concatenate([[True], np.any(np.diff(keys) != 0, axis=0)])
+    firsts = np.flatnonzero(new)
+    joints, tips, groups = keys[:, firsts]
+    return BodyBounds(
+        skeleton,
+        joints,
+        tips,
+        groups,
+        np.minimum.reduceat(shares, firsts),
+        np.maximum.reduceat(shares, firsts),
+        np.maximum.reduceat(far, firsts),
+    )
+
+
+def _nearest_bones(
+    skeleton: Skeleton, points: Floats, joints: Indices
+) -> tuple[Indices, Floats, Floats]:
+    """Return, of points (K, 3) moved by joints (K,), the bone of each joint that is nearest.
+
+    Its end, the share along it of the place next to the point, and the distance from there, m.
+    """
+    local = points - skeleton.at_rest(skeleton.offsets)[joints]
+    tips, shares = joints.copy(), np.zeros(len(joints))
+    far = np.linalg.norm(local, axis=-1)
+    arms = np.concatenate([skeleton.offsets, skeleton.tip_offsets])
+    above = (*skeleton.parents, *skeleton.tip_joints)
+    for end, (arm, joint) in enumerate(zip(arms, above, strict=True)):
+        square = float(arm @ arm)
+        if joint < 0 or square == 0.0:
+            continue
+        of_joint = np.flatnonzero(joints == joint)
+        share = np.clip(local[of_joint] @ arm / square, 0.0, 1.0)
+        off = np.linalg.norm(local[of_joint] - share[:, None] * arm, axis=-1)
+        nearer = off < far[of_joint]
+        tips[of_joint[nearer]], shares[of_joint[nearer]] = end, share[nearer]
+        far[of_joint[nearer]] = off[nearer]
+    return tips, shares, far
 
 
 # A box has an apex near the joint it turns with, two square rings, and an apex near the other

@@ -18,9 +18,9 @@ from posefield.common.units import Floats, Singles
 from posefield.encode import conventions
 from posefield.encode.body import skinned_mesh
 from posefield.encode.body.mannequin import mannequin
-from posefield.encode.body.skinned_mesh import SkinnedMesh, bones_body
+from posefield.encode.body.skinned_mesh import BodyBounds, SkinnedMesh, bones_body
 from posefield.encode.character import extent
-from posefield.encode.character.extent import BodyBounds, PointTree
+from posefield.encode.character.extent import PointTree
 from posefield.encode.conventions import METRES, Convention
 from posefield.motion import joint_roles, root_bone
 from posefield.motion.clip import Clip
@@ -108,7 +108,7 @@ def _cached_rig(
     if has_root:
         joints, body = root_bone.with_root(joints), body and skinned_mesh.below_root(body)
     paths = joint_paths(legal_names(joints.names), joints.parents)
-    tree, bounds = extent.tree(joints), extent.bounds(joints, body)
+    tree, bounds = extent.tree(joints), skinned_mesh.body_bounds(joints, body)
     return CharacterRig(joints, joints.names, paths, tree, body, bounds, int(has_root))
 
 

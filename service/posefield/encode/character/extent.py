@@ -1,17 +1,12 @@
-"""Extents: bounding boxes of skinned characters over whole motions, for many motions at once.
+"""Motions in USD's form, and extents: bounding boxes of skinned characters over whole motions.
 
-Positions of joints and tips are exact, by forward kinematics; the body lies within spheres about
-them whose radii are the same for all frames.
-
-A joint moves a point rigidly, with its own bones: so in any pose the point stays as far from a
-place along such a bone as at rest. A point that several joints move is the mean, by its weights, of
-the points to which each would move it; so it is as far from the mean of those places as the mean of
-those distances, at most. The body is therefore within the convex hull of spheres about the ends of
-bones, whose radius is the largest such mean of the points near to each.
+Quaternions are float32 with the real part last, and neighbours have one sign. Positions of joints
+and tips are exact, by forward kinematics; the body lies within the spheres of `BodyBounds` about
+them, whose radii are the same for all frames.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -19,9 +14,122 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Indices, Singles
-from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
-from posefield.encode.character.animation_samples import AnimationSamples
+from posefield.motion.clip import Clip, Motions
 from posefield.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class AnimationSamples:
+    """M motions of one skeleton, concatenated: motion m has the frames starts[m] to starts[m + 1].
+
+    rotations (N, J, 4): of all frames, real part last. path (N, 3): root positions, m. offsets (M,
+    J, 3): of the bones, m; the root's is not used. starts: (M + 1,). hips (N, 3): translations of
+    joint 1 below a root bone, m; None where there is none. No number is -0.
+    """
+
+    rotations: Singles
+    path: Singles
+    offsets: Singles
+    starts: Indices
+    hips: Singles | None = None
+
+    def __len__(self) -> int:
+        return len(self.offsets)
+
+    @cached_property
+    def translations(self) -> Singles:
+        """Return the local translations (N, J, 3), m."""
+        local = np.repeat(self.offsets, np.diff(self.starts), axis=0)
+        local[:, 0] = self.path
+        if self.hips is not None:
+            local[:, 1] = self.hips
+        return local
+
+    def parts(self, frames: int) -> Iterator["AnimationSamples"]:
+        """Yield the motions in parts of at most `frames` frames, longer motions one by one."""
+        first = 0
+        while first < len(self):
+            last = int(np.searchsorted(self.starts, self.starts[first] + frames, "right")) - 1
+            last = max(last, first + 1)
+            yield self._between(first, last)
+            first = last
+
+    def _between(self, first: int, last: int) -> "AnimationSamples":
+        frames = slice(self.starts[first], self.starts[last])
+        starts = self.starts[first : last + 1] - self.starts[first]
+        offsets = self.offsets[first:last]
+        hips = None if self.hips is None else self.hips[frames]
+        return AnimationSamples(self.rotations[frames], self.path[frames], offsets, starts, hips)
+
+
+def samples_of_clips(clips: Sequence[Clip], root_bone: bool = False) -> AnimationSamples:
+    """Return the moves of clips of one skeleton, with the bone offsets of their first frames."""
+    starts = _starts([len(clip) for clip in clips])
+    samples = _empty(starts, len(clips[0].skeleton))
+    for index, clip in enumerate(clips):
+        frames = slice(starts[index], starts[index + 1])
+        _write_real_part_last(clip.rotations, samples.rotations[frames])
+        samples.path[frames] = clip.translations[:, 0]
+        samples.offsets[index] = clip.translations[0]
+    if root_bone:
+        samples = replace(
+            samples, hips=np.concatenate([c.translations[:, 1] for c in clips], dtype="f4")
+        )
+    return _normalize(samples)
+
+
+def samples_of_motions(batch: Motions) -> AnimationSamples:
+    """Return the moves of a crowd's motions."""
+    count, frames, joints = batch.rotations.shape[:3]
+    samples = _empty(_starts([frames] * count), joints)
+    _write_real_part_last(batch.rotations.reshape(-1, joints, 4), samples.rotations)
+    samples.path[:] = batch.root_position.reshape(-1, 3)
+    samples.offsets[:] = batch.bone_offsets
+    return _normalize(samples)
+
+
+def _starts(frames: Sequence[int]) -> Indices:
+    return np.concatenate([[0], np.cumsum(frames)])
+
+
+def _empty(starts: Indices, joints: int) -> AnimationSamples:
+    motions, frames = len(starts) - 1, int(starts[-1])
+    rotations = np.empty((frames, joints, 4), np.float32)
+    path, offsets = np.empty((frames, 3), np.float32), np.empty((motions, joints, 3), np.float32)
+    return AnimationSamples(rotations, path, offsets, starts)
+
+
+def _write_real_part_last(wxyz: Floats | Singles, xyzw: Singles) -> None:
+    """Write quaternions with the real part last.
+
+    All numbers move by one in a single copy, then the real parts are set.
+    """
+    source, target = np.ascontiguousarray(wxyz).reshape(-1), xyzw.reshape(-1)
+    target[:-1] = source[1:]
+    target[3::4] = source[::4]
+
+
+def _normalize(samples: AnimationSamples) -> AnimationSamples:
+    _unroll_quaternions(samples)
+    for values in (samples.rotations, samples.path, samples.offsets, samples.hips):
+        if values is not None:
+            # USD's deduplication does not distinguish -0 from 0.
+            values += np.float32(0.0)
+    return samples
+
+
+def _unroll_quaternions(samples: AnimationSamples) -> None:
+    """Choose signs so that neighbours lie close: some readers interpolate by component."""
+    products = samples.rotations[1:] * samples.rotations[:-1]
+    dots = products[..., 0] + products[..., 1] + products[..., 2] + products[..., 3]
+    dots[samples.starts[1:-1] - 1] = 1.0
+    if not len(dots) or dots.min() >= 0:
+        return
+    signs = np.where(dots < 0, np.float32(-1.0), np.float32(1.0))
+    for first, last in zip(samples.starts, samples.starts[1:], strict=False):
+        turned = np.cumprod(signs[first : last - 1], axis=0, dtype=np.float32)
+        samples.rotations[first + 1 : last] *= turned[..., None]
+
 
 PointIndices = npt.NDArray[np.intp]
 
@@ -35,7 +143,7 @@ FRAMES_AT_ONCE = 3200
 
 
 @dataclass(frozen=True)
-class TreeLevel:
+class PointLevel:
     """Points of one depth in the tree, and their parents.
 
     points: their indices in the tree's order. turns: indices, among the turning joints, of those
@@ -61,7 +169,7 @@ class PointTree:
     tips: Floats
     order: PointIndices
     turning: PointIndices
-    generations: tuple[TreeLevel, ...]
+    generations: tuple[PointLevel, ...]
 
 
 def tree(skeleton: Skeleton) -> PointTree:
@@ -74,7 +182,7 @@ def tree(skeleton: Skeleton) -> PointTree:
     order = np.lexsort((bare, depths))
     turning = order[~bare[order]]
     return PointTree(
-        skeleton.tip_offsets, order, turning, tuple(_tree_levels(above, depths, order, turning))
+        skeleton.tip_offsets, order, turning, tuple(_point_levels(above, depths, order, turning))
     )
 
 
@@ -117,16 +225,16 @@ def enlarged_box(low: Floats, high: Floats) -> Floats:
     return np.stack([low - slack, high + slack], axis=-2)
 
 
-def _tree_levels(
+def _point_levels(
     above: PointIndices, depths: PointIndices, order: PointIndices, turning: PointIndices
-) -> Iterator[TreeLevel]:
+) -> Iterator[PointLevel]:
     rank, turner = np.argsort(order), {joint: at for at, joint in enumerate(turning.tolist())}
     for depth in range(1, depths.max() + 1):
         points = slice(*np.searchsorted(depths[order], [depth, depth + 1]))
         turns = slice(*np.searchsorted(depths[turning], [depth, depth + 1]))
         holders = above[order[points]]
         turners = np.array([turner[joint] for joint in holders.tolist()])
-        yield TreeLevel(points, turns, _as_slice(rank[holders]), _as_slice(turners))
+        yield PointLevel(points, turns, _as_slice(rank[holders]), _as_slice(turners))
 
 
 def _as_slice(indices: PointIndices) -> PointIndices | slice:
@@ -207,137 +315,3 @@ def _cross(a: Singles, b: Singles) -> Singles:
     product = a[1:4] * b[2:5]
     product -= a[2:5] * b[1:4]
     return product
-
-
-@dataclass(frozen=True)
-class BodyBounds:
-    """Points of a body in K groups, of which each is moved by one joint and near to one bone.
-
-    joints, ends (K,): the joint, and where the bone that is near leads; the joint itself where none
-    is nearer. places (K,): the place among those of the body that the points of a group follow.
-    lowest, highest (K,): shares of the way along the bone between which the points lie. rest (K,):
-    largest mean distance of the points from their bones at rest, m.
-    """
-
-    skeleton: Skeleton
-    joints: Indices
-    ends: Indices
-    places: Indices
-    lowest: Floats
-    highest: Floats
-    rest: Floats
-
-    def displacements(self, offsets: Floats) -> Floats:
-        """Return how far bone offsets (M, J, 3) move joints and tips (M, J + E, 3) at rest, m."""
-        joints = self.skeleton
-        displaced = joints.at_rest(offsets - joints.offsets)
-        return np.concatenate([displaced, displaced.take(joints.tip_joints, axis=1)], axis=1)
-
-    def radii(self, displaced: Floats, along: Floats) -> Floats:
-        """Return the radii (M, J + E), m, of bodies made for bones of other lengths.
-
-        moved: displacements of joints and tips (M, J + E, 3); along: of the body's places (M, R,
-        3), m. A point and the place on the bone next to it move by different displacements, which
-        are linear in the share along the bone; so the largest difference is at one of its ends.
-        """
-        start, end = displaced.take(self.joints, axis=1), displaced.take(self.ends, axis=1)
-        end -= start
-        start -= along.take(self.places, axis=1)
-        low, high = (start + share[:, None] * end for share in (self.lowest, self.highest))
-        return self._spheres(np.maximum(_lengths(low), _lengths(high)))
-
-    def radii_of_others(self, offsets: Floats | Singles) -> Floats:
-        """Return the radii (M, J + E), m, where bone offsets (M, J, 3) move a body made at rest."""
-        tips = np.zeros((len(offsets), len(self.skeleton.tip_joints), 3))
-        longer = np.concatenate([offsets - self.skeleton.offsets, tips], axis=1)
-        arms = longer.take(self.ends, axis=1)
-        arms[:, self.ends == self.joints] = 0.0
-        return self._spheres(self.highest * _lengths(arms))
-
-    @cached_property
-    def _groups_of_points(self) -> list[tuple[Indices, Indices, Indices]]:
-        """Return, for each end of the bones, the groups in the order of its points (K,).
-
-        With the points (P,), and the place in that order of each one's first group (P,).
-        """
-        groups = []
-        for indices in (self.joints, self.ends):
-            order = np.argsort(indices, kind="stable")
-            groups.append((order, *np.unique(indices[order], return_index=True)))
-        return groups
-
-    def _spheres(self, differences: Floats) -> Floats:
-        """Return the radius (M, J + E) about each joint and tip.
-
-        differences (M, K): by how much the points of each group may be further away than at rest,
-        m. A point may belong to several groups, so the largest counts for all.
-        """
-        radii_of_points = np.zeros(
-            (len(differences), len(self.skeleton) + len(self.skeleton.tip_joints))
-        )
-        if not len(self.joints):
-            return radii_of_points
-        radii = self.rest + differences.max(axis=1, keepdims=True)
-        for order, points, firsts in self._groups_of_points:
-            largest = np.maximum.reduceat(radii.take(order, axis=1), firsts, axis=1)
-            radii_of_points[:, points] = np.maximum(radii_of_points[:, points], largest)
-        return radii_of_points
-
-
-def bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
-    """Return the bounds of a body; None for no body."""
-    if body is None:
-        none = np.empty(0, np.intp)
-        share = np.empty(0)
-        return BodyBounds(skeleton, none, none, none, share, share, share)
-    points, influences = np.nonzero(body.weights)
-    joints = body.joints[points, influences].astype(np.intp)
-    tips, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
-    means = np.zeros(len(body.points))
-    np.add.at(means, points, far * body.weights[points, influences] / FULL_WEIGHT)
-    far = means[points]
-    keys = np.stack([joints, tips, body.place[points]])
-    order = np.lexsort(keys)
-    keys, shares, far = keys[:, order], shares[order], far[order]
-    new = np.concatenate([[True], np.any(np.diff(keys) != 0, axis=0)])
-    firsts = np.flatnonzero(new)
-    joints, tips, groups = keys[:, firsts]
-    return BodyBounds(
-        skeleton,
-        joints,
-        tips,
-        groups,
-        np.minimum.reduceat(shares, firsts),
-        np.maximum.reduceat(shares, firsts),
-        np.maximum.reduceat(far, firsts),
-    )
-
-
-def _nearest_bones(
-    skeleton: Skeleton, points: Floats, joints: Indices
-) -> tuple[Indices, Floats, Floats]:
-    """Return, of points (K, 3) moved by joints (K,), the bone of each joint that is nearest.
-
-    Its end, the share along it of the place next to the point, and the distance from there, m.
-    """
-    local = points - skeleton.at_rest(skeleton.offsets)[joints]
-    tips, shares = joints.copy(), np.zeros(len(joints))
-    far = np.linalg.norm(local, axis=-1)
-    arms = np.concatenate([skeleton.offsets, skeleton.tip_offsets])
-    above = (*skeleton.parents, *skeleton.tip_joints)
-    for end, (arm, joint) in enumerate(zip(arms, above, strict=True)):
-        square = float(arm @ arm)
-        if joint < 0 or square == 0.0:
-            continue
-        of_joint = np.flatnonzero(joints == joint)
-        share = np.clip(local[of_joint] @ arm / square, 0.0, 1.0)
-        off = np.linalg.norm(local[of_joint] - share[:, None] * arm, axis=-1)
-        nearer = off < far[of_joint]
-        tips[of_joint[nearer]], shares[of_joint[nearer]] = end, share[nearer]
-        far[of_joint[nearer]] = off[nearer]
-    return tips, shares, far
-
-
-def _lengths(arms: Floats) -> Floats:
-    x, y, z = arms[..., 0], arms[..., 1], arms[..., 2]
-    return np.sqrt(x * x + y * y + z * z)

@@ -21,9 +21,9 @@ from pxr import Sdf, Vt
 from posefield.common.units import Booleans
 from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims, usd_clip
-from posefield.encode.usd.usd_clip import ClipArrays, ClipLayerBuilder
+from posefield.encode.usd.usd_clip import ClipLayerBuilder
 from posefield.encode.usd_layers import layers
-from posefield.encode.usd_layers.layers import ValueTypes
+from posefield.encode.usd_layers.layers import LayerContent, ValueTypes
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
 PERFORMANCE = Sdf.Path("/Performance")
@@ -54,7 +54,7 @@ def usdz(answer: PerformanceAnswer, convention: Convention) -> bytes:
 def segment_frames(begin: float, end: float, rate: float, frames: int) -> range:
     """Return the frames of a segment: from the one at or before its begin to the one at its end.
 
-    begins, ends: s. rate: frames a second. frames: of the performance; an end after the last one
+    begin, end: s. rate: frames a second. frames: of the performance; an end after the last one
     has none of its own.
     """
     slack = ROUNDING * rate
@@ -65,9 +65,8 @@ def segment_frames(begin: float, end: float, rate: float, frames: int) -> range:
 
 def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
     """Return the layer; its prims are valid while the caller holds it."""
-    (arrays,) = usd_clip.arrays_with_character([answer], convention)
-    author = ClipLayerBuilder(arrays.rate, convention, arrays.rig, arrays.curves)
-    layer = author.layer(arrays.content)
+    ((builder, content),) = usd_clip.builders_and_contents([answer], convention)
+    layer = builder.layer(content)
     with Sdf.ChangeBlock():
         scope = layers.prim(layer, PERFORMANCE.name, "Scope")
         facts = answer.trust.facts()
@@ -75,28 +74,34 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
         scope.customData = {layers.FACTS: layers.usd_dictionary(facts)}
         group = layers.prim(scope, SEGMENTS.name, "Scope")
         for index, segment in enumerate(segments):
-            _add_segment(group, index, segment, arrays)
-    _add_contacts(layer, answer.trust, arrays)
+            _add_segment(group, index, segment, builder, content)
+    _add_contacts(layer, answer.trust, builder.rate, content.frames)
     return layer
 
 
-def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
-    paths = arrays.rig.paths
-    prim = character_prims.animation(group, f"s{index:03}", paths, arrays.curves)
+def _add_segment(
+    group: Any,
+    index: int,
+    facts: dict[str, Any],
+    builder: ClipLayerBuilder,
+    content: LayerContent,
+) -> None:
+    name = f"s{index:03}"
+    prim = character_prims.animation(group, name, builder.rig.paths, builder.curves)
     prim.customData = {layers.FACTS: layers.usd_dictionary(facts)}
-    frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
+    frames = segment_frames(facts["begins"], facts["ends"], builder.rate, content.frames)
     rows = slice(frames.start, frames.stop)
-    samples = {name: array[rows] for name, array in arrays.content.samples.items()}
+    samples = {name: array[rows] for name, array in content.samples.items()}
     layers.set_time_samples(prim, samples, frames.start)
 
 
-def _add_contacts(layer: Any, report: PerformanceReport, arrays: ClipArrays) -> None:
+def _add_contacts(layer: Any, report: PerformanceReport, rate: float, frames: int) -> None:
     """Add the contacts of the feet that were made to stand; nothing for feet as predicted."""
     stances = () if report.feet is None else report.feet.stances
     joints = list(dict.fromkeys(stance.joint for stance in stances))
     if not joints:
         return
-    times = np.arange(arrays.content.frames) / arrays.rate
+    times = np.arange(frames) / rate
     standing = np.zeros((len(times), len(joints)), dtype=bool)
     for stance in stances:
         during = (times >= stance.begin - ROUNDING) & (times <= stance.end + ROUNDING)

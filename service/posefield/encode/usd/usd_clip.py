@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from itertools import groupby, pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pxr import Sdf
@@ -19,9 +19,9 @@ from pxr import Sdf
 from posefield.common import cancellation
 from posefield.common.units import Singles
 from posefield.encode import archives, conventions
-from posefield.encode.character import animation_samples, character, extent
-from posefield.encode.character.animation_samples import AnimationSamples
+from posefield.encode.character import character, extent
 from posefield.encode.character.character import CharacterRig
+from posefield.encode.character.extent import AnimationSamples
 from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import crate_template, layers
@@ -40,40 +40,6 @@ FRAMES_AT_ONCE = 3200
 
 
 WITHOUT_BODY = Convention(1.0, "y", "none")
-
-
-class ClipArrays(NamedTuple):
-    """Rig, frame rate, layer content and names of the curves of one clip."""
-
-    rig: CharacterRig
-    rate: float
-    content: LayerContent
-    curves: tuple[str, ...]
-
-
-def arrays_with_character(
-    answers: Sequence[SampledClip], convention: Convention
-) -> Iterator[ClipArrays]:
-    """Yield arrays in the order of their results, with samples, character values and facts."""
-    for rig, some in _grouped_by_rig(answers, convention):
-        animation = _samples_of(some)
-        rest = character.rest_pose(rig, animation.offsets)
-        boxes = extent.bounding_boxes(rig.tree, animation, rest.radii)
-        values = character.character_arrays(rest, convention)
-        values["extent"] = conventions.convert_box(convention, boxes).astype(np.float32)
-        for index, samples in enumerate(_samples(animation, some, convention)):
-            clip_values = {name: array[index] for name, array in values.items()}
-            yield _clip_arrays(rig, some[index], samples, clip_values)
-
-
-def arrays_without_character(
-    answers: Sequence[SampledClip], convention: Convention
-) -> Iterator[ClipArrays]:
-    """Yield arrays in the order of their results, with samples and facts only."""
-    for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
-        animation = _samples_of(some)
-        for answer, samples in zip(some, _samples(animation, some, convention), strict=True):
-            yield _clip_arrays(rig, answer, samples, {})
 
 
 def _grouped_by_rig(
@@ -102,7 +68,7 @@ def _rig(clip: Clip, convention: Convention) -> CharacterRig:
 def _samples_of(answers: Sequence[SampledClip]) -> AnimationSamples:
     """Return the moves of results of one skeleton, with their root bones."""
     clips = [character.rig_and_clip(answer.clip, "none")[1] for answer in answers]
-    return animation_samples.from_clips(clips, answers[0].clip.root_bone)
+    return extent.samples_of_clips(clips, answers[0].clip.root_bone)
 
 
 @cache
@@ -116,13 +82,13 @@ def _keep_freed_memory() -> None:
     np.empty(31 << 20, np.uint8)
 
 
-def _clip_arrays(
-    rig: CharacterRig, answer: SampledClip, samples: Samples, values: Mapping[str, Array]
-) -> ClipArrays:
+def _content(answer: SampledClip, samples: Samples, values: Mapping[str, Array]) -> LayerContent:
     cancellation.check()
-    content = LayerContent(samples, values, answer.trust.facts())
-    names = answer.clip.curves.names if answer.clip.curves else ()
-    return ClipArrays(rig, answer.clip.rate, content, tuple(names))
+    return LayerContent(samples, values, answer.trust.facts())
+
+
+def _curve_names(clip: Clip) -> tuple[str, ...]:
+    return () if clip.curves is None else tuple(clip.curves.names)
 
 
 def _samples(
@@ -176,17 +142,17 @@ def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[st
     layer = Sdf.Layer.CreateAnonymous("prims.usda")
     root = character_prims.root(layer, ROOT.name, rig, convention)
     character_prims.add_blend_shapes(root, rig, curves)
-    made_animation = character_prims.animation(root, ANIMATION.name, rig.paths, curves)
-    character_prims.bind_animation(root, made_animation.path)
+    animation = character_prims.animation(root, ANIMATION.name, rig.paths, curves)
+    character_prims.bind_animation(root, animation.path)
     return layer
 
 
 def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers as text."""
-    built = (
-        author.layer(content) for author, content in builders_and_contents(answers, convention)
-    )
-    return [layer.ExportToString().encode() for layer in built]
+    return [
+        builder.layer(content).ExportToString().encode()
+        for builder, content in builders_and_contents(answers, convention)
+    ]
 
 
 def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
@@ -207,9 +173,18 @@ def usdz_package(layer: bytes) -> bytes:
 def builders_and_contents(
     answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[tuple[ClipLayerBuilder, LayerContent]]:
-    """Yield the author and the content of the layer of each answer."""
-    for take in arrays_with_character(answers, convention):
-        yield ClipLayerBuilder(take.rate, convention, take.rig, take.curves), take.content
+    """Yield the builder and the content of the layer of each result, in their order."""
+    for rig, clips in _grouped_by_rig(answers, convention):
+        animation = _samples_of(clips)
+        rest = character.rest_pose(rig, animation.offsets)
+        boxes = extent.bounding_boxes(rig.tree, animation, rest.radii)
+        values = character.character_arrays(rest, convention)
+        values["extent"] = conventions.convert_box(convention, boxes).astype(np.float32)
+        for index, samples in enumerate(_samples(animation, clips, convention)):
+            clip = clips[index].clip
+            builder = ClipLayerBuilder(clip.rate, convention, rig, _curve_names(clip))
+            clip_values = {name: array[index] for name, array in values.items()}
+            yield builder, _content(clips[index], samples, clip_values)
 
 
 ANIMATION_NAME = "Anim"
@@ -236,9 +211,16 @@ class AnimationLayerBuilder(BaseLayerBuilder):
 
 def animation_usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, with the facts and without a character."""
-    return [
-        crate_template.usdc(
-            AnimationLayerBuilder(take.rate, convention, take.rig.paths, take.curves), take.content
-        )
-        for take in arrays_without_character(answers, convention)
-    ]
+    return [crate_template.usdc(*pair) for pair in animation_contents(answers, convention)]
+
+
+def animation_contents(
+    answers: Sequence[SampledClip], convention: Convention
+) -> Iterator[tuple[AnimationLayerBuilder, LayerContent]]:
+    """Yield the builder and the content of the layer of each animation, in their order."""
+    for rig, clips in _grouped_by_rig(answers, WITHOUT_BODY):
+        animations = _samples(_samples_of(clips), clips, convention)
+        for answer, samples in zip(clips, animations, strict=True):
+            names = _curve_names(answer.clip)
+            builder = AnimationLayerBuilder(answer.clip.rate, convention, rig.paths, names)
+            yield builder, _content(answer, samples, {})

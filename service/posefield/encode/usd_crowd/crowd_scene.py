@@ -1,4 +1,4 @@
-"""Scene hierarchy of a crowd: prototype, characters and their placement, motions and extents.
+"""Scene of a crowd: prototype, characters and their placement, motions and extents; its layers.
 
     /Crowd                      assembly, the default prim
       Prototype                 class, the one character that all others refer to
@@ -12,6 +12,11 @@ after all motions are computed, as opinions, so that they may be in a layer of t
 
 All characters share one body mesh, made for the model's own bones, while each has its own bone
 offsets.
+
+usd-core holds a layer's samples until it has been exported, so a crowd of one layer is in memory
+once. A crowd of many layers, an entry, the character, one for each motion and a summary, is written
+as its motions are computed, in a fraction of the time. The summary is a sublayer of the entry, so
+that the entry can be written before any motion is computed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,15 +30,20 @@ from pxr import Sdf, Vt
 
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, Singles
-from posefield.encode.character import animation_samples, extent
-from posefield.encode.character.animation_samples import AnimationSamples
+from posefield.encode import archives
+from posefield.encode.archives import ZipMember
+from posefield.encode.character import character, extent
 from posefield.encode.character.character import CharacterRig
+from posefield.encode.character.extent import AnimationSamples
 from posefield.encode.conventions import METRES
+from posefield.encode.usd import character_prims
 from posefield.encode.usd.usd_clip import AnimationLayerBuilder
+from posefield.encode.usd_crowd import crowd_size
 from posefield.encode.usd_layers import crate_template, layers
 from posefield.encode.usd_layers.layers import WEIGHTS, LayerContent, Samples, ValueTypes
 from posefield.motion import quat
 from posefield.motion.clip import CrowdClip, Motions, Placement
+from posefield.question.motion_question import BodyKind
 
 CORNERS = np.array(list(product((False, True), repeat=3)))
 
@@ -75,11 +85,6 @@ class MotionSamples:
     summary: MotionSummary
 
 
-def motion_count(crowd: CrowdClip) -> int:
-    """Return the number of motions that the characters play."""
-    return int(crowd.motion.max()) + 1
-
-
 def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
     """Yield the motions in order; at most one batch is in memory at a time.
 
@@ -90,8 +95,8 @@ def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
     for motion in chain.from_iterable(map(partial(_batch_motions, crowd, rig), crowd.batches)):
         count += 1
         yield motion
-    if count != motion_count(crowd):
-        raise ValueError(f"{count} motions, expected {motion_count(crowd)}")
+    if count != crowd_size.motion_count(crowd):
+        raise ValueError(f"{count} motions, expected {crowd_size.motion_count(crowd)}")
 
 
 def motion_layer(crowd: CrowdClip, rig: CharacterRig, samples: Samples) -> bytes:
@@ -105,7 +110,7 @@ def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Itera
     if batch.rotations.shape[1:] != expected:
         raise ValueError(f"motions of {batch.rotations.shape[1:]}, expected {expected}")
     weights = _weights(crowd, batch)
-    animation = animation_samples.from_motions(batch)
+    animation = extent.samples_of_motions(batch)
     boxes = motion_boxes(rig, animation)
     for index, (motion, box) in enumerate(zip(animation.parts(1), boxes, strict=True)):
         samples = {"translations": motion.translations, "rotations": motion.rotations}
@@ -285,3 +290,124 @@ def _set_levels(layer: Any, prim: Any, note: MotionSummary) -> None:
 def _attribute(layer: Any, path: Any, kind: Any) -> Any:
     attribute = layer.GetAttributeAtPath(path)
     return attribute or Sdf.CreatePrimAttributeInLayer(layer, path, kind)
+
+
+def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKind) -> Any:
+    """Return a layer in which every character refers to one prototype; the caller must hold it."""
+    layer, rig = new_layer(crowd, form), character.rig(crowd.skeleton, body)
+    root = layer.GetPrimAtPath(ROOT)
+    prototype = character_prims.root(root, PROTOTYPE.name, rig)
+    character_prims.add_blend_shapes(prototype, rig, crowd.curves)
+    character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
+    prototype.specifier = Sdf.SpecifierClass
+    group = layers.prim(root, MOTIONS.name, "Scope")
+    notes = []
+    for index, motion in enumerate(all_motions(crowd, rig)):
+        name = motion_name(index)
+        animation = character_prims.animation(group, name, rig.paths, crowd.curves)
+        layers.set_time_samples(animation, motion.samples)
+        notes.append(motion.summary)
+    add_references(layer, crowd, instanced)
+    add_to_references(layer, crowd, notes)
+    return layer
+
+
+def flat_layer(crowd: CrowdClip, form: str, body: BodyKind) -> Any:
+    """Return a layer in which every character has its own data; the caller must hold it."""
+    layer, rig = new_layer(crowd, form), character.rig(crowd.skeleton, body)
+    _copy_prototype(layer, crowd, rig)
+    notes = []
+    for index, motion in enumerate(all_motions(crowd, rig)):
+        _copy_motion(layer, crowd, index, rig, motion)
+        notes.append(motion.summary)
+    add_to_flat(layer, crowd, notes)
+    return layer
+
+
+def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
+    # Sdf.CopySpec would take a third of the time, but it adds the fields of a spec in the order of
+    # their names' addresses, which differs between processes and shows in binary files.
+    group, values = (
+        characters_prim(layer),
+        character_prims.values(character.rest_pose_arrays(rig)),
+    )
+    for some in character_blocks(crowd):
+        with Sdf.ChangeBlock():
+            prims = [character_prims.root(group, character_name(i), rig) for i in some]
+            for prim in prims:
+                character_prims.add_blend_shapes(prim, rig, crowd.curves)
+                character_prims.set_values(prim, values)
+            set_transforms(prims, crowd.placement.select(some))
+
+
+def _copy_motion(
+    layer: Any, crowd: CrowdClip, played: int, rig: CharacterRig, motion: MotionSamples
+) -> None:
+    """Give each character that plays a motion, of an index, a copy of it.
+
+    The copy has the character's name: some readers identify an animation by the name of its prim
+    alone.
+    """
+    first = None
+    for index in np.flatnonzero(crowd.motion == played).tolist():
+        cancellation.check()
+        root = layer.GetPrimAtPath(character_path(index))
+        skel_animation = character_prims.animation(root, root.name, rig.paths, crowd.curves)
+        if first is None:
+            layers.set_time_samples(skel_animation, motion.samples)
+            first = skel_animation.path
+        else:
+            # Each spec lacks at most one field, so the order of copying does not matter.
+            Sdf.CopySpec(layer, first, layer, skel_animation.path)
+        character_prims.bind_animation(root, skel_animation.path)
+
+
+LAYER_FOLDER, CHARACTER_FILE, SUMMARY_FILE = "crowd_clips", "character.usdc", "summary.usdc"
+
+
+def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
+    """Return the root layer, which refers to the others in a folder beside it."""
+    layer = new_layer(crowd, "usdc")
+    root = layer.GetPrimAtPath(ROOT)
+    layer.subLayerPaths.append(f"./{folder}/{SUMMARY_FILE}")
+    with Sdf.ChangeBlock():
+        prototype = layers.prim(root, PROTOTYPE.name, "SkelRoot")
+        prototype.specifier, prototype.kind = Sdf.SpecifierClass, "component"
+        set_payload(prototype, f"./{folder}/{CHARACTER_FILE}")
+        group = layers.prim(root, MOTIONS.name, "Scope")
+        for name in map(motion_name, range(crowd_size.motion_count(crowd))):
+            set_payload(layers.prim(group, name, "SkelAnimation"), f"./{folder}/{name}.usdc")
+    add_references(layer, crowd, instanced)
+    return layers.crate_bytes(layer)
+
+
+def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each other layer, one at a time."""
+    rig, notes = character.rig(crowd.skeleton, body), []
+    standing = _part_layer("Character", crowd)
+    prim = character_prims.root(standing, "Character", rig)
+    character_prims.add_blend_shapes(prim, rig, crowd.curves)
+    character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
+    yield CHARACTER_FILE, layers.crate_bytes(standing)
+    for index, motion in enumerate(all_motions(crowd, rig)):
+        notes.append(motion.summary)
+        yield (
+            f"{motion_name(index)}.usdc",
+            motion_layer(crowd, rig, motion.samples),
+        )
+    last = _part_layer(ROOT.name, crowd)
+    add_to_references(last, crowd, notes)
+    yield SUMMARY_FILE, layers.crate_bytes(last)
+
+
+def members(crowd: CrowdClip, instanced: bool, body: BodyKind) -> Iterator[ZipMember]:
+    """Yield all layers as members of an archive, the entry first."""
+    yield archives.whole("crowd.usdc", root_layer(crowd, instanced, LAYER_FOLDER))
+    for name, content in referenced_layers(crowd, body):
+        yield archives.whole(f"{LAYER_FOLDER}/{name}", content)
+
+
+def _part_layer(default: str, crowd: CrowdClip) -> Any:
+    layer = Sdf.Layer.CreateAnonymous("part.usdc")
+    layers.set_layer_metadata(layer, default, crowd.frames, crowd.rate)
+    return layer

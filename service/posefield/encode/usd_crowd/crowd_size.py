@@ -6,6 +6,10 @@ in memory, which are many times those in binary files (decision 0029).
 
 from dataclasses import dataclass
 
+from posefield.common.errors import InvalidField
+from posefield.encode import archives
+from posefield.motion.clip import CrowdClip
+
 # Bytes of a character that refers to the prototype, of one with its own skeleton and body, and of a
 # motion without its frames.
 CHARACTER, FLAT, MOTION = 2_600, 40_000, 8_000
@@ -58,3 +62,31 @@ def _characters(counts: CrowdCounts, flat: bool) -> int:
 
 def _motion(counts: CrowdCounts) -> int:
     return MOTION + counts.frames * (POSE + JOINT * counts.joints + WEIGHT * counts.curves)
+
+
+def motion_count(crowd: CrowdClip) -> int:
+    """Return the number of motions that the characters play."""
+    return int(crowd.motion.max()) + 1
+
+
+# Bytes of a character in the entry of a crowd of many layers, and of the rest of entry and body.
+REFERENCE, REST = 2_000, 100_000
+# Of a curve: a weight in a frame with its share of the head; its name in a layer; its blend shape.
+HEADED_WEIGHT, CURVE_NAME, PLAIN_SHAPE = 12, 200, 1_000
+
+
+def archive_size_bound(crowd: CrowdClip) -> int:
+    """Return an upper bound of the bytes of all layers."""
+    curves = len(crowd.curves)
+    frame = POSE + JOINT * len(crowd.skeleton) + HEADED_WEIGHT * curves
+    layer = MOTION + CURVE_NAME * curves + crowd.frames * frame
+    return REST + PLAIN_SHAPE * curves + motion_count(crowd) * layer + len(crowd.motion) * REFERENCE
+
+
+def check_archive_size(crowd: CrowdClip) -> None:
+    """Raise InvalidField if an archive of the crowd could exceed the limits of a zip."""
+    size, members = archive_size_bound(crowd), motion_count(crowd) + 3
+    if size > archives.BYTES or members > archives.MEMBERS:
+        sizes = f"{size / 1e9:.1f} GB in {members} layers"
+        expected = f"{archives.BYTES / 1e9:.1f} GB in {archives.MEMBERS}"
+        raise InvalidField("format", f"{sizes}, expected at most {expected} in a usdz; take usd")

@@ -24,14 +24,7 @@ from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.common.errors import FileError, InvalidField, did_you_mean
 from posefield.encode import archives
 from posefield.encode.character import character
-from posefield.encode.usd_crowd import (
-    FILES,
-    INSTANCING,
-    STREAMS,
-    crowd_package,
-    crowd_scene,
-    crowd_size,
-)
+from posefield.encode.usd_crowd import FILES, INSTANCING, STREAMS, crowd_scene, crowd_size
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.encode.usd_layers import layers
 from posefield.motion.clip import CrowdClip
@@ -169,7 +162,7 @@ def stream(
     counts = CrowdCounts(
         len(crowd.skeleton),
         len(crowd.motion),
-        crowd_scene.motion_count(crowd),
+        crowd_size.motion_count(crowd),
         crowd.frames,
         character.body_size(crowd.skeleton, body),
         len(crowd.curves),
@@ -193,7 +186,7 @@ def _validate(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancin
     _check_choice("format", ending, endings)
     _check_choice("instancing", instancing, INSTANCING)
     if ending == "usdz":
-        crowd_package.check_size(crowd)
+        crowd_size.check_archive_size(crowd)
 
 
 def _check_choice(field: str, value: str, expected: tuple[str, ...]) -> None:
@@ -208,8 +201,8 @@ def _form(ending: str) -> str:
 
 def _layer(crowd: CrowdClip, form: str, instancing: str, body: BodyKind) -> Any:
     if instancing == "flatten":
-        return crowd_package.flat_layer(crowd, form, body)
-    return crowd_package.referencing_layer(crowd, form, instancing == "scenegraph", body)
+        return crowd_scene.flat_layer(crowd, form, body)
+    return crowd_scene.referencing_layer(crowd, form, instancing == "scenegraph", body)
 
 
 def _single_file(crowd: CrowdClip, ending: str, instancing: str, body: BodyKind) -> Iterator[bytes]:
@@ -221,7 +214,7 @@ def _single_file(crowd: CrowdClip, ending: str, instancing: str, body: BodyKind)
 
 def _usdz(crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
     if instancing != "flatten":
-        members = crowd_package.members(crowd, instancing == "scenegraph", body)
+        members = crowd_scene.members(crowd, instancing == "scenegraph", body)
         return archives.zip_chunks(members)
     return _flat_usdz(crowd, body)
 
@@ -229,7 +222,7 @@ def _usdz(crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
 def _flat_usdz(crowd: CrowdClip, body: BodyKind) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, "crowd.usdc")
-        layers.export_layer(crowd_package.flat_layer(crowd, "usdc", body), path)
+        layers.export_layer(crowd_scene.flat_layer(crowd, "usdc", body), path)
         yield from archives.zip_chunks([archives.member_of_file(path.name, path)])
 
 
@@ -244,8 +237,8 @@ def _write_folder(crowd: CrowdClip, path: Path, instanced: bool, body: BodyKind)
     folder = path.with_name(f"{path.stem}_clips")
     _check_crowd_folder(folder)
     with atomic_files.replacing_pair(path, folder) as (entry, inside):
-        entry.write_bytes(crowd_package.root_layer(crowd, instanced, folder.name))
-        for name, content in crowd_package.referenced_layers(crowd, body):
+        entry.write_bytes(crowd_scene.root_layer(crowd, instanced, folder.name))
+        for name, content in crowd_scene.referenced_layers(crowd, body):
             (inside / name).write_bytes(content)
 
 
