@@ -16,7 +16,7 @@ from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
 from posefield.model_file import onnx_file
 from posefield.motion import quat
-from posefield.motion.rotation_charts import CHARTS, ChartName
+from posefield.motion.quat import CHARTS, ChartName
 from posefield_train.align import time_alignment
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_graph import COVARIANCES

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefield.motion import quat, skeleton
-from posefield.motion.rotation_charts import CHARTS
+from posefield.motion.quat import CHARTS
 from posefield_train.tensor import motion_tensor
 
 PARENTS = (-1, 0, 1, 2, 1, 4)

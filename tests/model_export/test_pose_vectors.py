@@ -7,7 +7,7 @@ import pytest
 
 from posefield.common.errors import TrainingError
 from posefield.motion import quat
-from posefield.motion.rotation_charts import CHARTS
+from posefield.motion.quat import CHARTS
 from posefield_train.tensor import pose_vectors
 
 UP = np.array([0.0, 1.0, 0.0])

@@ -8,7 +8,7 @@ from numpy.random import PCG64, Generator
 from running import bank_values, outputs
 
 from posefield.motion import quat
-from posefield.motion.rotation_charts import CHARTS
+from posefield.motion.quat import CHARTS
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.kriging import thinning, universal_kriging

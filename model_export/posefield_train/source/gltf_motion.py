@@ -9,9 +9,8 @@ import numpy as np
 from posefield.common.units import Floats, Positions, Rotations
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
-from posefield.rigs import gltf_document, gltf_rig, rest_joints
-from posefield.rigs.gltf_document import Beside, GltfDocument
-from posefield.rigs.gltf_rig import GltfJoints
+from posefield.rigs import gltf_rig, rest_joints
+from posefield.rigs.gltf_rig import Beside, GltfDocument, GltfJoints
 from posefield.rigs.rest_joints import SCALE_TOLERANCE, Transform
 from posefield.roles import joint_recognition
 from posefield_train.source import motion_file
@@ -100,8 +99,8 @@ def _read_tracks(document: GltfDocument, animation: Any) -> Tracks:
 
 
 def _track(document: GltfDocument, sampler: Any, part: str) -> Track:
-    times = gltf_document.numbers(document, sampler.input, "SCALAR")[:, 0]
-    values = gltf_document.numbers(document, sampler.output, KINDS[part])
+    times = gltf_rig.numbers(document, sampler.input, "SCALAR")[:, 0]
+    values = gltf_rig.numbers(document, sampler.output, KINDS[part])
     is_rotation = part == "rotation"
     if is_rotation:
         values = values[:, [3, 0, 1, 2]]
@@ -140,7 +139,7 @@ def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> M
 
 
 def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> MotionFile:
-    document = gltf_document.load(content, source, beside)
+    document = gltf_rig.load(content, source, beside)
     name, animation, notes = _chosen(document, options.animation)
     curves = _read_tracks(document, animation)
     joints = _joints(document, curves, options.skeleton)

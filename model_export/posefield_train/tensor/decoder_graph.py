@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices
 from posefield.motion import quat
 from posefield.motion.curves import limits
-from posefield.motion.rotation_charts import CHARTS, ChartName
+from posefield.motion.quat import CHARTS, ChartName
 from posefield_train.onnx_graph import GraphBuilder, Integers
 from posefield_train.tensor.decoder import Decoder
 from posefield_train.tensor.pose_vectors import PoseChart

@@ -23,7 +23,7 @@ from posefield.common.units import (
 from posefield.motion import curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, distances
-from posefield.motion.rotation_charts import CHARTS
+from posefield.motion.quat import CHARTS
 from posefield_train.align import time_alignment, travel
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.align.warp import CanonicalTiming

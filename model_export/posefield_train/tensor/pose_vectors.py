@@ -1,6 +1,6 @@
 """Pose vectors: root translation and the numbers of each joint's rotation about its mean.
 
-The numbers are those of a chart of rotations (`rotation_charts`). Rotations are ambiguous beyond
+The numbers are those of a chart of rotations (`quat`). Rotations are ambiguous beyond
 half a turn from the mean, which a raised arm can reach: they are unwrapped so that no clip is
 discontinuous, and every such joint is reported.
 """
@@ -22,7 +22,7 @@ from posefield.common.units import (
     Vector,
 )
 from posefield.motion import quat
-from posefield.motion.rotation_charts import CHARTS, ChartName
+from posefield.motion.quat import CHARTS, ChartName
 from posefield.motion.skeleton import POSES_PER_BLOCK
 from posefield_train.source import canonical
 from posefield_train.source.canonical import Finding

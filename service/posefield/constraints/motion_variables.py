@@ -18,7 +18,7 @@ from posefield.common.units import (
 )
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.motion import quat
-from posefield.motion.rotation_charts import CHARTS, RotationChart
+from posefield.motion.quat import CHARTS, RotationChart
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from posefield.kriging.random_field import Seeds
 from posefield.model_file.model_card import Level, ModelCard
 from posefield.motion import curves, quat
 from posefield.motion.curves import Curve
-from posefield.motion.rotation_charts import CHARTS, ChartName
+from posefield.motion.quat import CHARTS, ChartName
 
 STREAM = 3
 """Stream of a seed, besides those of `random_field`."""

@@ -31,7 +31,7 @@ from posefield.motion import measures
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.curves import Curve
 from posefield.motion.measures import Measure
-from posefield.motion.rotation_charts import ChartName
+from posefield.motion.quat import ChartName
 from posefield.motion.skeleton import Skeleton
 
 
@@ -201,7 +201,7 @@ class TrainingParameters:
     motions without one. take_root (4, r3 + 4): of a cycle, last rows of a root of the covariance of
     the errors of the coefficients, of the duration's logarithm and of the travel, for a sigma of
     one metre. detail: of a cycle, deviations that no control predicts (`reduced_motion`). chart: of
-    the numbers of rotations (`rotation_charts`).
+    the numbers of rotations (`quat`).
     """
 
     fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from posefield.motion import quat
-from posefield.motion.rotation_charts import CHARTS
+from posefield.motion.quat import CHARTS
 
 EXACT = 1e-12
 
