@@ -276,10 +276,7 @@ def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
         raise row.error(f"frame {last}, but {row.place} has frames 0 to {len(clip) - 1}")
     if last <= row.first_frame:
         raise row.error(f"{row.place} has frames 0 to {last}, expected two or more")
-    kept = slice(row.first_frame, last + 1)
-    rotations, translations = clip.rotations[kept], clip.translations[kept]
-    curves = clip.curves and replace(clip.curves, values=clip.curves.values[kept])
-    return replace(clip, rotations=rotations, translations=translations, curves=curves), last
+    return clip.part(slice(row.first_frame, last + 1)), last
 
 
 BVH = "BVH"

@@ -155,7 +155,7 @@ def _held_hands(
 ) -> tuple[list[HandGoal], list[str]]:
     """Return the targets of hands as goals while they are held, and sentences on others.
 
-    named: role of each joint that is a hand.
+    hand_roles: role of each joint that is a hand.
     """
     goals = [
         HandGoal(
@@ -178,7 +178,7 @@ def _hand_goals(
 ) -> tuple[list[HandGoal], list[str]]:
     """Return the targets of hands as goals, and a sentence for each other target.
 
-    named: role of each joint that is a hand.
+    hand_roles: role of each joint that is a hand.
 
     A goal is at the frame in which the joint of the model is nearest to the target, its moment.
     """
@@ -200,11 +200,7 @@ def _hand_goals(
 
 def _loop_note(clip: Clip) -> list[str]:
     """Return a sentence if the last pose of a loop is not the first, as seen from the root."""
-    boundary = replace(
-        clip,
-        rotations=clip.rotations[[0, -1]].copy(),
-        translations=clip.translations[[0, -1]].copy(),
-    )
+    boundary = clip.part([0, -1])
     boundary.rotations[:, 0], boundary.translations[:, 0] = quat.IDENTITY, 0.0
     first, last = boundary.positions()
     distance = float(np.linalg.norm(last - first, axis=-1).max())

@@ -120,19 +120,11 @@ MOST_CHARACTERS = 1000
 
 
 @dataclass(frozen=True)
-class CharacterFault:
-    """File of a folder that cannot be used. reason: in words."""
-
-    file: str
-    reason: str
-
-
-@dataclass(frozen=True)
 class CharacterFolder:
-    """Characters by name, and files that cannot be used."""
+    """Characters by name, and the reason by file for files that cannot be used."""
 
     characters: Mapping[str, UserCharacter] = field(default_factory=dict)
-    faults: tuple[CharacterFault, ...] = ()
+    faults: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> bytes:
@@ -159,9 +151,7 @@ class CharacterFolder:
         """Return the CharacterList (schema of the contract)."""
         return {
             "characters": [_facts(character) for character in self.characters.values()],
-            "faults": [
-                {"file": character.file, "reason": character.reason} for character in self.faults
-            ],
+            "faults": [{"file": file, "reason": reason} for file, reason in self.faults.items()],
         }
 
 
@@ -182,15 +172,15 @@ def read_folder(folder: Path, prefix: str) -> CharacterFolder:
     if len(files) > MOST_CHARACTERS:
         raise FileError(folder, f"{len(files)} files, expected at most {MOST_CHARACTERS}")
     characters: dict[str, UserCharacter] = {}
-    faults = []
+    faults: dict[str, str] = {}
     for file in files:
         try:
             characters[file.stem] = _read(file, prefix, characters)
         except FileError as error:
             # Clients read the reasons: they do not tell where the folder is.
             reason = error.message.replace(f"{folder.resolve()}{os.sep}", "")
-            faults.append(CharacterFault(file.name, reason))
-    return CharacterFolder(characters, tuple(faults))
+            faults[file.name] = reason
+    return CharacterFolder(characters, faults)
 
 
 def _read(file: Path, prefix: str, characters: Mapping[str, UserCharacter]) -> UserCharacter:

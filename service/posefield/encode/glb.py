@@ -50,7 +50,7 @@ class GlbBuffer:
     def view(self, content: bytes, **properties: Any) -> int:
         """Return the index of a new view of bytes, padded to a multiple of four.
 
-        said: further properties of the view.
+        properties: further ones of the view.
         """
         last = self.views[-1] if self.views else {"byteOffset": 0, "byteLength": 0}
         start = last["byteOffset"] + _padded_length(last["byteLength"])
@@ -62,7 +62,7 @@ class GlbBuffer:
     def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **properties: Any) -> int:
         """Return the index of a new accessor with one element per row of the array.
 
-        kind: glTF type such as "VEC3". said: further properties of the accessor.
+        kind: glTF type such as "VEC3". properties: further ones of the accessor.
         """
         component = COMPONENTS[array.dtype.str[1:]]
         accessor = {
@@ -82,13 +82,13 @@ class GlbBuffer:
         return len(self.accessors) - 1
 
     def add(self, array: npt.NDArray[Any], kind: str, **properties: Any) -> int:
-        """Return the index of an accessor of a whole array; said: properties of its view."""
+        """Return the index of an accessor of a whole array; properties: of its view."""
         return self.accessor(array, kind, self.view(array.tobytes(), **properties))
 
     def add_bounded(self, array: npt.NDArray[Any], kind: str, **properties: Any) -> int:
         """Return the index of an accessor of a whole array, with minimum and maximum.
 
-        glTF requires them for positions and times. said: properties of its view.
+        glTF requires them for positions and times. properties: of its view.
         """
         flat = array.reshape(len(array), -1)
         bounds = {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()}

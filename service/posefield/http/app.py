@@ -91,8 +91,8 @@ def _characters(settings: Settings) -> CharacterFolder:
     if not settings.characters:
         return EMPTY
     folder = user_character.read_folder(Path(settings.characters), settings.character_prefix)
-    for fault in folder.faults:
-        log.warning("character %s cannot be used: %s", fault.file, fault.reason)
+    for file, reason in folder.faults.items():
+        log.warning("character %s cannot be used: %s", file, reason)
     return folder
 
 

@@ -24,7 +24,7 @@ from posefield.common.errors import ModelError
 from posefield.common.units import Floats
 from posefield.model_file import card_check, onnx_file
 from posefield.model_file.model_card import FORMAT, OPTIONAL_ENTRIES, PREFIX, UNITS, ModelCard
-from posefield.roles.standing import standing
+from posefield.roles.joint_recognition import standing
 
 CHECKSUM_KEY = b"posefield_sha256"
 

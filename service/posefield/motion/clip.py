@@ -1,7 +1,7 @@
 """Clips and crowds: motions of one skeleton, sampled at a constant rate."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -71,6 +71,12 @@ class Clip:
     def curve_values(self) -> Annotated[Floats, "frames curves"]:
         """Return the values (F, C) of the curves; (F, 0) without them."""
         return np.zeros((len(self), 0)) if self.curves is None else self.curves.values
+
+    def part(self, frames: slice | Sequence[int]) -> "Clip":
+        """Return some of the frames."""
+        curves = self.curves and replace(self.curves, values=self.curves.values[frames])
+        rotations, translations = self.rotations[frames], self.translations[frames]
+        return replace(self, rotations=rotations, translations=translations, curves=curves)
 
     def positions(self) -> Positions:
         """Return the joint positions (F, J, 3) in the character's frame, m."""

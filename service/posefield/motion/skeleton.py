@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -197,21 +197,16 @@ def _accumulate(
     return world, turns
 
 
-@dataclass(frozen=True)
-class TreeLevel:
-    """Joints of one depth. rows: in the order of the levels. parents: of each, in that order."""
+class TreeLevels(NamedTuple):
+    """Levels of a tree without its root.
 
-    rows: slice
-    parents: Indices
+    levels: of the joints of one depth, their rows in the order of the levels, and the row of the
+    parent of each. order: joints by level. ranks: rows of the joints.
+    """
 
-
-@dataclass(frozen=True)
-class TreeLevels:
-    """Levels of a tree without its root. order: joints by level. places: of the joints in it."""
-
-    levels: tuple[TreeLevel, ...]
+    levels: tuple[tuple[slice, Indices], ...]
     order: Indices
-    places: Indices
+    ranks: Indices
 
 
 @lru_cache(64)
@@ -224,7 +219,7 @@ def tree_levels(parents: tuple[int, ...]) -> TreeLevels:
     ranks = np.argsort(order)
     level_ends = np.cumsum(np.bincount(depths))
     levels = [
-        TreeLevel(slice(int(begin), int(end)), ranks[np.array(parents)[order[begin:end]]])
+        (slice(int(begin), int(end)), ranks[np.array(parents)[order[begin:end]]])
         for begin, end in pairwise(level_ends)
     ]
     return TreeLevels(tuple(levels), order, ranks)
@@ -251,18 +246,18 @@ def _accumulate_levels(
         sorted_rotations[:, 0],
         sorted_rotations[1:3, 0],
     )
-    for level in tree.levels:
-        rows, above = level.rows, turns[:, level.parents]
+    for rows, parent_rows in tree.levels:
+        above = turns[:, parent_rows]
         placed = _rotated(above, arms[:, rows])
-        placed += world[:, level.parents]
+        placed += world[:, parent_rows]
         world[:, rows] = placed
         turned = above[0] * terms[0, :, rows]
         for component in (1, 2, 3):
             turned += above[component] * terms[component, :, rows]
         turns[:4, rows], turns[4:, rows] = turned, turned[1:3]
     # Sums over an array depend on its layout, which is therefore that of larger numbers of poses.
-    placed = np.ascontiguousarray(world[:, tree.places].T)
-    return placed, np.ascontiguousarray(turns[:4, tree.places].T)
+    placed = np.ascontiguousarray(world[:, tree.ranks].T)
+    return placed, np.ascontiguousarray(turns[:4, tree.ranks].T)
 
 
 def _rotated(

@@ -16,9 +16,10 @@ from posefield.common.units import UP, Booleans, Floats, Rotations, Vector
 from posefield.feet.two_bone import shortest_turn
 from posefield.motion import quat
 from posefield.motion.skeleton import joint_chain
-from posefield.retarget.planted_legs import FLOOR, PosedRig
-from posefield.retarget.role_map import SIDES, Body, Chain
+from posefield.retarget.role_map import SIDES, Body, Chain, PosedBody
 
+FLOOR = 1.0 - UP
+"""Factors of a vector that leave its part along the floor."""
 UPRIGHT = 0.7
 """Vertical part of the directions of legs and trunk at rest from which on a body stands."""
 SAME_SLOPE = np.radians(10.0)
@@ -27,7 +28,7 @@ FLAT_SHARE = 30.0
 """Percentile of the heights of an ankle in stances up to which its foot is flat."""
 
 
-def with_upright_rest(motion: PosedRig) -> PosedRig:
+def with_upright_rest(motion: PosedBody) -> PosedBody:
     """Return a motion whose body is at rest as in its most upright frame, if its own rest is not.
 
     Positions stay; orientations are those against the new rest.
@@ -38,11 +39,11 @@ def with_upright_rest(motion: PosedRig) -> PosedRig:
     feet = 0.5 * (motion.of_role("leftFoot") + motion.of_role("rightFoot"))
     top = motion.of_role(next(role for role in ("neck", "head", "hips") if role in joints))
     frame = int(np.argmax(np.round((top - feet) @ UP, 4)))
-    positions = motion.places[frame]
+    positions = motion.positions[frame]
     bones = positions - positions[list(motion.body.parents)]
     bones[0] = positions[0]
-    turns = quat.mul(motion.turns, quat.conj(motion.turns[frame]))
-    return replace(motion, body=replace(motion.body, bones=bones), turns=turns)
+    turns = quat.mul(motion.orientations, quat.conj(motion.orientations[frame]))
+    return replace(motion, body=replace(motion.body, bones=bones), orientations=turns)
 
 
 def is_upright(body: Body) -> bool:
@@ -93,7 +94,7 @@ def sole_at_rest(body: Body, side: str) -> Sole:
 
 
 def sole_of_motion(
-    motion: PosedRig, side: str, standing: Annotated[Booleans, "frames"], rig: Sole
+    motion: PosedBody, side: str, standing: Annotated[Booleans, "frames"], rig: Sole
 ) -> Sole:
     """Return the sole of a foot of a motion, flat as it is while it stands with a low ankle.
 

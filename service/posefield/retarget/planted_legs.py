@@ -17,15 +17,14 @@ from posefield.common.units import UP, Booleans, Floats, Frames, Indices, RootPa
 from posefield.feet import stance_rows, two_bone
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import UNEVEN, Interval
-from posefield.motion import quat, skeleton
+from posefield.motion import quat
 from posefield.question.results import StanceResult
-from posefield.retarget.role_map import SIDES, Body
+from posefield.retarget.role_map import SIDES, Body, PosedBody, moved, posed
 
 FADE = 0.1
 """Time over which a correction settles before the first stance and after the last, s."""
 HIGHEST_FOOT = 0.2
 """Largest height at rest of a joint that stands, as a share of the leg."""
-FLOOR = 1.0 - UP
 
 
 @dataclass(frozen=True)
@@ -147,7 +146,7 @@ def plan_paths(
     """
     planned = feet.paths + (heights - feet.heights)[:, None] * UP
     for foot, intervals in enumerate(feet.stances):
-        offsets = (copied[:, foot] - feet.paths[:, foot]) * FLOOR
+        offsets = (copied[:, foot] - feet.paths[:, foot]) * (1.0 - UP)
         planned[:, foot] += offsets + _correction(offsets, intervals, rate)
     return planned
 
@@ -211,86 +210,30 @@ SAME = 1e-6
 """Distance, m, up to which the end of a limb is where it is wanted, and the limb stays."""
 
 
-@dataclass(frozen=True)
-class PosedRig:
-    """Poses of a rig. rotations (F, J, 4): local. roots (F, 3), places (F, J, 3), m."""
+def plant(
+    rig: PosedBody,
+    feet: SourceFeet,
+    soles: tuple[Annotated[Floats, "feet"], Annotated[Floats, "feet 3"]],
+    limited: bool,
+    rate: float,
+) -> tuple[PosedBody, PosedBody, Annotated[Floats, "frames feet"], Frames]:
+    """Return the poses with the feet on their paths, and those before.
 
-    body: Body
-    rotations: Rotations
-    roots: RootPath
-    places: Annotated[Floats, "frames joints 3"]
-    turns: Annotated[Floats, "frames joints 4"]
-
-    def of_role(self, role: str) -> RootPath:
-        """Return the positions (F, 3), m, of the joint of a role."""
-        return self.places[:, self.body.joints[role]]
-
-    def limb(self, roles: tuple[str, ...]) -> tuple[Limb, LimbPoses]:
-        """Return the limb of joints of roles, and its poses; joints between them do not turn."""
-        role_joints = [self.body.joints[role] for role in roles]
-        joints = (self.body.parents[role_joints[0]], *role_joints)
-        rest = self.body.rest[list(joints)]
-        bones = np.diff(rest, axis=0, prepend=rest[:1])
-        parents = tuple(range(-1, len(joints) - 1))
-        limb_positions, turns = self.places[:, list(joints)], self.turns[:, list(joints)]
-        limb = Limb(role_joints[0], role_joints[1], role_joints[2], role_joints[-1])
-        return limb, LimbPoses(joints, parents, bones, limb_positions, turns)
-
-
-def posed(body: Body, rotations: Rotations, roots: RootPath) -> PosedRig:
-    """Return poses with the positions and orientations of their joints."""
-    translations = skeleton.translations(body.bones, roots)
-    return PosedRig(
-        body,
-        rotations,
-        roots,
-        *skeleton.forward_kinematics(body.parents, rotations, translations),
-    )
-
-
-def moved(rig: PosedRig, shift: RootPath) -> PosedRig:
-    """Return poses whose root is moved by (F, 3), m."""
-    positions = rig.places + shift[:, None]
-    return PosedRig(rig.body, rig.rotations, rig.roots + shift, positions, rig.turns)
-
-
-@dataclass(frozen=True)
-class PlantedLegs:
-    """Poses whose feet follow their paths.
-
-    copied: before. depths (F, 2): of soles below the floor, m. lowered: of the pelvis (F,), m.
+    Further the depths (F, 2) of soles below the floor, and how much the pelvis was lowered (F,), m.
+    feet: of the motion, in proportion. soles: heights (2,) of the joints that stand above the
+    soles, and vectors (2, 3) at rest from the ankles to the soles below, m. limited: whether the
+    depth of the soles is limited.
     """
-
-    rig: PosedRig
-    copied: PosedRig
-    depths: Annotated[Floats, "frames feet"]
-    lowered: Frames
-
-
-@dataclass(frozen=True)
-class RigSoles:
-    """Soles of a rig's feet.
-
-    heights (2,): of the joints that stand above the soles, m. heels (2, 3): vectors at rest from
-    the ankles to the soles below, m. limited: whether their depth below the floor is limited.
-    """
-
-    heights: Annotated[Floats, "feet"]
-    heels: Annotated[Floats, "feet 3"]
-    limited: bool = True
-
-
-def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> PlantedLegs:
-    """Return the poses with the feet on their paths. feet: of the motion, in proportion."""
+    heights, _ = soles
     copied = _at(rig, feet.roles)
-    target_heights = feet.paths @ UP + soles.heights - feet.heights
+    target_heights = feet.paths @ UP + heights - feet.heights
     rig = moved(
         rig, _pelvis_height(target_heights - copied @ UP, feet.standing, rate)[:, None] * UP
     )
     copied = _at(rig, feet.roles)
-    paths = plan_paths(feet, copied, soles.heights, rate)
+    paths = plan_paths(feet, copied, heights, rate)
     depths = sole_depths(rig, soles, feet.floors, paths, paths - copied)
-    if soles.limited:
+    if limited:
         paths += limited_lifts(depths)[..., None] * UP
     legs = [
         rig.limb((side + "UpperLeg", side + "LowerLeg", side + "Foot", role))
@@ -315,7 +258,7 @@ def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> Plan
     planted = posed(rig.body, rotations, rig.roots + shift)
     still = np.zeros(paths.shape)
     depths = sole_depths(planted, soles, feet.floors, _at(planted, feet.roles), still)
-    return PlantedLegs(planted, rig, depths, lowered)
+    return planted, rig, depths, lowered
 
 
 def turn_limb(
@@ -335,7 +278,7 @@ def turn_limb(
     rotations[~changed] = before[~changed]
 
 
-def _at(rig: PosedRig, roles: tuple[str, str]) -> Annotated[Floats, "frames feet 3"]:
+def _at(rig: PosedBody, roles: tuple[str, str]) -> Annotated[Floats, "frames feet 3"]:
     """Return the positions (F, 2, 3), m, of the joints of two roles."""
     return np.stack([rig.of_role(role) for role in roles], axis=1)
 
@@ -361,8 +304,8 @@ def _pelvis_height(
 
 
 def sole_depths(
-    rig: PosedRig,
-    soles: RigSoles,
+    rig: PosedBody,
+    soles: tuple[Annotated[Floats, "feet"], Annotated[Floats, "feet 3"]],
     floors: Annotated[Floats, "frames feet"],
     paths: Annotated[Floats, "frames feet 3"],
     shift: Annotated[Floats, "frames feet 3"],
@@ -372,10 +315,11 @@ def sole_depths(
     The deeper of ball and heel. floors (F, 2): heights, m. paths: of the joints that stand, m.
     shift: of the ankles against the poses (F, 2, 3), m.
     """
-    depths = floors + soles.heights - paths @ UP
+    heights, heels = soles
+    depths = floors + heights - paths @ UP
     for foot, side in enumerate(SIDES):
         ankle = rig.body.joints[side + "Foot"]
-        heel = rig.places[:, ankle] + quat.rotate(rig.turns[:, ankle], soles.heels[foot])
+        heel = rig.positions[:, ankle] + quat.rotate(rig.orientations[:, ankle], heels[foot])
         below = floors[:, foot] - (heel + shift[:, foot]) @ UP
         depths[:, foot] = np.maximum(depths[:, foot], below)
     return depths

@@ -14,9 +14,9 @@ from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
 from posefield.retarget import copied_pose, planted_legs, role_map
-from posefield.retarget.copied_pose import Soles
-from posefield.retarget.planted_legs import FLOOR, PlantedLegs, PosedRig, RigSoles, SourceFeet
-from posefield.retarget.role_map import SIDES, Body
+from posefield.retarget.copied_pose import FLOOR, Soles
+from posefield.retarget.planted_legs import SourceFeet
+from posefield.retarget.role_map import SIDES, Body, PosedBody
 from posefield.rigs.rig import Rig
 
 Travel = Literal["scaled", "kept"]
@@ -54,17 +54,17 @@ class RetargetReport:
     distance of each hand from its goal, m. warnings: sentences for the user.
     """
 
-    mapped: tuple[str, ...] = ()
-    missing: tuple[str, ...] = ()
-    scale: float = 1.0
-    skate_source: float = 0.0
-    skate_copied: float = 0.0
-    skate: float = 0.0
-    legs_turned: float = 0.0
-    lowered: float = 0.0
-    penetration: float = 0.0
-    hands_missed: tuple[float, ...] = ()
-    warnings: tuple[str, ...] = ()
+    mapped: tuple[str, ...]
+    missing: tuple[str, ...]
+    scale: float
+    skate_source: float
+    skate_copied: float
+    skate: float
+    legs_turned: float
+    lowered: float
+    penetration: float
+    hands_missed: tuple[float, ...]
+    warnings: tuple[str, ...]
 
     def facts(self) -> dict[str, Any]:
         """Return the fields as plain values, lengths rounded to micrometres."""
@@ -76,27 +76,6 @@ class RetargetReport:
                 facts[name] = list(value)
         facts["hands_missed"] = list(map(round_micrometres, self.hands_missed))
         return facts
-
-
-def measure(feet: SourceFeet, planted: PlantedLegs, scale: float, rate: float) -> RetargetReport:
-    """Return the report on a motion with planted feet, without its roles, hands and warnings.
-
-    feet: of the motion, in proportion. scale: length of the rig's legs over the motion's.
-    """
-    paths = [
-        np.stack([rig.of_role(role) for role in feet.roles], axis=1)
-        for rig in (planted.copied, planted.rig)
-    ]
-    before, copied, after = (skate(rig, feet.standing, rate) for rig in (feet.paths, *paths))
-    return RetargetReport(
-        scale=scale,
-        skate_source=before,
-        skate_copied=copied,
-        skate=after,
-        legs_turned=legs_turned(planted.copied, planted.rig),
-        lowered=float(planted.lowered.max()),
-        penetration=float(np.percentile(np.maximum(planted.depths, 0.0), 99.0)),
-    )
 
 
 def skate(
@@ -113,7 +92,7 @@ def skate(
     return float(np.sum(speeds * both) / max(int(both.sum()), 1))
 
 
-def legs_turned(copied: PosedRig, planted: PosedRig) -> float:
+def legs_turned(copied: PosedBody, planted: PosedBody) -> float:
     """Return the mean angle between the bones of legs in two poses, rad."""
     angles = []
     for side in SIDES:
@@ -133,7 +112,7 @@ ARMS = {
 }
 
 
-def check_goals(goals: Sequence[HandGoal], rig: PosedRig, rate: float) -> None:
+def check_goals(goals: Sequence[HandGoal], rig: PosedBody, rate: float) -> None:
     """Raise InvalidField for a goal of no hand of the rig, or outside the motion."""
     last = (len(rig.roots) - 1) / rate
     for goal in goals:
@@ -150,7 +129,7 @@ def check_goals(goals: Sequence[HandGoal], rig: PosedRig, rate: float) -> None:
             )
 
 
-def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRig:
+def meet_goals(rig: PosedBody, goals: Sequence[HandGoal], rate: float) -> PosedBody:
     """Return poses in which each hand is at its goals at their times.
 
     A hand is moved by its distance from the goal, less before and after it. Out of reach it comes
@@ -171,7 +150,7 @@ def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRi
             shift += _shares(times - there, goal, goals_of_role)[:, None] * offset
         limb, poses = rig.limb(roles)
         planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + shift)
-    return planted_legs.posed(rig.body, rotations, rig.roots)
+    return role_map.posed(rig.body, rotations, rig.roots)
 
 
 def _at(path: RootPath, frames: Annotated[Floats, "places"]) -> Annotated[Floats, "places 3"]:
@@ -194,7 +173,7 @@ def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
     return shares
 
 
-def misses(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> tuple[float, ...]:
+def misses(rig: PosedBody, goals: Sequence[HandGoal], rate: float) -> tuple[float, ...]:
     """Return the largest distance of each hand from its goal, m."""
     distances = []
     for goal in goals:
@@ -233,7 +212,7 @@ def retarget(
     source = role_map.body_of_motion(clip.skeleton, clip.translations[0], roles)
     joints = rig.skeleton
     body = Body(joints.names, joints.parents, joints.offsets, rig.joints)
-    motion = PosedRig(
+    motion = PosedBody(
         source,
         clip.rotations,
         clip.root_path,
@@ -243,26 +222,43 @@ def retarget(
     scale = body.leg_length / source.leg_length
     motion = _scaled(motion, scale, scale if travel == "scaled" else 1.0)
     feet = _feet(motion, body, clip, stances)
-    soles, higher, below = _ground(motion, body, feet, scale)
-    rotations = copied_pose.copy_orientations(motion.body, body, motion.turns, soles)
-    still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
-    copied = planted_legs.moved(still, _hips(motion) + higher * UP - _hips(still))
-    planted = planted_legs.plant(copied, feet, below, clip.rate)
-    check_goals(hands, planted.rig, clip.rate)
-    final = meet_goals(planted.rig, hands, clip.rate)
+    soles, higher, heights_and_heels = _ground(motion, body, feet, scale)
+    rotations = copied_pose.copy_orientations(motion.body, body, motion.orientations, soles)
+    still = role_map.posed(body, rotations, np.zeros((len(rotations), 3)))
+    copied = role_map.moved(still, _hips(motion) + higher * UP - _hips(still))
+    # A character of the same bones has the motion as it is.
+    bones = motion.body.leg_bones, body.leg_bones
+    limited = len(bones[0]) != len(bones[1]) or not np.allclose(*bones, rtol=0.0, atol=SAME_BONE)
+    planted, copied, depths, lowered = planted_legs.plant(
+        copied, feet, heights_and_heels, limited, clip.rate
+    )
+    check_goals(hands, planted, clip.rate)
+    final = meet_goals(planted, hands, clip.rate)
     retargeted = clips.assemble(joints, final.rotations, final.roots, joints.offsets, clip.rate)
-    report = measure(feet, planted, scale, clip.rate)
-    mapped = tuple(role for role in source.joints if role in body.joints)
     missing = tuple(role for role in source.joints if role not in body.joints)
     distances = misses(final, hands, clip.rate)
-    warnings = (*rig.notes, *_warnings(missing, hands, distances))
-    return (
-        replace(retargeted, curves=clip.curves),
-        replace(report, mapped=mapped, missing=missing, hands_missed=distances, warnings=warnings),
+    paths = [
+        np.stack([poses.of_role(role) for role in feet.roles], axis=1)
+        for poses in (copied, planted)
+    ]
+    skates = [skate(path, feet.standing, clip.rate) for path in (feet.paths, *paths)]
+    report = RetargetReport(
+        mapped=tuple(role for role in source.joints if role in body.joints),
+        missing=missing,
+        scale=scale,
+        skate_source=skates[0],
+        skate_copied=skates[1],
+        skate=skates[2],
+        legs_turned=legs_turned(copied, planted),
+        lowered=float(lowered.max()),
+        penetration=float(np.percentile(np.maximum(depths, 0.0), 99.0)),
+        hands_missed=distances,
+        warnings=(*rig.notes, *_warnings(missing, hands, distances)),
     )
+    return replace(retargeted, curves=clip.curves), report
 
 
-def _scaled(motion: PosedRig, scale: float, travel: float) -> PosedRig:
+def _scaled(motion: PosedBody, scale: float, travel: float) -> PosedBody:
     """Return poses in another proportion: the body by `scale`, the way of its hips by `travel`.
 
     Both about the floor below the hips in the first frame.
@@ -270,34 +266,35 @@ def _scaled(motion: PosedRig, scale: float, travel: float) -> PosedRig:
     hips = _hips(motion)
     level = hips * FLOOR
     roots = level[:1] + travel * (level - level[:1])
-    positions = roots[:, None] + scale * (motion.places - level[:, None])
-    return replace(motion, places=positions)
+    positions = roots[:, None] + scale * (motion.positions - level[:, None])
+    return replace(motion, positions=positions)
 
 
-def _hips(rig: PosedRig) -> RootPath:
+def _hips(rig: PosedBody) -> RootPath:
     """Return the path (F, 3), m, of the middle between both hips."""
     left, right = (rig.of_role(side + "UpperLeg") for side in SIDES)
     return 0.5 * (left + right)
 
 
 def _feet(
-    motion: PosedRig, body: Body, clip: Clip, stances: Sequence[StanceResult] | None
+    motion: PosedBody, body: Body, clip: Clip, stances: Sequence[StanceResult] | None
 ) -> SourceFeet:
     """Return the feet of a motion in the rig's proportion."""
     roles = planted_legs.contact_roles(motion.body, body)
     left, right = (motion.body.joints[role] for role in roles)
     names = clip.skeleton.names[left], clip.skeleton.names[right]
-    paths = motion.places[:, [left, right]]
+    paths = motion.positions[:, [left, right]]
     return planted_legs.feet_of(paths, clip.rate, roles, names, stances)
 
 
 def _ground(
-    motion: PosedRig, body: Body, feet: SourceFeet, scale: float
-) -> tuple[Soles, float, RigSoles]:
+    motion: PosedBody, body: Body, feet: SourceFeet, scale: float
+) -> tuple[Soles, float, tuple[Floats, Floats]]:
     """Return the soles of a motion and of a rig, left and right, and how they stand.
 
     Second is how much higher ankles of the rig are than those of the motion in proportion, m, then
-    the heights and heels of the rig. scale: length of the rig's legs over that of the motion's.
+    the heights (2,) of the rig's joints that stand above its soles, and the vectors (2, 3) at rest
+    from its ankles to the soles below, m. scale: length of the rig's legs over the motion's.
     """
     heights, standing = planted_legs.standing_heights(feet, body), feet.standing
     ours = [copied_pose.sole_at_rest(body, side) for side in SIDES]
@@ -312,11 +309,7 @@ def _ground(
     heels = [
         (on_toes * sole.toes @ UP - height) * UP for sole, height in zip(ours, heights, strict=True)
     ]
-    # A character of the same bones has the motion as it is.
-    bones = motion.body.leg_bones, body.leg_bones
-    limited = len(bones[0]) != len(bones[1]) or not np.allclose(*bones, rtol=0.0, atol=SAME_BONE)
-    below = RigSoles(heights, np.stack(heels), limited)
-    return (left, right), higher, below
+    return (left, right), higher, (heights, np.stack(heels))
 
 
 def _warnings(

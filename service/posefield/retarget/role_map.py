@@ -1,7 +1,7 @@
 """Roles of the joints of a motion and of a rig: which joint of one follows which of the other."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Annotated
@@ -9,7 +9,9 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import Bones, Floats
+from posefield.common.units import Bones, Floats, RootPath, Rotations
+from posefield.feet.limbs import Limb, LimbPoses
+from posefield.motion import skeleton
 from posefield.motion.skeleton import Skeleton, joint_chain
 from posefield.rigs.rig import facing_of
 from posefield.roles import joint_recognition
@@ -137,3 +139,51 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
     body_bones = bones.copy()
     body_bones[0] = 0.0
     return Body(skeleton.names, skeleton.parents, body_bones, joints)
+
+
+@dataclass(frozen=True)
+class PosedBody:
+    """Poses of a body.
+
+    rotations (F, J, 4): local to the parents. roots (F, 3), positions (F, J, 3), m. orientations
+    (F, J, 4): in the world.
+    """
+
+    body: Body
+    rotations: Rotations
+    roots: RootPath
+    positions: Annotated[Floats, "frames joints 3"]
+    orientations: Annotated[Floats, "frames joints 4"]
+
+    def of_role(self, role: str) -> RootPath:
+        """Return the positions (F, 3), m, of the joint of a role."""
+        return self.positions[:, self.body.joints[role]]
+
+    def limb(self, roles: tuple[str, ...]) -> tuple[Limb, LimbPoses]:
+        """Return the limb of joints of roles, and its poses; joints between them do not turn."""
+        role_joints = [self.body.joints[role] for role in roles]
+        joints = (self.body.parents[role_joints[0]], *role_joints)
+        rest = self.body.rest[list(joints)]
+        bones = np.diff(rest, axis=0, prepend=rest[:1])
+        parents = tuple(range(-1, len(joints) - 1))
+        limb_positions = self.positions[:, list(joints)]
+        limb = Limb(role_joints[0], role_joints[1], role_joints[2], role_joints[-1])
+        return limb, LimbPoses(
+            joints, parents, bones, limb_positions, self.orientations[:, list(joints)]
+        )
+
+
+def posed(body: Body, rotations: Rotations, roots: RootPath) -> PosedBody:
+    """Return poses with the positions and orientations of their joints."""
+    translations = skeleton.translations(body.bones, roots)
+    return PosedBody(
+        body,
+        rotations,
+        roots,
+        *skeleton.forward_kinematics(body.parents, rotations, translations),
+    )
+
+
+def moved(rig: PosedBody, shift: RootPath) -> PosedBody:
+    """Return poses whose root is moved by (F, 3), m."""
+    return replace(rig, roots=rig.roots + shift, positions=rig.positions + shift[:, None])

@@ -218,7 +218,7 @@ def read(
     """Return the joints of a .usd, .usda, .usdc or .usdz file.
 
     Further the tokens of its `joints`, the path of its Skeleton, and notes. source: name of the
-    file in messages. named: joints of the skeleton that is meant. Raises MotionFileError for a file
+    file in messages. joint_names: of the skeleton that is meant. Raises MotionFileError for a file
     without a skeleton or with several, for a skeleton whose prim moves over time, and for layers
     out of the file's folder.
     """

@@ -1,12 +1,16 @@
-"""Roles of joints by their names, the tree and the shape of the body, with a confidence."""
+"""Roles of joints by their names, the tree and the shape of the body, with a confidence.
+
+A rest pose that stands on its soles follows from them.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion.joint_roles import ROLES
+from posefield.motion.skeleton import Skeleton
 from posefield.roles.joint_words import (
     ARM,
     HIPS,
@@ -346,3 +350,34 @@ def _trunk_angle(positions: Mapping[str, Floats]) -> float | None:
     cosines = np.sum(down * trunk, axis=-1) / np.maximum(lengths, 1e-12)
     angles = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
     return float(np.percentile(angles, POSES_SHARE))
+
+
+SOLE, ANKLE = 0.028, 0.089
+"""Height of the toe joint above the sole, and of the ankle of a foot without toes, per leg length;
+as in the mannequin's feet."""
+
+
+def standing(skeleton: Skeleton) -> Skeleton:
+    """Return the skeleton with its root above the origin, and its rest pose on the floor.
+
+    The lowest joint, end site or sole is at the height 0. Engines scale motions by the root's.
+    """
+    offsets = skeleton.offsets.copy()
+    offsets[0] = 0.0
+    positions = skeleton.at_rest(offsets)
+    tips = positions[list(skeleton.tip_joints)] + skeleton.tip_offsets
+    heights = [*positions[:, 1].tolist(), *tips[:, 1].tolist()]
+    roles = roles_of(skeleton.names, skeleton.parents)
+    index = {role: skeleton.names.index(name) for role, name in roles.items()}
+    for side in ("left", "right"):
+        leg = [index.get(side + segment, -1) for segment in ("UpperLeg", "LowerLeg", "Foot")]
+        if -1 in leg:
+            continue
+        length = float(np.linalg.norm(np.diff(positions[leg], axis=0), axis=1).sum())
+        toes = index.get(f"{side}Toes")
+        if toes is not None:
+            heights.append(float(positions[toes, 1]) - SOLE * length)
+        elif leg[2] not in (*skeleton.parents, *skeleton.tip_joints):
+            heights.append(float(positions[leg[2], 1]) - ANKLE * length)
+    offsets[0, 1] = -min(heights)
+    return replace(skeleton, offsets=offsets)

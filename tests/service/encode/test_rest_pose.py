@@ -13,7 +13,7 @@ from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.question.results import SampledClip, Trust
 from posefield.registry import model_registry
-from posefield.roles.standing import standing
+from posefield.roles.joint_recognition import standing
 
 SOLE = 0.01
 """Largest distance of the body's lowest point from the floor, m."""

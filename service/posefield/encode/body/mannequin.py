@@ -267,7 +267,7 @@ def _on_trunk(points: Floats, stored: Floats, fit: _Fit) -> Floats:
 
 
 def _on_foot(points: Floats, stored: Floats, bone_ends: Floats, fit: _Fit) -> Floats:
-    """Return points of a foot that stands flat; stored, ends (2, 2, 3): of foot and toes, m."""
+    """Return points of a flat foot; stored, bone_ends (2, 2, 3): of foot and toes, m."""
     scale = fit.scale
     (ankle, ball), (_, tip) = bone_ends
     old_ankle, old_ball = stored[0]
