@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, record, table
 from timing import in_turn
@@ -133,7 +134,9 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
 def _warned(answers: list[ClipAnswer]) -> list[ClipAnswer]:
     """The same with a warning that no other clip has had."""
     return [
-        replace(answer, trust=replace(answer.trust, warnings=(f"control = {next(SERIAL)}",)))
+        replace(
+            answer, trust=structs.replace(answer.trust, warnings=(f"control = {next(SERIAL)}",))
+        )
         for answer in answers
     ]
 
@@ -170,7 +173,9 @@ def _answers(count: int) -> list[ClipAnswer]:
         clip = clips.assemble(person, quat.exp(np.sin(pace * t + phase)), path, offsets, 30.0)
         controls = {f"control {index}": float(rng.uniform()) for index in range(6)}
         duration, sigma = (float(np.float32(number)) for number in rng.uniform(0, 2, 2))
-        made.append(ClipAnswer(clip, Trust("walk@0123abcd", controls, duration, sigma, ())))
+        made.append(
+            ClipAnswer(clip, Trust("walk@0123abcd", controls, None, 0, duration, sigma, True, ()))
+        )
     return made
 
 

@@ -36,7 +36,7 @@ BODIES = {
 """Families and beginnings of the files whose first one gives a rig."""
 SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6)
 """Speeds of the clips of the shipped walk, m/s."""
-TRUST = Trust("a@0123456789abcdef", {}, 1.0, 0.0, ())
+TRUST = Trust("a@0123456789abcdef", {}, None, 0, 1.0, 0.0, True, ())
 RATE = 60
 SKATE, DEPTH, TURNED = 1.1, 1.0, 5.0
 """Goals: skate over the motion's, depth below the floor in cm, turn of legs in degrees."""

@@ -27,7 +27,7 @@ def still(card, scale, names="mixamo"):
 
 
 def _written(form, card, scale, convention=None):
-    trust = Trust("rig@0000000000000000", {}, 1.0, 0.0, ())
+    trust = Trust("rig@0000000000000000", {}, None, 0, 1.0, 0.0, True, ())
     return CLIP_ENCODERS[form].encode(SampledClip(still(card, scale), trust), convention)
 
 

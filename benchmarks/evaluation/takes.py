@@ -1,7 +1,7 @@
 """Takes of the service for held-out clips, compared with the captured motion."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -129,7 +129,7 @@ def _unlimited(model: Synthesizer, asked: ClipQuestion) -> Clip:
     settings = TakeSettings(asked.take, asked.variety, detail=False)
     held = variation.vary(bench, bench.predict(state), question, settings)
     times = np.arange(0.0, held.duration, 1.0 / asked.fps)
-    trust = replace(model.constrained_trust(asked, question, held), targets=())
+    trust = structs.replace(model.constrained_trust(asked, question, held), targets=())
     found = solver.poses_at(question, held, times, trust)
     return assemble(
         card.skeleton, found.rotations, found.root_position, found.bone_offsets, asked.fps

@@ -121,7 +121,7 @@ def _answer(frames: int, rate: float) -> ClipAnswer:
     turns = quat.exp(0.6 * np.sin(2 * np.pi * t[:, None, None] + phases))
     path = np.stack([0.3 * np.sin(t), 0.9 + 0.05 * np.cos(5 * t), 1.2 * t], axis=-1)
     made = clips.assemble(somebody, turns, path, 1.07 * somebody.offsets, rate)
-    return ClipAnswer(made, Trust("hand@0", {"speed": 1.0}, made.duration, 0.01, ()))
+    return ClipAnswer(made, Trust("hand@0", {"speed": 1.0}, None, 0, made.duration, 0.01, True, ()))
 
 
 def _swapped(answer: ClipAnswer) -> ClipAnswer:

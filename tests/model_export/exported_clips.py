@@ -4,7 +4,7 @@ from posefield.encode.conventions import METRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.results import SampledClip, Trust
 
-TRUST = Trust("a@0123456789abcdef", {}, 1.0, 0.0, ())
+TRUST = Trust("a@0123456789abcdef", {}, None, 0, 1.0, 0.0, True, ())
 CENTIMETRES_Z = Convention(0.01, "z")
 FORMATS = {
     "bvh": METRES,

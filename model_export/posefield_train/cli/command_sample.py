@@ -181,7 +181,9 @@ def sample(
     encode = encoder_for(output).encode
     controls = parse_controls(true.control or [])
     clip = noise_free.truth_clip(controls, true.fps)
-    answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
+    answer = ClipAnswer(
+        clip, Trust("reaching@truth", controls, None, 0, clip.duration, 0.0, True, ())
+    )
     atomic_files.write(encode(answer), output)
     typer.echo(written_message(output, answer, json))
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from posefield.characters.user_character import UserCharacter
 from posefield.common.errors import InvalidField
@@ -59,7 +60,7 @@ class Delivery:
         if question.loop:
             left_out += _loop_note(clip)
         notes = (*warnings, *left_out, *self.character.target.notes(self.form, clip))
-        told_trust = replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
+        told_trust = structs.replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
         return ClipAnswer(clip, told_trust)
 
     def performance(self, answer: PerformanceAnswer, roles: Mapping[str, str]) -> PerformanceAnswer:
@@ -74,7 +75,7 @@ class Delivery:
         clip, facts, new_warnings = self._retargeted(answer.clip, roles, stances, hands, "kept")
         notes = (*new_warnings, *left_out, *self.character.target.notes(self.form, clip))
         warnings = tuple(ScriptWarning(POINTER, sentence) for sentence in notes)
-        delivered = replace(
+        delivered = structs.replace(
             report, script_warnings=(*report.script_warnings, *warnings), retargeting=facts
         )
         return PerformanceAnswer(clip, delivered)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from msgspec import structs
+
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField, UnknownFormat, did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
@@ -105,7 +107,9 @@ class ClipEncoder(Format):
         if answer.clip.root_bone and not (self.has_body or self.extension == "bvh"):
             notes.append(f"{self.extension} files have no root bone: the hips travel")
         warnings = (*answer.trust.warnings, *notes)
-        return replace(answer, trust=replace(answer.trust, warnings=warnings)) if notes else answer
+        if not notes:
+            return answer
+        return replace(answer, trust=structs.replace(answer.trust, warnings=warnings))
 
     def encode(self, answer: SampledClip, convention: Convention | None = None) -> bytes:
         """Return the file of one result, in the format's default convention unless one is given."""

@@ -126,8 +126,8 @@ def report(
         all(span.supported for span in timeline.spans),
         tuple(_segment(composed, index, end) for index, end in enumerate(ends)),
         tuple(_join(composed, *pair) for pair in zip(timeline.joins, joins, strict=True)),
-        feet,
         tuple(warnings),
+        feet,
     )
 
 

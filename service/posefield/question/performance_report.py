@@ -1,8 +1,11 @@
 """Report of a performance: its timeline, joins, contacts, targets and warnings."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
+
+import msgspec
+from msgspec import Struct
 
 from posefield.question.results import ConstraintResult, FeetResult, SampledClip
 
@@ -25,8 +28,7 @@ class ScriptWarning:
         return f"{self.pointer}: {self.message}"
 
 
-@dataclass(frozen=True)
-class SegmentReport:
+class SegmentReport(Struct, frozen=True, omit_defaults=True):
     """A segment in the time of the performance.
 
     kind: walk, act or hold. model: name@contenthash; empty for a hold. begins, ends: s, without the
@@ -44,7 +46,7 @@ class SegmentReport:
     place: tuple[float, float]
     heading: float
     sigma: float
-    controls: Mapping[str, float] = field(default_factory=dict)
+    controls: Mapping[str, float] = {}
     phase: float | None = None
     event: float | None = None
     targets: tuple[ConstraintResult, ...] = ()
@@ -87,8 +89,9 @@ class JoinReport:
     reference: Reference
 
 
-@dataclass(frozen=True)
-class PerformanceReport:
+class PerformanceReport(
+    Struct, frozen=True, omit_defaults=True, rename={"script_warnings": "warnings"}
+):
     """Facts about a performance.
 
     models: name@contenthash, in the order of the script. character: of the bones. sigma: expected
@@ -105,9 +108,9 @@ class PerformanceReport:
     supported: bool
     segments: tuple[SegmentReport, ...]
     joins: tuple[JoinReport, ...]
-    feet: FeetResult | None
-    script_warnings: tuple[ScriptWarning, ...] = ()
-    retargeting: Mapping[str, Any] = field(default_factory=dict)
+    script_warnings: tuple[ScriptWarning, ...]
+    feet: FeetResult | None = None
+    retargeting: Mapping[str, Any] = {}
 
     @property
     def model(self) -> str:
@@ -117,7 +120,7 @@ class PerformanceReport:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Return the warnings as sentences."""
-        return tuple(each.sentence for each in self.script_warnings)
+        return tuple(warning.sentence for warning in self.script_warnings)
 
     def document(self) -> dict[str, Any]:
         """Return the Performance (schema of the contract)."""
@@ -125,19 +128,8 @@ class PerformanceReport:
 
     def facts(self) -> dict[str, Any]:
         """Return the fields that are not empty as plain values, for the metadata of files."""
-        found: dict[str, Any] = {
-            "models": list(self.models),
-            "character": self.character,
-            "duration": self.duration,
-            "frames": self.frames,
-            "sigma": self.sigma,
-            "supported": self.supported,
-            "segments": [_plain(each) for each in self.segments],
-            "joins": [asdict(each) for each in self.joins],
-            "warnings": [asdict(each) for each in self.script_warnings],
-        }
-        found |= {} if self.feet is None else {"feet": _listed(self.feet.facts())}
-        return found | ({"retargeting": dict(self.retargeting)} if self.retargeting else {})
+        facts: dict[str, Any] = msgspec.to_builtins(self)
+        return facts
 
 
 @dataclass(frozen=True)
@@ -156,20 +148,3 @@ class PerformanceAnswer(SampledClip):
 
     trust: PerformanceReport
     held: tuple[HeldJoint, ...] = ()
-
-
-def _plain(each: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass that are given, with tuples as lists."""
-    return {name: _listed(value) for name, value in asdict(each).items() if _is_given(value)}
-
-
-def _is_given(value: Any) -> bool:
-    return value is not None and value not in ((), {})
-
-
-def _listed(value: Any) -> Any:
-    if isinstance(value, list | tuple):
-        return [_listed(each) for each in value]
-    if isinstance(value, dict):
-        return {name: _listed(each) for name, each in value.items()}
-    return value

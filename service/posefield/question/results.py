@@ -1,11 +1,12 @@
 """Results of a query: poses or clips with provenance and uncertainty, sigma grids, reasons."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
+import msgspec
 import numpy as np
-from msgspec import structs
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from posefield.common.units import Booleans, Floats, Singles
@@ -59,8 +60,7 @@ def split_results(
     return tuple(results[:first]), tuple(results[first:])
 
 
-@dataclass(frozen=True)
-class Deviation:
+class Deviation(Struct, frozen=True):
     """A requested control whose value the motion does not have.
 
     asked: requested value. given: value of the motion if the control is measured, else the value at
@@ -73,11 +73,7 @@ class Deviation:
     given: float
     unit: str
     captured: tuple[float, float]
-
-    @property
-    def side(self) -> Literal["above", "below"]:
-        """Return on which side of the requested value the given one lies."""
-        return "above" if self.given > self.asked else "below"
+    side: Literal["above", "below"]
 
     @property
     def sentence(self) -> str:
@@ -88,10 +84,6 @@ class Deviation:
             f"{self.control}: asked {self.asked:.4g}{unit}, given {self.given:.4g}{unit}, "
             f"captured {low:.4g} to {high:.4g}{unit}; {self.side} what was asked"
         )
-
-    def facts(self) -> dict[str, Any]:
-        """Return the deviation as plain values."""
-        return {**asdict(self), "captured": list(self.captured), "side": self.side}
 
 
 @dataclass(frozen=True)
@@ -108,8 +100,7 @@ class StanceResult:
     position: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class FeetResult:
+class FeetResult(Struct, frozen=True, omit_defaults=True):
     """Feet of a clip that were made to stand, over the whole motion.
 
     swings: number of them. skate_before, skate: foot skate as predicted and as given, m/s. drift:
@@ -119,27 +110,18 @@ class FeetResult:
     foot that is as predicted. floor: on which they stand; None for a floor at height 0.
     """
 
-    stances: tuple[StanceResult, ...] = ()
-    swings: int = 0
-    skate_before: float = 0.0
-    skate: float = 0.0
-    drift: float = 0.0
-    lowered: float = 0.0
-    grounded: float = 0.0
-    left: tuple[str, ...] = ()
+    stances: tuple[StanceResult, ...]
+    swings: int
+    skate_before: float
+    skate: float
+    drift: float
+    lowered: float
+    grounded: float
+    left: tuple[str, ...]
     floor: Floor | None = None
 
-    def facts(self) -> dict[str, Any]:
-        """Return the fields as plain values, without the floor at height 0."""
-        found = {own.name: getattr(self, own.name) for own in fields(self)}
-        found["stances"] = tuple(dict(vars(stance)) for stance in self.stances)
-        if self.floor is None:
-            return {name: fact for name, fact in found.items() if name != "floor"}
-        return found | {"floor": structs.asdict(self.floor)}
 
-
-@dataclass(frozen=True)
-class Trust:
+class Trust(Struct, frozen=True, omit_defaults=True):
     """Provenance and uncertainty of a result.
 
     model: name@contenthash. controls: requested values in the model's units. duration: natural
@@ -161,22 +143,22 @@ class Trust:
 
     model: str
     controls: dict[str, float]
+    performer: str | None
+    level: int
     duration: float
     sigma: float
+    supported: bool
     warnings: tuple[str, ...]
-    performer: str | None = None
-    level: int = 0
-    supported: bool = True
     performer_seen: bool | None = None
     inferred: tuple[str, ...] = ()
-    measured: Mapping[str, float] = field(default_factory=dict)
+    measured: Mapping[str, float] = {}
     targets: tuple[ConstraintResult, ...] = ()
     joint_sigma: tuple[float, ...] = ()
     deviations: tuple[Deviation, ...] = ()
-    labels: Mapping[str, LabelValue] = field(default_factory=dict)
+    labels: Mapping[str, LabelValue] = {}
     feet: FeetResult | None = None
-    take: Mapping[str, float] = field(default_factory=dict)
-    retargeting: Mapping[str, Any] = field(default_factory=dict)
+    take: Mapping[str, float] = {}
+    retargeting: Mapping[str, Any] = {}
 
     def document(self) -> dict[str, Any]:
         """Return the Trust (schema of the contract): the facts and the band of sigma."""
@@ -184,32 +166,8 @@ class Trust:
 
     def facts(self) -> dict[str, Any]:
         """Return the fields that are not empty as plain values, for the metadata of files."""
-        return {
-            "model": self.model,
-            "controls": self.controls,
-            "performer": self.performer,
-            "level": self.level,
-            "duration": self.duration,
-            "sigma": self.sigma,
-            "supported": self.supported,
-            "warnings": list(self.warnings),
-            **self._optional_facts(),
-        }
-
-    def _optional_facts(self) -> dict[str, Any]:
-        seen = {} if self.performer_seen is None else {"performer_seen": self.performer_seen}
-        more = {
-            "inferred": list(self.inferred),
-            "measured": dict(self.measured),
-            "targets": [dict(vars(met)) for met in self.targets],
-            "joint_sigma": list(self.joint_sigma),
-            "deviations": [deviation.facts() for deviation in self.deviations],
-            "labels": dict(self.labels),
-            "feet": {} if self.feet is None else self.feet.facts(),
-            "take": dict(self.take),
-            "retargeting": dict(self.retargeting),
-        }
-        return seen | {name: fact for name, fact in more.items() if fact}
+        facts: dict[str, Any] = msgspec.to_builtins(self)
+        return facts
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField, QueryError
@@ -137,7 +138,7 @@ def predicted(
     question, when = request.question, answer.times
     if model.solver.measures:
         measured = model.solver.measured(question, model.solver.solve(question, NO_CONSTRAINTS))
-        answer = replace(answer, trust=replace(answer.trust, measured=measured))
+        answer = replace(answer, trust=structs.replace(answer.trust, measured=measured))
     way = _strides(model, question) if request.stands or request.routed else None
     if not request.stands:
         return ClipDraft(request, when, answer.trust, way=way, predicted=answer)

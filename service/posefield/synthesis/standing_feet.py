@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from msgspec import structs
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import UP, Floats, round_micrometres
@@ -160,8 +161,8 @@ def stand(model: Synthesizer, requests: Sequence[StandRequest]) -> list[PoseAnsw
         answer = found[place]
         left = answer.trust.feet.left if answer.trust.feet else ()
         measured = _measured(card, requests[place], plan)
-        trust = replace(
-            answer.trust, feet=replace(facts, left=left + facts.left), measured=measured
+        trust = structs.replace(
+            answer.trust, feet=structs.replace(facts, left=left + facts.left), measured=measured
         )
         found[place] = replace(answer, rotations=rotations, root_position=roots, trust=trust)
     return found
@@ -170,8 +171,8 @@ def stand(model: Synthesizer, requests: Sequence[StandRequest]) -> list[PoseAnsw
 def _unplaced(card: ModelCard, request: StandRequest, choice: LimbChoice) -> PoseAnswer[np.float64]:
     """Return an answer with the feet that are not placed in `trust`, each with the reason."""
     left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in choice.left)
-    feet = FeetResult(left=left, floor=_told(request.floor))
-    return replace(request.answer, trust=replace(request.answer.trust, feet=feet))
+    feet = FeetResult((), 0, 0.0, 0.0, 0.0, 0.0, 0.0, left, _told(request.floor))
+    return replace(request.answer, trust=structs.replace(request.answer.trust, feet=feet))
 
 
 def _plan_request(

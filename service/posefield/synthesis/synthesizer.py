@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from msgspec import structs
+
 from posefield.common.errors import OutOfReach, OutsideSamples
 from posefield.common.units import MICROMETRES
 from posefield.constraints import take_variation
@@ -105,12 +107,12 @@ class Synthesizer(NamedModel):
         return Trust(
             self.identity,
             question.controls,
-            duration,
-            sigma,
-            warnings,
             who,
             question.level,
+            duration,
+            sigma,
             question.supported,
+            warnings,
             seen,
             inferred=question.inferred,
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
@@ -130,7 +132,7 @@ class Synthesizer(NamedModel):
         own = self.trust(asked, question, held.duration, held.state.asked_sigma)
         said = () if asked.extrapolate == "ok" else miss_warnings(targets)
         warnings = (*own.warnings, *said)
-        return replace(own, warnings=warnings, measured=measured, targets=held.results)
+        return structs.replace(own, warnings=warnings, measured=measured, targets=held.results)
 
     def _deviations(
         self,

@@ -6,6 +6,7 @@ The limits of a model's inputs are shared with questions for crowds.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -337,7 +338,8 @@ def merge_warnings(
 def deviation(control: Control, requested: float, acting: float) -> Deviation:
     """Return the deviation of a control's given value from the requested one."""
     captured = control.minimum, control.maximum
-    return Deviation(control.name, requested, acting, control.unit, captured)
+    side: Literal["above", "below"] = "above" if acting > requested else "below"
+    return Deviation(control.name, requested, acting, control.unit, captured, side)
 
 
 def gap_warning(subject: str, variance: float, limit: float) -> str:

@@ -11,10 +11,12 @@ from posefield.question.results import ClipAnswer, Trust
 TRUST = Trust(
     "walk@0123abcd",
     {"speed": 1.25, "turn rate": -0.5},
+    "ada",
+    0,
     1.5,
     0.0125,
+    True,
     ("speed 1.25 is beyond 1.2",),
-    "ada",
 )
 
 # name, parent, rest offset in metres.

@@ -65,7 +65,7 @@ def test_clips_of_all_sizes_stand_at_rest(model, scale, tmp_path):
     turns = np.tile(quat.IDENTITY, (2, len(joints), 1))
     answer = SampledClip(
         clips.assemble(joints, turns, path, joints.offsets * scale, 30.0),
-        Trust("m@0000000000000000", {}, 1.0, 0.0, ()),
+        Trust("m@0000000000000000", {}, None, 0, 1.0, 0.0, True, ()),
     )
     document, binary = read_glb(CLIP_ENCODERS["glb"].encode(answer))
     height = document["nodes"][0]["translation"][1]

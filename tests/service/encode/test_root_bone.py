@@ -116,7 +116,7 @@ def rig(path, shipped_walk, root):
     turns = np.tile(quat.IDENTITY, (2, len(joints), 1))
     places = np.tile(joints.offsets, (2, 1, 1))
     made = replace(clip, skeleton=joints, rotations=turns, translations=places)
-    trust = Trust("rig@0000000000000000", {}, 1.0, 0.0, ())
+    trust = Trust("rig@0000000000000000", {}, None, 0, 1.0, 0.0, True, ())
     path.write_bytes(CLIP_ENCODERS["glb"].encode(SampledClip(made, trust)))
     return open_character(path, f"./{path.name}")
 

@@ -69,7 +69,7 @@ def test_every_number_of_a_pose_comes_back(extension, posed):
         # What JSON spells with the fewest digits is the same number only as float32.
         read = np.array(found[name], np.float64 if name == "times" else np.float32)
         assert np.array_equal(read, getattr(posed, name)), name
-    assert found["trust"] == posed.trust.document()
+    assert found["trust"] == json.loads(json.dumps(posed.trust.document()))
     other = dataclasses.replace(posed, rotations=posed.rotations[::-1])
     changed = READERS[extension](POSE_ENCODERS[extension].encode(other))
     assert not np.array_equal(np.array(changed["rotations"]), np.array(found["rotations"]))

@@ -143,7 +143,7 @@ def skinned(stage, frames=(0, 20, 44)):
 
 def test_the_layer_says_what_the_answer_is_worth(stage, walk):
     facts = stage.GetRootLayer().customLayerData["posefield"]
-    assert facts | {"warnings": list(facts["warnings"])} == walk.trust.facts()
+    assert facts | {"warnings": tuple(facts["warnings"])} == walk.trust.facts()
 
 
 PRINT_DIGESTS = """

@@ -1,11 +1,11 @@
 """Comparison of clips encoded in batches with usd-core's layers."""
 
 import math
-from dataclasses import replace
 
 import conftest
 import numpy as np
 import pytest
+from msgspec import structs
 
 from posefield.encode.conventions import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
@@ -33,9 +33,9 @@ def _answer(rng, frames, person, said):
     offsets = person.offsets * rng.uniform(0.9, 1.1, (joints, 1))
     controls = {"speed": float(rng.uniform(0, 2)), "turn rate": float(rng.uniform(-1, 1))}
     sigma, duration = (float(np.float32(number)) for number in rng.uniform(0, 2, 2))
-    trust = Trust("walk@0123abcd", controls, duration, sigma, (), "ada")
+    trust = Trust("walk@0123abcd", controls, "ada", 0, duration, sigma, True, ())
     made = clips.assemble(person, turns, path, offsets, 30.0)
-    return ClipAnswer(made, replace(trust, **said))
+    return ClipAnswer(made, structs.replace(trust, **said))
 
 
 def ordinary(given, convention=METRES):

@@ -16,7 +16,7 @@ from posefield.question.results import SampledClip, Trust
 FRAMES = (0, 3, 7)
 NEAR = 2e-5
 """Difference of positions that float32 leaves, m."""
-TRUST = Trust("walk@0000000000000000", {}, 1.0, 0.0, ())
+TRUST = Trust("walk@0000000000000000", {}, None, 0, 1.0, 0.0, True, ())
 ASKED = FileQuestion(controls={})
 FILES = {
     "y.usdc": lambda path, card: usd_rig(path, card, 0.7, Convention(1.0, "y")),

@@ -83,7 +83,7 @@ def test_what_was_asked_and_given_is_told_with_its_side(walk):
         assert trust(walk, {"speed": value}, extrapolate="ok").warnings == ()
         assert trust(walk, {"speed": value}, extrapolate="ok").deviations == (told,)
         facts = found.facts()["deviations"][0]
-        assert facts["side"] == side and facts["captured"] == [speed.minimum, speed.maximum]
+        assert facts["side"] == side and facts["captured"] == (speed.minimum, speed.maximum)
     assert trust(walk, {"speed": at(speed, 0.5)}).deviations == ()
     assert "deviations" not in trust(walk, {"speed": at(speed, 0.5)}).facts()
 

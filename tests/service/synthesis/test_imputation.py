@@ -96,7 +96,7 @@ def test_the_answer_is_that_of_the_whole_question(model, given, performer):
     names = [control.name for control in model.session.card.controls]
     assert part.trust.inferred == tuple(name for name in names if name not in given)
     assert whole.trust.inferred == ()
-    assert replace(part.trust, inferred=()) == whole.trust
+    assert structs.replace(part.trust, inferred=()) == whole.trust
     for field in ("rotations", "translations"):
         assert getattr(part.clip, field).tobytes() == getattr(whole.clip, field).tobytes()
     turned = structs.replace(asked, controls={**part.trust.controls, "turn": -20.0})

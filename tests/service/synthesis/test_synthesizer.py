@@ -218,7 +218,7 @@ def test_sigma_of_each_joint_is_its_share_of_sigma(model):
     shares = np.array(found.joint_sigma) / trust.sigma
     assert shares == pytest.approx(card.joint_sigma, abs=1e-4)
     assert np.sqrt(np.mean(np.square(shares))) == pytest.approx(1.0, abs=0.01)
-    assert found.facts()["joint_sigma"] == list(found.joint_sigma)
+    assert found.facts()["joint_sigma"] == found.joint_sigma
     pose = poses.synthesize_poses(
         model, PoseQuestion(controls=POINT, times=[0.0], joint_sigma=True)
     )
