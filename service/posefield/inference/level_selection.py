@@ -144,8 +144,8 @@ def budget_warnings(
         return ()
     budget = f"the budget of {1e3 * view.budget:g} ms"
     if choice.limit is None:
-        least = 1e3 * _seconds(choice.levels, ladder)
-        return (f"at the coarsest level the poses take {least:.3g} ms, more than {budget}",)
+        milliseconds = 1e3 * _seconds(choice.levels, ladder)
+        return (f"at the coarsest level the poses take {milliseconds:.3g} ms, more than {budget}",)
     return (f"{budget} asks for errors of up to {choice.limit:.3g} pixels, not {view.pixels:g}",)
 
 
@@ -241,7 +241,7 @@ def seconds_per_pose(
 
 
 def benchmark_levels(
-    asked: Sequence[tuple[Session, int]],
+    sessions: Sequence[tuple[Session, int]],
     rounds: int,
     progress: ProgressCallback = ignore_progress,
 ) -> Annotated[Floats, "{len(asked)}"]:
@@ -250,13 +250,13 @@ def benchmark_levels(
     rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
     affects all of them. progress: called after each round, and after the one that warms up.
     """
-    calls = [(session, _sample_inputs(session), level) for session, level in asked]
-    taken = []
+    calls = [(session, _sample_inputs(session), level) for session, level in sessions]
+    seconds = []
     for done in range(rounds + 1):
-        taken.append([_time_call(*call) for call in calls])
+        seconds.append([_time_call(*call) for call in calls])
         progress(done + 1, rounds + 1)
     # np.median imports masked arrays on first use, which takes longer than this measurement.
-    return np.sort(taken[1:], axis=0)[rounds // 2] / ROWS_PER_CALL
+    return np.sort(seconds[1:], axis=0)[rounds // 2] / ROWS_PER_CALL
 
 
 def monotone_costs(costs: Annotated[Floats, "levels"]) -> tuple[float, ...]:
@@ -300,8 +300,8 @@ class NamedModel:
         It differs between machines on which the model's answers or the correction differ in the
         last digits.
         """
-        parts = self.identity.encode() + self.session.golden + rounding_fingerprint()
-        return blake2b(parts, digest_size=16).digest()
+        content = self.identity.encode() + self.session.golden + rounding_fingerprint()
+        return blake2b(content, digest_size=16).digest()
 
     @cached_property
     def level_table(self) -> LevelTable:

@@ -78,12 +78,12 @@ class GraphParts:
     def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
         """Return values as `Graph.run` does."""
         key = tuple(values), level
-        part = self._parts.get(key)
-        if part is None:
-            part = self._parts[key] = self._open(*key)
-        own = {name: feed[name] for name in part.inputs if name in feed}
-        found: list[Any] = part.session.run(key[0], own)
-        return found
+        graph_part = self._parts.get(key)
+        if graph_part is None:
+            graph_part = self._parts[key] = self._open(*key)
+        inputs = {name: feed[name] for name in graph_part.inputs if name in feed}
+        outputs: list[Any] = graph_part.session.run(key[0], inputs)
+        return outputs
 
     def _open(self, values: tuple[str, ...], level: int) -> _Part:
         content = onnx_file.select_outputs(onnx_file.fix_level(self._content, level), *values)
@@ -178,9 +178,9 @@ def _check_bounds(answers: Mapping[str, Singles], card: ModelCard, source: str) 
         "bone_offsets": (-size, size, "m"),
     }
     for name, (low, high, unit) in bounds.items():
-        found = answers[name]
-        if not ((found >= low) & (found <= high)).all():
-            worst = found.flat[np.argmax(np.maximum(low - found, found - high))]
+        values = answers[name]
+        if not ((values >= low) & (values <= high)).all():
+            worst = values.flat[np.argmax(np.maximum(low - values, values - high))]
             raise ModelError(
                 source, f"its {name} is {worst:.3g} {unit}, expected {low:.3g} to {high:.3g} {unit}"
             )

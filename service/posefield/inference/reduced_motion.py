@@ -47,9 +47,9 @@ def deviations(card: ModelCard) -> Deviations:
     return stored.reshape(-1, card.levels[0].ranks[0])
 
 
-def to_bytes(found: Deviations) -> bytes:
+def to_bytes(deviations: Deviations) -> bytes:
     """Return the deviations as a card stores them: half precision, row by row."""
-    return found.astype("<f2").tobytes()
+    return deviations.astype("<f2").tobytes()
 
 
 def waves(frames: int, harmonics: int) -> Annotated[Floats, "frames waves"]:
@@ -59,12 +59,12 @@ def waves(frames: int, harmonics: int) -> Annotated[Floats, "frames waves"]:
 
 
 def sample(
-    found: Deviations, frames: int, seed: Seeds
+    deviations: Deviations, frames: int, seed: Seeds
 ) -> Annotated[Floats, "*seeds frames freedoms"]:
     """Return the detail (..., T, r1) of each seed: equal for all controls and labels."""
-    harmonics, freedoms = found.shape
-    drawn = random_field.normals(seed, STREAM, 2 * harmonics, freedoms)
-    return np.asarray(waves(frames, harmonics) @ (drawn * np.vstack([found, found])))
+    harmonics, freedoms = deviations.shape
+    normals = random_field.normals(seed, STREAM, 2 * harmonics, freedoms)
+    return np.asarray(waves(frames, harmonics) @ (normals * np.vstack([deviations, deviations])))
 
 
 GraphConstants = Mapping[str, npt.NDArray[Any]]
@@ -102,25 +102,25 @@ class ReducedTensor:
         """Return the reduced motion (r2, r1) of sample coefficients (r3,)."""
         return self.core @ coefficients
 
-    def row(self, place: float) -> Annotated[Floats, "times"]:
+    def row(self, frame: float) -> Annotated[Floats, "times"]:
         """Return the time coefficients (r2,) at a canonical frame, interpolated linearly."""
-        before = min(int(place), self.frames - 2)
-        share = place - before
-        found: Floats = (1.0 - share) * self.time[before] + share * self.time[before + 1]
-        return found
+        before = min(int(frame), self.frames - 2)
+        share = frame - before
+        interpolated: Floats = (1.0 - share) * self.time[before] + share * self.time[before + 1]
+        return interpolated
 
-    def rows(self, places: Frames) -> Annotated[Floats, "frames times"]:
+    def rows(self, frames: Frames) -> Annotated[Floats, "frames times"]:
         """Return the time coefficients (S, r2) at canonical frames (S,)."""
-        return quat.interpolate_rows(self.time, places)
+        return quat.interpolate_rows(self.time, frames)
 
     def moves(
-        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+        self, motion: Annotated[Floats, "times freedoms"], frames: Frames
     ) -> Annotated[Floats, "frames freedoms"]:
         """Return the coefficients (S, r1) of the directions in a reduced motion (r2, r1)."""
-        return self.with_detail(self.rows(places) @ motion, places)
+        return self.with_detail(self.rows(frames) @ motion, frames)
 
     def moves_of_coefficients(
-        self, coefficients: Annotated[Floats, "poses modes"], places: Annotated[Floats, "poses"]
+        self, coefficients: Annotated[Floats, "poses modes"], frames: Annotated[Floats, "poses"]
     ) -> Annotated[Floats, "poses freedoms"]:
         """Return the coefficients (S, r1) of the directions of poses of motions of their own.
 
@@ -128,41 +128,41 @@ class ReducedTensor:
         """
         r2, r1, r3 = self.core.shape
         motions = coefficients @ self.core.reshape(r2 * r1, r3).T
-        found = self.rows(places)[:, None] @ motions.reshape(-1, r2, r1)
-        return np.asarray(found[:, 0])
+        products = self.rows(frames)[:, None] @ motions.reshape(-1, r2, r1)
+        return np.asarray(products[:, 0])
 
     def with_detail(
-        self, moves: Annotated[Floats, "frames freedoms"], places: Frames
+        self, moves: Annotated[Floats, "frames freedoms"], frames: Frames
     ) -> Annotated[Floats, "frames freedoms"]:
         """Return moves (S, r1) at canonical frames (S,) with the detail added."""
-        return moves if self.detail is None else moves + quat.interpolate_rows(self.detail, places)
+        return moves if self.detail is None else moves + quat.interpolate_rows(self.detail, frames)
 
     def poses(
-        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+        self, motion: Annotated[Floats, "times freedoms"], frames: Frames
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
-        products, roots = self.turn_products(motion, places)
+        products, roots = self.turn_products(motion, frames)
         return self.rotations_of(products), roots
 
     def turns(self, numbers: Annotated[Floats, "poses dof"]) -> Rotations:
         """Return rotations (S, J, 4) of pose vectors (S, D)."""
-        own = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(numbers), -1, 3)
-        return quat.mul(self.rotations, CHARTS[self.chart].quaternions(own))
+        charts = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(numbers), -1, 3)
+        return quat.mul(self.rotations, CHARTS[self.chart].quaternions(charts))
 
     def turn_products(
-        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+        self, motion: Annotated[Floats, "times freedoms"], frames: Frames
     ) -> tuple[Annotated[Floats, "frames joints 4"], RootPath]:
         """Return what `rotations_of` needs (S, J, 4), and root positions (S, 3), m.
 
         The former are linear in the reduced motion (r2, r1), by products of one motion.
         """
-        moves = self.moves(motion, places)
+        moves = self.moves(motion, frames)
         mean, turns = self.mean_products
-        return (mean + moves @ turns).reshape(len(places), -1, 4), self._roots(moves)
+        return (mean + moves @ turns).reshape(len(frames), -1, 4), self._roots(moves)
 
-    def roots(self, motion: Annotated[Floats, "times freedoms"], places: Frames) -> RootPath:
+    def roots(self, motion: Annotated[Floats, "times freedoms"], frames: Frames) -> RootPath:
         """Return the root positions (S, 3), m, of a reduced motion (r2, r1)."""
-        return self._roots(self.moves(motion, places))
+        return self._roots(self.moves(motion, frames))
 
     def rotations_of(
         self, products: Annotated[Floats, "poses joints 4"]
@@ -191,11 +191,11 @@ class ReducedTensor:
 
         moves: coefficients (S, r1) of the directions.
         """
-        others = np.r_[:3, 3 + 3 * len(self.rotations) : len(self.mean)]
-        numbers = self.mean[others] + moves @ self.directions[:, others]
+        root_and_curves = np.r_[:3, 3 + 3 * len(self.rotations) : len(self.mean)]
+        numbers = self.mean[root_and_curves] + moves @ self.directions[:, root_and_curves]
         mean, turns = self.mean_products
-        found = self.rotations_of((mean + moves @ turns).reshape(len(moves), -1, 4))
-        return found, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
+        rotations = self.rotations_of((mean + moves @ turns).reshape(len(moves), -1, 4))
+        return rotations, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
 
     @cached_property
     def mean_products(
@@ -208,16 +208,18 @@ class ReducedTensor:
         end, joints = 3 + 3 * len(self.rotations), len(self.rotations)
         numbers = np.vstack([self.mean, self.directions])[:, 3:end]
         rows = CHARTS[self.chart].share * numbers.reshape(-1, joints, 3)
-        found = quat.mul(self.rotations, np.pad(rows, ((0, 0), (0, 0), (1, 0))))
-        flat = found.reshape(len(rows), -1)
+        products = quat.mul(self.rotations, np.pad(rows, ((0, 0), (0, 0), (1, 0))))
+        flat = products.reshape(len(rows), -1)
         return flat[0], flat[1:]
 
     def curve_values(
-        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+        self, motion: Annotated[Floats, "times freedoms"], frames: Frames
     ) -> Annotated[Floats, "frames curves"]:
         """Return the values (S, C) of the curves in a reduced motion (r2, r1)."""
-        own = slice(3 + 3 * len(self.rotations), None)
-        numbers = self.mean[own] + self.moves(motion, places) @ self.directions[:, own]
+        curve_rows = slice(3 + 3 * len(self.rotations), None)
+        numbers = (
+            self.mean[curve_rows] + self.moves(motion, frames) @ self.directions[:, curve_rows]
+        )
         return curves.clamp(self.curves, numbers)
 
 
@@ -231,8 +233,8 @@ def read(weights: GraphConstants, level: Level, card: ModelCard) -> ReducedTenso
     rotations = weights["mean_rotations"][:, :, 0].astype(np.float64)
     moves = np.zeros((1 + len(rotations), 1))
     moves[[0, *(1 + joint for joint in level.joints)]] = 1.0
-    moved = np.concatenate([np.repeat(moves, 3, axis=0), np.ones((len(own_curves), 1))])
-    directions = _directions(weights)[:, :r1] * moved
+    affine = np.concatenate([np.repeat(moves, 3, axis=0), np.ones((len(own_curves), 1))])
+    directions = _directions(weights)[:, :r1] * affine
     mean = [weights["root_mean"], _mean_turns(weights, rotations, chart).ravel()]
     core = weights["core"][:r2, :r1, :r3].astype(np.float64)
     time = weights["time_basis"][:r2].T.astype(np.float64)
@@ -257,17 +259,17 @@ def _with_event(
 ) -> Annotated[Floats, "more_times freedoms more_modes"]:
     """Return the core with the block that the event's second prediction multiplies."""
     columns, (r2, _, r3) = len(mixing), core.shape
-    found = np.pad(core, ((0, columns), (0, 0), (0, count)))
-    found[r2:, :, r3:] = np.tensordot(mixing, core[:, :, :count], axes=1)
-    return found
+    extended = np.pad(core, ((0, columns), (0, 0), (0, count)))
+    extended[r2:, :, r3:] = np.tensordot(mixing, core[:, :, :count], axes=1)
+    return extended
 
 
 def _directions(weights: GraphConstants) -> Annotated[Floats, "dof freedoms"]:
     """Return the directions (D, r1), with zeros for degrees of freedom that never vary."""
     stored = weights["directions"]
-    whole = np.vstack([stored, np.zeros((1, stored.shape[1]))])
-    found: Floats = whole[weights["freedoms"]].astype(np.float64)
-    return found
+    padded = np.vstack([stored, np.zeros((1, stored.shape[1]))])
+    directions: Floats = padded[weights["freedoms"]].astype(np.float64)
+    return directions
 
 
 def _mean_turns(weights: GraphConstants, rotations: JointRotations, chart: ChartName) -> Bones:
@@ -313,10 +315,10 @@ class ResidualCovariance:
         r2, r1 = len(self.time), len(self.freedoms)
         blocks = self.time @ inner.reshape(*inner.shape[:-1], r2, r1) @ self.freedoms
         even = blocks.reshape(inner.shape)
-        own = (inner @ self.residuals) @ self.residuals.T
-        both = MARGINAL_WEIGHT * even + (1.0 - MARGINAL_WEIGHT) * own
-        beside = gradients[..., len(self.residuals) :] @ self.beside
-        return np.concatenate([both, beside], axis=-1).swapaxes(-1, -2)
+        explained = (inner @ self.residuals) @ self.residuals.T
+        both = MARGINAL_WEIGHT * even + (1.0 - MARGINAL_WEIGHT) * explained
+        other_quantities = gradients[..., len(self.residuals) :] @ self.beside
+        return np.concatenate([both, other_quantities], axis=-1).swapaxes(-1, -2)
 
 
 def estimate(
@@ -334,21 +336,25 @@ def estimate(
     # What the second prediction around the event adds is given, and is no part of a correction.
     core = reduced.core[..., : card.levels[0].ranks[2]]
     r3 = core.shape[2]
-    held = sample_coefficients(card, weights, samples)[:, :r3]
-    missed = left_out @ held
+    coefficients = sample_coefficients(card, weights, samples)[:, :r3]
+    residuals = left_out @ coefficients
     sigmas = np.sqrt(sill * variances * len(samples))
     # Residuals for a sigma of one metre: times the sigma of a point they are those of the point.
-    strays = missed / sigmas[:, None]
+    strays = residuals / sigmas[:, None]
     root = np.linalg.cholesky(strays.T @ strays + 1e-12 * np.eye(r3))
     spread = core @ root
     time = np.einsum("tdk,sdk->ts", spread, spread)
     freedoms = np.einsum("tdk,tek->de", spread, spread)
-    own = np.array(card.beside, dtype=float).reshape(len(card.beside), len(card.beside))
+    other_covariance = np.array(card.beside, dtype=float).reshape(
+        len(card.beside), len(card.beside)
+    )
     marginals = time / np.trace(time), freedoms
     flat = core.reshape(-1, r3).T
-    motions = held @ flat, (held - missed) @ flat
+    motions = coefficients @ flat, (coefficients - residuals) @ flat
     roots = spread.reshape(-1, r3), root
-    return ResidualCovariance(*roots, *marginals, own @ own.T, *motions, sigmas)
+    return ResidualCovariance(
+        *roots, *marginals, other_covariance @ other_covariance.T, *motions, sigmas
+    )
 
 
 def sample_coefficients(
@@ -358,29 +364,29 @@ def sample_coefficients(
     hyper = card.kriging
     r3 = weights["core"].shape[2]
     order = importance_order(card, weights, samples)
-    held = samples[order]
+    ordered = samples[order]
     dual = weights["pose_weights"][:, :r3].astype(np.float64)
     # The event's columns come last.
     first = weights["linear_weights"].shape[1] - r3 - card.levels[0].event
     linear = weights["linear_weights"][:, first : first + r3].astype(np.float64)
-    found = np.empty((len(samples), r3))
-    near = kriging_model.stationary_covariances(hyper, held, held)
-    near += hyper.nugget * np.eye(len(held))
-    found[order] = near @ dual + kriging_model.linear_functions(hyper, held) @ linear
-    return found
+    coefficients = np.empty((len(samples), r3))
+    near = kriging_model.stationary_covariances(hyper, ordered, ordered)
+    near += hyper.nugget * np.eye(len(ordered))
+    coefficients[order] = near @ dual + kriging_model.linear_functions(hyper, ordered) @ linear
+    return coefficients
 
 
 def importance_order(
     card: ModelCard, weights: GraphConstants, samples: Samples
 ) -> Annotated[Indices, "samples"]:
     """Return the index on the card (n,) of each sample, in the file's order of importance."""
-    held = weights["samples"].T
+    rows = weights["samples"].T
     listed = samples[:, : len(card.controls)].astype(np.float32)
     graph_names = [weights[f"whose_{index}"] for index in range(len(card.labels))]
-    card_names = [own.clips for own in card.labels]
-    place = np.empty(len(held), dtype=np.int64)
-    place[np.lexsort((*held.T, *graph_names))] = np.lexsort((*listed.T, *card_names))
-    return place
+    card_names = [label.clips for label in card.labels]
+    order_of = np.empty(len(rows), dtype=np.int64)
+    order_of[np.lexsort((*rows.T, *graph_names))] = np.lexsort((*listed.T, *card_names))
+    return order_of
 
 
 def leave_out_groups(card: ModelCard, samples: Samples) -> Annotated[Indices, "samples"]:
@@ -399,5 +405,5 @@ def leave_out_groups(card: ModelCard, samples: Samples) -> Annotated[Indices, "s
 def take_numbers(card: ModelCard) -> Annotated[Indices, "samples"]:
     """Return the number (N,) of each captured clip's take; without takes, of its file."""
     files = [source.partition(", frames ")[0] for source in card.sources]
-    found = card.making.takes or np.unique(files, return_inverse=True)[1]
-    return np.asarray(found, dtype=np.int64)
+    numbers = card.making.takes or np.unique(files, return_inverse=True)[1]
+    return np.asarray(numbers, dtype=np.int64)

@@ -61,14 +61,14 @@ DEFAULT_LIMITS = TrialLimits()
 def _run_trial(content: bytes, limits: TrialLimits) -> str:
     """Return the reason for which a child process cannot open a file, or an empty text."""
     context = _context()
-    own, other = context.Pipe()
+    receiver, other = context.Pipe()
     child = context.Process(target=_run_child, args=(other, limits), daemon=True)
     # Python warns of a fork in a process with threads of libraries. OpenBLAS ends its own before a
     # fork.
-    with own, other, warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+    with receiver, other, warnings.catch_warnings(action="ignore", category=DeprecationWarning):
         child.start()
         other.close()
-        return _message(child, own, content, limits)
+        return _message(child, receiver, content, limits)
 
 
 def _context() -> Any:
@@ -81,16 +81,16 @@ def _context() -> Any:
     return multiprocessing.get_context("fork" if copied else "spawn")
 
 
-def _message(child: BaseProcess, own: Connection, content: bytes, limits: TrialLimits) -> str:
+def _message(child: BaseProcess, receiver: Connection, content: bytes, limits: TrialLimits) -> str:
     """Return the reason for which the child cannot open a file, or an empty text."""
     alarm = threading.Timer(limits.wall, child.kill)
     alarm.start()
     try:
         # Sent after the start: as an argument, it would block for ever on a child that ends at
         # once.
-        own.send_bytes(content)
+        receiver.send_bytes(content)
         # Bytes, not pickle, which runs code: a malicious file may control the child process.
-        return own.recv_bytes(4 * MAX_MESSAGE).decode()
+        return receiver.recv_bytes(4 * MAX_MESSAGE).decode()
     except (EOFError, OSError, UnicodeDecodeError):
         late = alarm.finished.is_set()
         child.join()
@@ -143,6 +143,6 @@ def _set_limits(limits: TrialLimits) -> None:
 
 
 def _set_soft_limit(kind: int, limit: int) -> None:
-    most = resource.getrlimit(kind)[1]
-    lower = limit if most == resource.RLIM_INFINITY else min(limit, most)
-    resource.setrlimit(kind, (lower, most))
+    hard = resource.getrlimit(kind)[1]
+    lower = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+    resource.setrlimit(kind, (lower, hard))

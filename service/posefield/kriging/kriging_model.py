@@ -113,12 +113,12 @@ class Hyper:
     @property
     def label_counts(self) -> tuple[int, ...]:
         """Return the number of names of each label set."""
-        return tuple(own.count for own in self.labels)
+        return tuple(label.count for label in self.labels)
 
     def with_offsets(self, *offsets: float) -> "Hyper":
         """Return the parameters with the offset of each label set replaced."""
         pairs = zip(self.labels, offsets, strict=True)
-        return replace(self, labels=tuple(replace(own, offset=a) for own, a in pairs))
+        return replace(self, labels=tuple(replace(label, offset=a) for label, a in pairs))
 
     def without_offsets(self) -> "Hyper":
         """Return the parameters with offsets of zero."""
@@ -181,10 +181,10 @@ def stationary_covariances(
 ) -> Annotated[Floats, "*some a b"]:
     """Return the part (..., A, B) of the covariances that depends on the points' distance."""
     squares = squared_distances(hyper, a.reshape(-1, a.shape[-1]), b)
-    found = COVARIANCE_MODELS[hyper.covariance](squares).reshape(*a.shape[:-1], len(b))
-    for own, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
-        found = found * (own.correlation + (1.0 - own.correlation) * same)
-    return found
+    covariances = COVARIANCE_MODELS[hyper.covariance](squares).reshape(*a.shape[:-1], len(b))
+    for label, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
+        covariances = covariances * (label.correlation + (1.0 - label.correlation) * same)
+    return covariances
 
 
 def label_products(
@@ -192,25 +192,25 @@ def label_products(
 ) -> list[Annotated[Floats, "*some a b"]]:
     """Return the inner products (..., A, B) of the points' weights of each label set's names."""
     columns = label_columns(len(hyper.scales), hyper.label_counts)
-    return [a[..., own] @ b[:, own].T for own in columns]
+    return [a[..., columns_of_label] @ b[:, columns_of_label].T for columns_of_label in columns]
 
 
 def label_columns(first: int, counts: Sequence[int]) -> list[slice]:
     """Return the columns of each label set, of that many names, from the first column on."""
-    ends = np.cumsum([first, *counts]).tolist()
-    return [slice(start, end) for start, end in pairwise(ends)]
+    bounds = np.cumsum([first, *counts]).tolist()
+    return [slice(start, end) for start, end in pairwise(bounds)]
 
 
 def covariances(
     hyper: Hyper, a: Annotated[Floats, "*some a coordinates"], b: Annotated[Floats, "b coordinates"]
 ) -> Annotated[Floats, "*some a b"]:
     """Return the covariances (..., A, B) between points (..., A, d + p) and (B, d + p)."""
-    found, d = stationary_covariances(hyper, a, b), len(hyper.scales)
-    for own, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
-        found = found + own.offset * same
+    matrix, d = stationary_covariances(hyper, a, b), len(hyper.scales)
+    for label, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
+        matrix = matrix + label.offset * same
     if hyper.trend:
-        found = found + hyper.trend * (a[..., :d] @ b[:, :d].T)
-    return found
+        matrix = matrix + hyper.trend * (a[..., :d] @ b[:, :d].T)
+    return matrix
 
 
 def prior_variances(hyper: Hyper, points: Points) -> PerPoint:
@@ -221,7 +221,7 @@ def prior_variances(hyper: Hyper, points: Points) -> PerPoint:
     """
     controls = points[:, : len(hyper.scales)]
     squares = np.sum(np.square(controls), axis=1)
-    return 1.0 + sum(own.offset for own in hyper.labels) + hyper.trend * squares
+    return 1.0 + sum(label.offset for label in hyper.labels) + hyper.trend * squares
 
 
 def drift(
@@ -251,13 +251,13 @@ def linear_terms(hyper: Hyper, samples: Samples) -> Annotated[Floats, "linear sy
     """
     (n, width), d, degree = samples.shape, len(hyper.scales), max(hyper.drifts)
     p = width - d
-    found = np.zeros((p + 1 + d, n + 1 + degree * d))
-    for own, columns in zip(hyper.labels, label_columns(0, hyper.label_counts), strict=True):
-        found[columns, :n] = own.offset * samples.T[d:][columns]
-    found[p + 1 :, :n] = hyper.trend * samples[:, :d].T
-    found[p, n] = 1.0
-    found[p + 1 :, n + 1 :] = np.eye(d) if degree else found[p + 1 :, n + 1 :]
-    return found
+    terms = np.zeros((p + 1 + d, n + 1 + degree * d))
+    for label, columns in zip(hyper.labels, label_columns(0, hyper.label_counts), strict=True):
+        terms[columns, :n] = label.offset * samples.T[d:][columns]
+    terms[p + 1 :, :n] = hyper.trend * samples[:, :d].T
+    terms[p, n] = 1.0
+    terms[p + 1 :, n + 1 :] = np.eye(d) if degree else terms[p + 1 :, n + 1 :]
+    return terms
 
 
 def find_required_group(
@@ -305,11 +305,11 @@ def weight_matrix(hyper: Hyper, samples: Samples) -> Annotated[Floats, "system s
     With more than one drift the weights are averaged.
     """
     n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
-    found = np.zeros((n + functions, n))
+    matrix = np.zeros((n + functions, n))
     for degree in hyper.drifts:
-        own = invert_system(hyper, samples, degree)[:, :n]
-        found[: len(own)] += own / len(hyper.drifts)
-    return found
+        inverse = invert_system(hyper, samples, degree)[:, :n]
+        matrix[: len(inverse)] += inverse / len(hyper.drifts)
+    return matrix
 
 
 def residual_matrix(
@@ -348,11 +348,11 @@ def divide_groups(
 
     several: of the groups of more than one sample, as `equal_sized_groups` returns them.
     """
-    found: Floats = rows / np.diagonal(block)[:, None]
-    for own in several:
-        among = block[own[:, :, None], own[:, None, :]]
-        found[own] = np.linalg.solve(among, rows[own])
-    return found
+    divided: Floats = rows / np.diagonal(block)[:, None]
+    for group in several:
+        among = block[group[:, :, None], group[:, None, :]]
+        divided[group] = np.linalg.solve(among, rows[group])
+    return divided
 
 
 def equal_sized_groups(
@@ -375,8 +375,10 @@ def leave_out(
     """
     d = len(hyper.scales)
     inverse: Floats = np.asarray(np.linalg.inv(noisy(hyper, samples)))
-    found = [residual_matrix(inverse, drift(samples, d, degree), groups) for degree in hyper.drifts]
-    return np.asarray(sum(found[1:], found[0]) / len(found))
+    matrices = [
+        residual_matrix(inverse, drift(samples, d, degree), groups) for degree in hyper.drifts
+    ]
+    return np.asarray(sum(matrices[1:], matrices[0]) / len(matrices))
 
 
 def left_out_variances(hyper: Hyper, samples: Samples, left_out: SampleMatrix) -> PerSample:

@@ -58,8 +58,8 @@ def words(seed: Seeds, stream: int, count: int) -> Words:
     counters = np.zeros((BLOCK, blocks), dtype=np.uint64)
     counters[0], counters[1] = np.arange(blocks, dtype=np.uint64), np.uint64(stream)
     keys = np.asarray(seed, np.uint64)[..., None]
-    found = philox(counters, (keys & WORD_MASK, keys >> WORD_BITS))
-    return np.moveaxis(found, 0, -1).reshape(*keys.shape[:-1], -1)[..., :count]
+    random_words = philox(counters, (keys & WORD_MASK, keys >> WORD_BITS))
+    return np.moveaxis(random_words, 0, -1).reshape(*keys.shape[:-1], -1)[..., :count]
 
 
 def signs(
@@ -78,12 +78,12 @@ def normals(
     By Box and Muller ("A note on the generation of random normal deviates", 1958), rounded.
     """
     pairs, shape = -(-rows * columns // 2), np.shape(seed)
-    drawn = words(seed, stream, 2 * pairs).reshape(*shape, pairs, 2)
-    shares = (drawn.astype(np.float64) + 0.5) / 2.0**32
+    uniform = words(seed, stream, 2 * pairs).reshape(*shape, pairs, 2)
+    shares = (uniform.astype(np.float64) + 0.5) / 2.0**32
     lengths, angles = np.sqrt(-2.0 * np.log(shares[..., 0])), 2.0 * np.pi * shares[..., 1]
-    found = np.stack([lengths * np.cos(angles), lengths * np.sin(angles)], axis=-1)
-    kept = found.reshape(*shape, -1)[..., : rows * columns]
-    return np.round(kept, NORMAL_DECIMALS).reshape(*shape, rows, columns)
+    pairs_of_normals = np.stack([lengths * np.cos(angles), lengths * np.sin(angles)], axis=-1)
+    numbers = pairs_of_normals.reshape(*shape, -1)[..., : rows * columns]
+    return np.round(numbers, NORMAL_DECIMALS).reshape(*shape, rows, columns)
 
 
 FREQUENCIES = 64
@@ -135,10 +135,10 @@ class RandomField:
         angles = controls @ self.frequencies
         scale = np.full_like(angles, FREQUENCIES**-0.5)
         sets = kriging_model.label_columns(0, _row_counts(self.hyper))
-        for place, (own, rows) in enumerate(zip(self.hyper.labels, sets, strict=True)):
-            kept = np.sqrt(own.correlation) * self.common[..., place, None, :]
+        for index, (label, rows) in enumerate(zip(self.hyper.labels, sets, strict=True)):
+            common = np.sqrt(label.correlation) * self.common[..., index, None, :]
             varied = names[..., rows] @ self.signs[..., rows, :]
-            scale *= kept + np.sqrt(1.0 - own.correlation) * varied
+            scale *= common + np.sqrt(1.0 - label.correlation) * varied
         features = np.concatenate([scale * np.cos(angles), scale * np.sin(angles)], axis=-1)
         linear = names @ self.offsets + controls @ self.slopes
         return np.asarray(features @ self.amplitudes + linear)
@@ -162,8 +162,8 @@ class ConditionalField:
         """Return the deviations (..., B, m) at points (..., B, d + p)."""
         weights = self.weights.weights(points.reshape(-1, points.shape[-1]))
         kriged = weights.reshape(*points.shape[:-1], -1) @ self.errors
-        found = self.field.evaluate(points) - kriged + self.own[..., None, :]
-        return np.asarray(np.round(found, VALUE_DECIMALS))
+        values = self.field.evaluate(points) - kriged + self.own[..., None, :]
+        return np.asarray(np.round(values, VALUE_DECIMALS))
 
     def evaluate_each(
         self, points: Annotated[Floats, "points coordinates"]
@@ -173,10 +173,10 @@ class ConditionalField:
         A product of matrices of several rows sums in another order than one of a single row; so
         each point has a product of its own.
         """
-        each = points[:, None]
-        kriged = self.weights.weights(each) @ self.errors
-        found = self.field.evaluate(each) - kriged + self.own
-        return np.asarray(np.round(found[:, 0], VALUE_DECIMALS))
+        rows = points[:, None]
+        kriged = self.weights.weights(rows) @ self.errors
+        values = self.field.evaluate(rows) - kriged + self.own
+        return np.asarray(np.round(values[:, 0], VALUE_DECIMALS))
 
 
 def draw_field(hyper: Hyper, seed: Seeds, count: int) -> RandomField:
@@ -194,13 +194,13 @@ def draw_field(hyper: Hyper, seed: Seeds, count: int) -> RandomField:
     shapes = [(d + freedoms, FREQUENCIES), *((n, count) for n in (2 * FREQUENCIES, names, d))]
     # One call for all numbers: the overhead of a call is a tenth of a field's time.
     sizes = [rows * columns for rows, columns in shapes]
-    drawn = normals(seed, FIELD, 1, sum(sizes))[..., 0, :]
-    parts = zip(np.split(drawn, np.cumsum(sizes)[:-1], axis=-1), shapes, strict=True)
+    numbers = normals(seed, FIELD, 1, sum(sizes))[..., 0, :]
+    blocks = zip(np.split(numbers, np.cumsum(sizes)[:-1], axis=-1), shapes, strict=True)
     spectrum, amplitudes, offsets, slopes = (
-        part.reshape(*np.shape(seed), *shape) for part, shape in parts
+        block.reshape(*np.shape(seed), *shape) for block, shape in blocks
     )
     changes = signs(seed, SIGNS, sets + names, FREQUENCIES)
-    scales = np.repeat([own.offset for own in hyper.labels], _row_counts(hyper))
+    scales = np.repeat([label.offset for label in hyper.labels], _row_counts(hyper))
     return RandomField(
         hyper,
         _frequencies(hyper, spectrum),
@@ -227,7 +227,7 @@ def simulate(weights: KrigingWeights, seed: Seeds, count: int) -> ConditionalFie
 
 def _row_counts(hyper: Hyper) -> list[int]:
     """Return the number of rows of each label set: its names and one without samples."""
-    return [own.count + 1 for own in hyper.labels]
+    return [label.count + 1 for label in hyper.labels]
 
 
 def _frequencies(
@@ -251,9 +251,9 @@ def _with_unsampled(hyper: Hyper, points: SeedPoints) -> Annotated[Floats, "*som
 
     It counts as a name without samples, as in `kriging_model.prior_variances`.
     """
-    parts = [np.zeros((*points.shape[:-1], 0))]
+    blocks = [np.zeros((*points.shape[:-1], 0))]
     for columns in kriging_model.label_columns(len(hyper.scales), hyper.label_counts):
-        own = points[..., columns]
-        left = np.sqrt(np.maximum(1.0 - np.sum(np.square(own), axis=-1), 0.0))
-        parts += [own, left[..., None]]
-    return np.concatenate(parts, axis=-1)
+        label_values = points[..., columns]
+        left = np.sqrt(np.maximum(1.0 - np.sum(np.square(label_values), axis=-1), 0.0))
+        blocks += [label_values, left[..., None]]
+    return np.concatenate(blocks, axis=-1)

@@ -70,14 +70,14 @@ class Support:
         """Return whether each of the points (B, d) is supported, as (B,)."""
         low, high = np.transpose(self._bounds)
         inside = ((low <= points) & (points <= high)).all(axis=1)
-        found = np.zeros(len(points), dtype=bool)
-        own = points[inside]
-        lowest, highest = self.variance_bounds(own)
+        supported = np.zeros(len(points), dtype=bool)
+        inner_points = points[inside]
+        lowest, highest = self.variance_bounds(inner_points)
         verdict = highest <= self.limit - FLOAT32_ERROR
         unsure = np.flatnonzero(~verdict & (lowest < self.limit + FLOAT32_ERROR))
-        verdict[unsure] = self.variance(own[unsure]) <= self.limit
-        found[inside] = verdict
-        return found
+        verdict[unsure] = self.variance(inner_points[unsure]) <= self.limit
+        supported[inside] = verdict
+        return supported
 
     def is_supported(self, point: Sequence[float]) -> bool:
         """Return whether a point (d,) is supported: `supported` for a single point."""
@@ -119,8 +119,8 @@ class Support:
 
     @cached_property
     def _inverse(self) -> SampleMatrix:
-        own = covariances(self.samples, self.samples) + NUGGET * np.eye(len(self.samples))
-        return np.asarray(np.linalg.inv(own))
+        matrix = covariances(self.samples, self.samples) + NUGGET * np.eye(len(self.samples))
+        return np.asarray(np.linalg.inv(matrix))
 
     @cached_property
     def _bounds(self) -> list[tuple[float, float]]:
@@ -131,8 +131,8 @@ class Support:
     def _scale(self) -> list[tuple[float, float]]:
         """Return the factor and the offset of each control that scale it to half-ranges."""
         width = self.high - self.low
-        ends = (2.0 / width).tolist(), ((self.low + self.high) / width).tolist()
-        return list(zip(*ends, strict=True))
+        factors = (2.0 / width).tolist(), ((self.low + self.high) / width).tolist()
+        return list(zip(*factors, strict=True))
 
     @cached_property
     def _exponents(self) -> tuple[SampleControls, PerSample]:
@@ -142,8 +142,8 @@ class Support:
         """
         factors, offsets = np.transpose(self._scale)
         slopes = 2.0 * RATE * self.samples
-        own = RATE * np.sum(np.square(self.samples), axis=1)
-        return slopes * factors, -slopes @ offsets - own
+        exponents = RATE * np.sum(np.square(self.samples), axis=1)
+        return slopes * factors, -slopes @ offsets - exponents
 
     @cached_property
     def _float32_factors(self) -> "_VarianceFactors":
@@ -156,37 +156,37 @@ class Support:
         sizes, vectors = np.linalg.eigh(covariances(self.samples, self.samples))
         sizes, vectors = np.maximum(sizes[::-1], 0.0), vectors[:, ::-1]
         count = max(int(np.sum(sizes > SMALL_SHARE * NUGGET)), 1)
-        kept = sizes[:count]
-        own = RATE * np.sum(np.square(self.samples), axis=1)
-        parts = (
+        chosen_sizes = sizes[:count]
+        exponents = RATE * np.sum(np.square(self.samples), axis=1)
+        arrays = (
             2.0 * RATE * self.samples.T,
-            -own,
-            vectors[:, :count] / np.sqrt(kept + NUGGET),
-            np.stack([np.ones(count), (kept + NUGGET) / kept], axis=1),
+            -exponents,
+            vectors[:, :count] / np.sqrt(chosen_sizes + NUGGET),
+            np.stack([np.ones(count), (chosen_sizes + NUGGET) / chosen_sizes], axis=1),
         )
         next_size = float(sizes[count]) if count < len(sizes) else 0.0
         slopes, offsets, directions, sums = (
-            np.ascontiguousarray(part, dtype=np.float32) for part in parts
+            np.ascontiguousarray(array, dtype=np.float32) for array in arrays
         )
         rest = next_size / (next_size + NUGGET)
         return _VarianceFactors(slopes, offsets, directions, sums, rest)
 
     def variance_bounds(self, points: PointControls) -> tuple[PerPoint, PerPoint]:
         """Return bounds (B,) of `variance`, right to FLOAT32_ERROR, for points near the range."""
-        own = self._float32_factors
+        factors = self._float32_factors
         scaled = self.scaled(points).astype(np.float32)
         explained, captured = np.empty((2, len(points)))
         for rows in (slice(at, at + BATCH) for at in range(0, len(points), BATCH)):
             cancellation.check()
             some = scaled[rows]
-            near = some @ own.slopes
-            near += own.offsets
+            near = some @ factors.slopes
+            near += factors.offsets
             near -= np.float32(RATE) * np.einsum("bd,bd->b", some, some)[:, None]
             np.exp(near, out=near)
-            parts = near @ own.directions
-            np.square(parts, out=parts)
-            explained[rows], captured[rows] = (parts @ own.sums).T
-        rest = own.rest * np.maximum(1.0 - captured, 0.0)
+            projections = near @ factors.directions
+            np.square(projections, out=projections)
+            explained[rows], captured[rows] = (projections @ factors.sums).T
+        rest = factors.rest * np.maximum(1.0 - captured, 0.0)
         return 1.0 - explained - rest, 1.0 - explained
 
     def scaled(self, points: PointControls) -> PointControls:

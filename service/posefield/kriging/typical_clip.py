@@ -22,21 +22,21 @@ NEIGHBOUR_QUANTILE = 0.95
 BISECTIONS = 30
 
 
-def medoid(places: Annotated[Floats, "clips values"]) -> int:
+def medoid(points: Annotated[Floats, "clips values"]) -> int:
     """Return the row of places (n, k) with the least sum of distances to all rows."""
-    return typical_row(places, np.zeros(len(places)))
+    return typical_row(points, np.zeros(len(points)))
 
 
-def typical_row(places: Annotated[Floats, "clips values"], costs: PerClip) -> int:
+def typical_row(points: Annotated[Floats, "clips values"], costs: PerClip) -> int:
     """Return the medoid of the rows near given values.
 
     places (n, k): rows in the space of the open values. costs (n,): squared distances from the
     given values, in `NEAR`. Rows weigh exp(-cost / 2), and only the nearest ones are candidates.
     """
     beyond = costs - costs.min()
-    apart = np.linalg.norm(places[:, None] - places, axis=-1)
+    distances = np.linalg.norm(points[:, None] - points, axis=-1)
     # Products of one matrix and a vector would round differently between processors.
-    total = np.sum(np.exp(-0.5 * beyond)[:, None] * apart, axis=0)
+    total = np.sum(np.exp(-0.5 * beyond)[:, None] * distances, axis=0)
     total[beyond > CANDIDATE_COST] = np.inf
     return int(np.argmin(total))
 
@@ -54,9 +54,9 @@ class Neighbourhood:
 
     def contains(self, point: Values) -> bool:
         """Return whether a point (k,) is near a captured clip, jointly and in each value."""
-        apart = self.places - point
+        differences = self.places - point
         return all(
-            np.linalg.norm(apart[:, columns], axis=1).min() <= radius
+            np.linalg.norm(differences[:, columns], axis=1).min() <= radius
             for columns, radius in self.sets
         )
 
@@ -72,18 +72,18 @@ class Neighbourhood:
         return start + low * (end - start)
 
 
-def neighbourhood(places: Annotated[Floats, "clips values"]) -> Neighbourhood:
+def neighbourhood(points: Annotated[Floats, "clips values"]) -> Neighbourhood:
     """Return the surroundings of captured clips at places (n, k)."""
-    width = places.shape[1]
+    width = points.shape[1]
     columns = [np.arange(width), *(np.array([i]) for i in range(width if width > 1 else 0))]
-    return Neighbourhood(places, tuple((own, _radius(places[:, own])) for own in columns))
+    return Neighbourhood(points, tuple((column, _radius(points[:, column])) for column in columns))
 
 
-def _radius(places: Floats) -> float:
+def _radius(points: Floats) -> float:
     """Return the distance within which most rows (n, k) have another row."""
-    distinct = np.unique(places, axis=0)
+    distinct = np.unique(points, axis=0)
     if len(distinct) < 2:
         return 0.0
-    apart = np.linalg.norm(distinct[:, None] - distinct, axis=-1)
-    np.fill_diagonal(apart, np.inf)
-    return float(np.quantile(apart.min(axis=1), NEIGHBOUR_QUANTILE))
+    distances = np.linalg.norm(distinct[:, None] - distinct, axis=-1)
+    np.fill_diagonal(distances, np.inf)
+    return float(np.quantile(distances.min(axis=1), NEIGHBOUR_QUANTILE))

@@ -70,22 +70,22 @@ class AnswerBounds:
 
         Keeps the type of the numbers.
         """
-        low, high = (ends.astype(controls.dtype) for ends in self.limits)
+        low, high = (limit.astype(controls.dtype) for limit in self.limits)
         return np.asarray(np.clip(controls, low, high))
 
     def nearest_sampled(self, controls: Floats | Singles) -> Floats:
         """Return the nearest controls (B, d) inside the sampled ranges."""
         return np.clip(controls.astype(np.float64), self.low, self.high)
 
-    def limit_durations(self, found: Singles, nearest: Singles) -> Singles:
+    def limit_durations(self, durations: Singles, nearest: Singles) -> Singles:
         """Return durations (B,), s, limited to the margin about the captured ones.
 
         nearest (B,): durations at the nearest controls inside the sampled ranges, which may lie
         further out where a combination of controls was never captured.
         """
-        shortest, longest = np.array(self.duration_limits, found.dtype)
-        least, most = np.minimum(shortest, nearest), np.maximum(longest, nearest)
-        return np.clip(found, least, most)
+        shortest, longest = np.array(self.duration_limits, durations.dtype)
+        low, high = np.minimum(shortest, nearest), np.maximum(longest, nearest)
+        return np.clip(durations, low, high)
 
 
 def of_card(card: ModelCard) -> AnswerBounds:
@@ -95,8 +95,8 @@ def of_card(card: ModelCard) -> AnswerBounds:
 
 def limit_control(control: Control, value: float) -> float:
     """Return the value at which a control acts: at most the margin outside its sampled range."""
-    least, most = _with_margin(control.minimum, control.maximum)
-    return min(max(value, least), most)
+    low, high = _with_margin(control.minimum, control.maximum)
+    return min(max(value, low), high)
 
 
 def _with_margin(low: Bound, high: Bound) -> tuple[Bound, Bound]:

@@ -42,9 +42,9 @@ def check(card: ModelCard) -> None:
 
     The message names path, value and expectation.
     """
-    for name, most in MAX_ENTRIES.items():
-        found = len(getattr(card, name))
-        _expect(1 <= found <= most, name, found, f"1 to {most}")
+    for name, largest in MAX_ENTRIES.items():
+        count = len(getattr(card, name))
+        _expect(1 <= count <= largest, name, count, f"1 to {largest}")
     _check_lengths(card)
     _check_controls(card)
     _check_clips(card)
@@ -67,12 +67,13 @@ def check_graph(
     compute.
     """
     for name, expected in _shapes(card).items():
-        found = shapes.get(name, ())
-        fits = [b in (a, ANY_SIZE) for a, b in zip(found, expected, strict=False)]
-        if len(found) != len(expected) or not all(fits):
-            wanted = str(expected).replace(str(ANY_SIZE), "any")
+        shape = shapes.get(name, ())
+        fits = [b in (a, ANY_SIZE) for a, b in zip(shape, expected, strict=False)]
+        if len(shape) != len(expected) or not all(fits):
+            card_shape = str(expected).replace(str(ANY_SIZE), "any")
             raise ValueError(
-                f"its graph's constant {name!r} has shape {found}, expected {wanted} by its card"
+                f"its graph's constant {name!r} has shape {shape}, "
+                f"expected {card_shape} by its card"
             )
     further = [*["way"] * card.cyclic, *["contacts"] * bool(card.contacts)]
     further += [rows for name, rows in ROW_VALUES.items() if card.curves or name != "curves"]
@@ -81,27 +82,27 @@ def check_graph(
             raise ValueError(f"its graph computes no value {name!r}, expected one")
 
 
-def _expect(right: bool, path: str, found: object, expected: str) -> None:
+def _expect(right: bool, path: str, value: object, expected: str) -> None:
     if not right:
-        text = str(found)
-        shown = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
-        raise ValueError(f"its card's {path} is {shown}, expected {expected}")
+        text = str(value)
+        shortened = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
+        raise ValueError(f"its card's {path} is {shortened}, expected {expected}")
 
 
-def _expect_length(found: Sized, path: str, expected: int) -> None:
-    if len(found) != expected:
-        raise ValueError(f"its card's {path} has {len(found)} entries, expected {expected}")
+def _expect_length(values: Sized, path: str, expected: int) -> None:
+    if len(values) != expected:
+        raise ValueError(f"its card's {path} has {len(values)} entries, expected {expected}")
 
 
-def _expect_unique(found: Iterable[Hashable], path: str) -> None:
-    twice = [entry for entry, count in Counter(found).items() if count > 1]
+def _expect_unique(values: Iterable[Hashable], path: str) -> None:
+    twice = [entry for entry, count in Counter(values).items() if count > 1]
     _expect(not twice, path, twice, "each entry once")
 
 
-def _expect_joints(found: tuple[int, ...], path: str, card: ModelCard) -> None:
+def _expect_joints(joints: tuple[int, ...], path: str, card: ModelCard) -> None:
     last = len(card.skeleton) - 1
-    _expect_unique(found, path)
-    _expect(max(found, default=0) <= last, path, list(found), f"joints from 0 to {last}")
+    _expect_unique(joints, path)
+    _expect(max(joints, default=0) <= last, path, list(joints), f"joints from 0 to {last}")
 
 
 def _check_lengths(card: ModelCard) -> None:
@@ -122,9 +123,9 @@ def _check_lengths(card: ModelCard) -> None:
         ("beside", card.beside, size),
         ("kriging.labels", card.kriging.labels, len(card.labels)),
     ]
-    rows += [(f"labels[{i}].clips", own.clips, clips) for i, own in enumerate(card.labels)]
-    for path, found, expected in rows:
-        _expect_length(found, path, expected)
+    rows += [(f"labels[{i}].clips", label.clips, clips) for i, label in enumerate(card.labels)]
+    for path, values, expected in rows:
+        _expect_length(values, path, expected)
 
 
 def _check_controls(card: ModelCard) -> None:
@@ -133,31 +134,31 @@ def _check_controls(card: ModelCard) -> None:
         path, sampled = f"controls[{index}]", sorted(example[index] for example in card.examples)
         low, high = sampled[0], sampled[-1]
         _expect(low < high, path, f"{low} in all clips", "a control that varies")
-        found = (control.minimum, control.maximum)
-        _expect(found == (low, high), path, found, f"{low}, {high} by its clips")
+        limits = (control.minimum, control.maximum)
+        _expect(limits == (low, high), path, limits, f"{low}, {high} by its clips")
         # Files of earlier versions have medians, which are values of clips, too.
-        taken = control.default in sampled
-        _expect(taken, f"{path}.default", control.default, "the value of one of its clips")
-        known = control.values in ((), tuple(sorted({*sampled})))
-        _expect(known, f"{path}.values", control.values, "those of its clips, or none")
+        is_sampled = control.default in sampled
+        _expect(is_sampled, f"{path}.default", control.default, "the value of one of its clips")
+        is_complete = control.values in ((), tuple(sorted({*sampled})))
+        _expect(is_complete, f"{path}.values", control.values, "those of its clips, or none")
         if control.measure:
             _check_measure(f"{path}.measure", control.measure, card)
 
 
-def _check_measure(path: str, own: Measure, card: ModelCard) -> None:
-    _expect_joints(own.joints, f"{path}.joints", card)
-    count = len(own.joints)
-    if own.quantity in POSITION_AXES:
-        _expect(own.at is not None, f"{path}.at", None, f"a moment of {own.quantity}")
-        _expect(count > 0, f"{path}.joints", [], f"joints of {own.quantity}")
-    if own.quantity == "step_length":
-        _expect_length(own.joints, f"{path}.joints", 2)
-    if own.quantity == "leg_length":
+def _check_measure(path: str, measure: Measure, card: ModelCard) -> None:
+    _expect_joints(measure.joints, f"{path}.joints", card)
+    count = len(measure.joints)
+    if measure.quantity in POSITION_AXES:
+        _expect(measure.at is not None, f"{path}.at", None, f"a moment of {measure.quantity}")
+        _expect(count > 0, f"{path}.joints", [], f"joints of {measure.quantity}")
+    if measure.quantity == "step_length":
+        _expect_length(measure.joints, f"{path}.joints", 2)
+    if measure.quantity == "leg_length":
         _expect(count > 0, f"{path}.joints", [], "the joints of a leg")
-    if own.at == "landmark":
-        _expect(own.share is not None, f"{path}.share", None, "the place of the landmark")
-    of_cycles = own.quantity in (*TRAVEL_QUANTITIES, "step_length")
-    _expect(card.cyclic or not of_cycles, path, own.quantity, "another, for it is of cycles")
+    if measure.at == "landmark":
+        _expect(measure.share is not None, f"{path}.share", None, "the place of the landmark")
+    of_cycles = measure.quantity in (*TRAVEL_QUANTITIES, "step_length")
+    _expect(card.cyclic or not of_cycles, path, measure.quantity, "another, for it is of cycles")
 
 
 def _check_clips(card: ModelCard) -> None:
@@ -175,31 +176,31 @@ def _check_clips(card: ModelCard) -> None:
 
 def _check_labels(card: ModelCard) -> None:
     controls = {control.name for control in card.controls}
-    _expect_unique([own.name for own in card.labels], "labels")
-    for index, (own, kernel) in enumerate(zip(card.labels, card.kriging.labels, strict=True)):
-        path, count = f"labels[{index}]", len(own.names)
-        _expect(own.name not in controls, f"{path}.name", own.name, "none of the controls")
-        _expect_unique(own.names, f"{path}.names")
+    _expect_unique([label.name for label in card.labels], "labels")
+    for index, (label, kernel) in enumerate(zip(card.labels, card.kriging.labels, strict=True)):
+        path, count = f"labels[{index}]", len(label.names)
+        _expect(label.name not in controls, f"{path}.name", label.name, "none of the controls")
+        _expect_unique(label.names, f"{path}.names")
         _expect(count > 0, f"{path}.names", [], "names")
-        most = max(own.clips, default=0)
-        _expect(most < count, f"{path}.clips", most, f"indices below {count}")
-        found, where = kernel.count, f"kriging.labels[{index}]"
-        _expect(found == count, f"{where}.count", found, f"{count}, as many as {path}.names")
-        kept = kernel.correlation
-        _expect(kept <= 1.0, f"{where}.correlation", kept, "at most 1")
+        last = max(label.clips, default=0)
+        _expect(last < count, f"{path}.clips", last, f"indices below {count}")
+        names, where = kernel.count, f"kriging.labels[{index}]"
+        _expect(names == count, f"{where}.count", names, f"{count}, as many as {path}.names")
+        correlation = kernel.correlation
+        _expect(correlation <= 1.0, f"{where}.correlation", correlation, "at most 1")
 
 
 def _check_kriging(card: ModelCard) -> None:
-    own = card.kriging
+    kriging = card.kriging
     _expect(
-        own.covariance in COVARIANCE_MODELS,
+        kriging.covariance in COVARIANCE_MODELS,
         "kriging.covariance",
-        own.covariance,
+        kriging.covariance,
         f"of {[*COVARIANCE_MODELS]}",
     )
-    _expect(len(own.drifts) > 0, "kriging.drifts", [], "degrees")
-    right = own.scales.ndim == 1 and bool((own.scales > 0.0).all())
-    _expect(right, "kriging.scales", own.scales.tolist(), "numbers above 0")
+    _expect(len(kriging.drifts) > 0, "kriging.drifts", [], "degrees")
+    right = kriging.scales.ndim == 1 and bool((kriging.scales > 0.0).all())
+    _expect(right, "kriging.scales", kriging.scales.tolist(), "numbers above 0")
     for index, row in enumerate(card.beside):
         right = max(map(abs, row)) <= MAX_LENGTH
         _expect(right, f"beside[{index}]", list(row), f"at most {MAX_LENGTH:g}")
@@ -208,8 +209,8 @@ def _check_kriging(card: ModelCard) -> None:
 def _check_skeleton(card: ModelCard) -> None:
     joints = card.skeleton
     for name, offsets in (("offsets", joints.offsets), ("tip_offsets", joints.tip_offsets)):
-        most = float(abs(offsets).max(initial=0.0))
-        _expect(most <= MAX_LENGTH, f"skeleton.{name}", most, f"at most {MAX_LENGTH:g} m")
+        longest = float(abs(offsets).max(initial=0.0))
+        _expect(longest <= MAX_LENGTH, f"skeleton.{name}", longest, f"at most {MAX_LENGTH:g} m")
     _expect_joints(card.feet, "feet", card)
     _expect_joints((card.event.joint,) if card.event else (), "event.joint", card)
     for role, joint in card.roles.items():
@@ -233,10 +234,10 @@ def _check_levels(card: ModelCard) -> None:
 
 
 def _check_training_parameters(card: ModelCard) -> None:
-    for name, own in card.making.fields.items():
+    for name, values in card.making.fields.items():
         sets = len(card.labels)
         expected = f"a nugget, a trend and an offset for each of {sets} label sets"
-        _expect(len(own) == 2 + sets, f"making.fields.{name}", list(own), expected)
+        _expect(len(values) == 2 + sets, f"making.fields.{name}", list(values), expected)
     _check_take_statistics(card)
     for joint in card.making.joint_weights:
         _expect(joint in card.skeleton.names, "making.joint_weights", joint, "a joint")
@@ -268,13 +269,18 @@ def _check_presets(card: ModelCard) -> None:
         right = sorted(preset.controls) == sorted(names)
         _expect(right, f"{path}.controls", [*preset.controls], f"a value for each of {names}")
         for control in card.controls:
-            value, least, most = preset.controls[control.name], control.minimum, control.maximum
-            right = least <= value <= most
-            _expect(right, f"{path}.controls.{control.name}", value, f"{least} to {most}")
-        known = {own.name: own.names for own in card.labels}
+            value, low, high = preset.controls[control.name], control.minimum, control.maximum
+            right = low <= value <= high
+            _expect(right, f"{path}.controls.{control.name}", value, f"{low} to {high}")
+        label_names = {card_label.name: card_label.names for card_label in card.labels}
         for label_set, label in preset.labels.items():
-            _expect(label_set in known, f"{path}.labels", label_set, f"label sets {[*known]}")
-            right, expected = label in known[label_set], f"one of {[*known[label_set]]}"
+            _expect(
+                label_set in label_names,
+                f"{path}.labels",
+                label_set,
+                f"label sets {[*label_names]}",
+            )
+            right, expected = label in label_names[label_set], f"one of {[*label_names[label_set]]}"
             _expect(right, f"{path}.labels.{label_set}", label, expected)
 
 
@@ -282,25 +288,32 @@ def _check_curves(card: ModelCard) -> None:
     _expect_unique([curve.name for curve in card.curves], "curves")
     _expect(len(card.curves) <= MAX_CURVES, "curves", len(card.curves), f"at most {MAX_CURVES}")
     for index, curve in enumerate(card.curves):
-        ends = [curve.minimum, curve.maximum]
-        _expect(ends[0] < ends[1], f"curves[{index}]", ends, "a minimum below the maximum")
+        limits = [curve.minimum, curve.maximum]
+        _expect(limits[0] < limits[1], f"curves[{index}]", limits, "a minimum below the maximum")
 
 
 def _check_contacts(card: ModelCard) -> None:
-    _expect_joints(tuple(own.joint for own in card.contacts), "contacts", card)
-    for index, own in enumerate(card.contacts):
-        path, longest = f"contacts[{index}]", own.longest_swing
-        right = own.swing <= longest
-        _expect(right, f"{path}.longest_swing", longest, f"at least its swing, {own.swing} s")
-        for name, found in (("height", own.height), ("clearance", own.clearance)):
-            _expect(abs(found) <= MAX_LENGTH, f"{path}.{name}", found, f"at most {MAX_LENGTH:g} m")
+    _expect_joints(tuple(contact.joint for contact in card.contacts), "contacts", card)
+    for index, contact in enumerate(card.contacts):
+        path, longest = f"contacts[{index}]", contact.longest_swing
+        right = contact.swing <= longest
+        _expect(right, f"{path}.longest_swing", longest, f"at least its swing, {contact.swing} s")
+        for name, number in (("height", contact.height), ("clearance", contact.clearance)):
+            _expect(
+                abs(number) <= MAX_LENGTH, f"{path}.{name}", number, f"at most {MAX_LENGTH:g} m"
+            )
 
 
 def _check_accelerations(card: ModelCard) -> None:
-    own = card.captured_acceleration
-    if own is not None:
+    acceleration = card.captured_acceleration
+    if acceleration is not None:
         path = "captured_acceleration.p99"
-        _expect(own.p99 >= own.median, path, own.p99, f"at least the median, {own.median:g}")
+        _expect(
+            acceleration.p99 >= acceleration.median,
+            path,
+            acceleration.p99,
+            f"at least the median, {acceleration.median:g}",
+        )
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:

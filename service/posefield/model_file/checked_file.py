@@ -156,29 +156,29 @@ def decode_card(entries: Mapping[str, bytes]) -> ModelCard:
 
     Raises ValueError, which names the entry, the path, the value found and the value expected.
     """
-    own = {key: text for key, text in entries.items() if key.startswith(PREFIX)}
-    _check_format(own)
-    if (size := sum(map(len, own.values()))) > MAX_CARD_BYTES:
+    texts = {key: text for key, text in entries.items() if key.startswith(PREFIX)}
+    _check_format(texts)
+    if (size := sum(map(len, texts.values()))) > MAX_CARD_BYTES:
         raise ValueError(f"its card has {size} bytes, expected at most {MAX_CARD_BYTES}")
-    _decode_entry(own, "units", Units)
+    _decode_entry(texts, "units", Units)
     card = ModelCard(
-        **{f.name: _decode_entry(own, f.name, _TYPES[f.name]) for f in fields(ModelCard)}
+        **{f.name: _decode_entry(texts, f.name, _TYPES[f.name]) for f in fields(ModelCard)}
     )
     card_check.check(card)
     return card
 
 
-def _check_format(own: Mapping[str, bytes]) -> None:
-    found = own.get(f"{PREFIX}format")
-    if found is None:
+def _check_format(texts: Mapping[str, bytes]) -> None:
+    version = texts.get(f"{PREFIX}format")
+    if version is None:
         raise ValueError("no posefield metadata: it was not written by posefield")
-    if found != str(FORMAT).encode():
-        shown = found[:40].decode(errors="replace")
-        raise ValueError(f"model format {shown}, this version reads format {FORMAT}")
+    if version != str(FORMAT).encode():
+        quoted = version[:40].decode(errors="replace")
+        raise ValueError(f"model format {quoted}, this version reads format {FORMAT}")
 
 
-def _decode_entry(own: Mapping[str, bytes], name: str, kind: Any) -> Any:
-    text = own.get(PREFIX + name, OPTIONAL.get(name))
+def _decode_entry(texts: Mapping[str, bytes], name: str, kind: Any) -> Any:
+    text = texts.get(PREFIX + name, OPTIONAL.get(name))
     if text is None:
         raise ValueError(f"its card has no entry {name!r}")
     try:
@@ -187,10 +187,10 @@ def _decode_entry(own: Mapping[str, bytes], name: str, kind: Any) -> Any:
         raise ValueError(f"its card's entry {name!r} is wrong: {fault}") from fault
 
 
-def _decode_array(kind: Any, found: Any) -> Floats:
+def _decode_array(kind: Any, value: Any) -> Floats:
     """Return an array of numbers (n,), or of triples (n, 3)."""
-    rows = isinstance(found, list) and all(isinstance(row, list) for row in found)
-    numbers = msgspec.convert(found, list[Triple] if rows else list[Number])
+    rows = isinstance(value, list) and all(isinstance(row, list) for row in value)
+    numbers = msgspec.convert(value, list[Triple] if rows else list[Number])
     return np.array(numbers, dtype=np.float64).reshape((-1, 3) if rows else -1)
 
 

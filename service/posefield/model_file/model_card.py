@@ -272,27 +272,27 @@ class ModelCard:
     @property
     def clip_labels(self) -> Floats:
         """Return the weights (N, p) of the captured clips' labels: one for a clip's own names."""
-        own = [np.eye(len(one.names))[list(one.clips)] for one in self.labels]
-        return np.hstack([np.zeros((len(self.examples), 0)), *own])
+        indicators = [np.eye(len(one.names))[list(one.clips)] for one in self.labels]
+        return np.hstack([np.zeros((len(self.examples), 0)), *indicators])
 
     @property
     def label_counts(self) -> tuple[int, ...]:
         """Return the number of names of each label set."""
-        return tuple(len(own.names) for own in self.labels)
+        return tuple(len(label.names) for label in self.labels)
 
     @property
     def performers(self) -> tuple[str, ...]:
         """Return the names of performers; empty where the model does not distinguish them."""
-        return next((own.names for own in self.labels if own.name == PERFORMER), ())
+        return next((label.names for label in self.labels if label.name == PERFORMER), ())
 
     @property
     def moved_by(self) -> tuple[int, ...]:
         """Return the index of each clip's performer; empty where `performers` is."""
-        return next((own.clips for own in self.labels if own.name == PERFORMER), ())
+        return next((label.clips for label in self.labels if label.name == PERFORMER), ())
 
     def clip_names(self, clip: int) -> dict[str, str]:
         """Return the name of a captured clip in each label set."""
-        return {own.name: own.names[own.clips[clip]] for own in self.labels}
+        return {label.name: label.names[label.clips[clip]] for label in self.labels}
 
     @property
     def sampled_ranges(self) -> tuple[Floats, Floats]:
@@ -314,8 +314,8 @@ def dump(card: ModelCard) -> dict[str, str]:
     """Return the metadata entries of a card: keys in a fixed order, values JSON text."""
     making: dict[str, Any] = msgspec.to_builtins(card.making)
     defaults = msgspec.to_builtins(TrainingParameters())
-    told = {key: value for key, value in making.items() if value != defaults[key]}
-    plain = {**_plain_fields(card), "format": FORMAT, "making": told}
+    changed = {key: value for key, value in making.items() if value != defaults[key]}
+    plain = {**_plain_fields(card), "format": FORMAT, "making": changed}
     for name in OPTIONAL_ENTRIES:
         if not getattr(card, name):
             plain.pop(name, None)
@@ -341,10 +341,10 @@ def _plain_fields(card: ModelCard) -> dict[str, Any]:
         if not getattr(card, name):
             plain.pop(name, None)
     # msgspec leaves out defaults of objects that it decoded.
-    for control, own in zip(plain["controls"], card.controls, strict=True):
+    for control, control_card in zip(plain["controls"], card.controls, strict=True):
         control.pop("measure", None)
-        if own.measure:
-            control["measure"] = measures.to_dict(own.measure)
+        if control_card.measure:
+            control["measure"] = measures.to_dict(control_card.measure)
     for preset, point in zip(plain["presets"], card.presets, strict=True):
         preset["labels"] = dict(point.labels)
     joints = plain["skeleton"]

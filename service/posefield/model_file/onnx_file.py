@@ -149,8 +149,8 @@ def check(content: bytes) -> CheckedGraph:
     """Return the parts of a file; ValueError names the first field or operator not on the lists."""
     _check_fields(content, MODEL, "")
     used = {field.content.decode() for field in fields_at(content, 7, 1, 4)}
-    if others := used - OPERATORS:
-        operator = min(others)[:40]
+    if unknown := used - OPERATORS:
+        operator = min(unknown)[:40]
         raise ValueError(f"its graph has an operator {operator!r}, which posefield does not use")
     constants = initializers(content)
     for name, array in constants.items():
@@ -166,20 +166,22 @@ def _metadata(content: bytes) -> dict[str, bytes]:
         {field.number: field.content for field in wire_fields(entry.content)}
         for entry in fields_at(content, 14)
     ]
-    found = {entry.get(1, b"").decode(): entry.get(2, b"") for entry in entries}
-    if len(found) < len(entries):
+    metadata = {entry.get(1, b"").decode(): entry.get(2, b"") for entry in entries}
+    if len(metadata) < len(entries):
         raise ValueError("two of its metadata entries have one key")
-    return found
+    return metadata
 
 
 def _check_fields(message: bytes, allowed: AllowedFields, path: str) -> None:
     for field in wire_fields(message):
-        own = f"{path}{field.number}"
+        field_path = f"{path}{field.number}"
         inner = allowed.get(field.number)
         if inner is None:
-            raise ValueError(f"it has a field {own} of onnx.proto, which posefield does not write")
+            raise ValueError(
+                f"it has a field {field_path} of onnx.proto, which posefield does not write"
+            )
         if inner:
-            _check_fields(field.content, inner, f"{own}.")
+            _check_fields(field.content, inner, f"{field_path}.")
 
 
 Array = npt.NDArray[Any]
@@ -230,14 +232,17 @@ def _replace_graph(model: bytes, change: Callable[[bytes], bytes]) -> bytes:
 def _read_tensor(content: bytes) -> tuple[str, Array]:
     """Return the name and the values of a constant."""
     fields = list(wire_fields(content))
-    held = {field.number: field for field in fields}
+    field_of = {field.number: field for field in fields}
     axes = [field.value for field in fields if field.number == TENSOR_AXES]
-    if not {TENSOR_TYPE, TENSOR_NAME} <= held.keys() or held[TENSOR_TYPE].value not in DTYPES:
+    if (
+        not {TENSOR_TYPE, TENSOR_NAME} <= field_of.keys()
+        or field_of[TENSOR_TYPE].value not in DTYPES
+    ):
         raise ValueError("it has a constant without name, or neither of float32 nor int64")
     # An empty array has no bytes in the file.
-    numbers = held[TENSOR_BYTES].content if TENSOR_BYTES in held else b""
-    array = np.frombuffer(numbers, DTYPES[held[TENSOR_TYPE].value])
-    return held[TENSOR_NAME].content.decode(), array.reshape(axes)
+    numbers = field_of[TENSOR_BYTES].content if TENSOR_BYTES in field_of else b""
+    array = np.frombuffer(numbers, DTYPES[field_of[TENSOR_TYPE].value])
+    return field_of[TENSOR_NAME].content.decode(), array.reshape(axes)
 
 
 def _prune_graph(graph: bytes, outputs: set[bytes]) -> bytes:
@@ -247,12 +252,12 @@ def _prune_graph(graph: bytes, outputs: set[bytes]) -> bytes:
     for field in reversed(fields):
         if field.number == NODE and needed & _field_names(field.content, NODE_OUTPUT):
             needed |= _field_names(field.content, NODE_INPUT)
-    kept = b"".join(field.encoded for field in fields if _is_needed(field, needed))
+    content = b"".join(field.encoded for field in fields if _is_needed(field, needed))
     there = {
         name for f in fields if f.number == OUTPUT for name in _field_names(f.content, VALUE_NAME)
     }
     added = (encode_bytes(OUTPUT, _float_output(name)) for name in sorted(outputs - there))
-    return kept + b"".join(added)
+    return content + b"".join(added)
 
 
 def _is_needed(field: Field, names: set[bytes]) -> bool:
@@ -279,10 +284,10 @@ def _freeze_level(graph: bytes, level: int) -> bytes:
             encode_bytes(TENSOR_BYTES, level.to_bytes(8, "little")),
         )
     )
-    kept = (field.encoded for field in wire_fields(graph) if not _is_level(field))
-    return b"".join(kept) + encode_bytes(INITIALIZER, fixed)
+    content = (field.encoded for field in wire_fields(graph) if not _is_level(field))
+    return b"".join(content) + encode_bytes(INITIALIZER, fixed)
 
 
 def _is_level(field: Field) -> bool:
-    named = field.number in (INITIALIZER, INPUT)
-    return named and b"level" in _field_names(field.content, NAME_FIELDS[field.number])
+    is_named = field.number in (INITIALIZER, INPUT)
+    return is_named and b"level" in _field_names(field.content, NAME_FIELDS[field.number])
