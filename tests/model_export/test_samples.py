@@ -64,7 +64,7 @@ def test_files_without_which_no_drift_is_left_are_not_left_out_whole(files):
     laid, _ = sample_points.make_samples(recipe(drift=1), examples(files=files))
     assert laid.groups.tolist() == list(range(6))
     said = sample_points.data_notes(recipe(drift=1), examples(files=files))
-    assert len(said) == 1 and said[0].startswith("clips of one take are not left out together")
+    assert len(said) == 1 and said[0].startswith("clips of one recording are not left out together")
     # A constant needs no more than one clip of another file.
     constant, _ = sample_points.make_samples(recipe(drift=0), examples(files=files))
     assert len(np.unique(constant.groups)) == (6 if files == "aaaaaa" else 2)

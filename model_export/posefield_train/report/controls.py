@@ -1,4 +1,4 @@
-"""Coverage of the controls, limits of the predictions, and accuracy of sigma."""
+"""Coverage of the controls and their explained share, limits of answers, and accuracy of sigma."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -19,15 +19,17 @@ from posefield.synthesis import trust
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging.kriging_bank import POSE
+from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.report import page
-from posefield_train.report.page import Chapter, Section, Table, draw_chart, short_label
+from posefield_train.report.page import Section, Table, draw_chart, percent, short_label
 
 BINS = 16
 # Joints named, and captures suggested.
 LISTED_JOINTS, POINTS = 8, 8
 
 
-def coverage_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Chapter:
+def coverage_section(trained: TrainedModel, controls: tuple[Control, ...]) -> Section:
     """Return a table of the controls, warnings, and a scatter plot of each pair."""
     values = np.stack([example.controls for example in trained.examples])
     performers = [example.row.performer for example in trained.examples]
@@ -62,20 +64,18 @@ def coverage_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Ch
             for name in labels
         ),
     )
-    rows = tuple(
-        (
-            control.name,
-            control.unit,
-            f"{control.minimum:.4g}",
-            f"{control.maximum:.4g}",
-            str(row["distinct"]),
-            "{:.4g} to {:.4g}".format(*row["widest_gap"]),
-            control.description,
-        )
-        for control, row in zip(controls, ranges, strict=True)
+    described = zip(ranges, controls, strict=True)
+    table = Table.of(
+        "Captured range of each control",
+        [{**row, "description": control.description} for row, control in described],
+        ("control", "name", str),
+        ("unit", "unit", str),
+        ("minimum", "minimum", "{:.4g}".format),
+        ("maximum", "maximum", "{:.4g}".format),
+        ("distinct values", "distinct", str),
+        ("widest gap", "widest_gap", lambda gap: "{:.4g} to {:.4g}".format(*gap)),
+        ("description", "description", str),
     )
-    titles = ("minimum", "maximum", "distinct values", "widest gap", "description")
-    table = Table("Captured range of each control", ("control", "unit", *titles), rows)
     names = ", ".join(control.name for control in controls)
     errors = np.sqrt(trained.left_out_errors)
     chart = draw_chart(
@@ -90,9 +90,7 @@ def coverage_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Ch
         "one_value_a_performer": list(labels),
         "correlation": correlation,
     }
-    return Chapter(
-        facts, Section("coverage", "Coverage of the controls", paragraphs, (table,), (chart,))
-    )
+    return Section("coverage", "Coverage of the controls", paragraphs, (table,), (chart,), facts)
 
 
 def label_controls(
@@ -102,12 +100,12 @@ def label_controls(
 
     values: (N, d). performers: names (N,), empty if the recipe has none.
     """
-    whose = np.unique(performers, return_inverse=True)[1]
+    indices = np.unique(performers, return_inverse=True)[1]
     several = 1 < len(set(performers)) < len(performers)
     return tuple(
         control.name
         for control, column in zip(controls, values.T, strict=True)
-        if several and all(np.ptp(column[whose == one]) == 0.0 for one in set(whose))
+        if several and all(np.ptp(column[indices == index]) == 0.0 for index in set(indices))
     )
 
 
@@ -143,17 +141,17 @@ def _paint_pairs(
         figure.colorbar(points, ax=axes, label="leave-one-out error (cm)", shrink=0.6, aspect=30)
 
 
-def trust_chapter(exported: ExportedModel) -> Chapter:
+def trust_section(exported: ExportedModel) -> Section:
     """Return the limits of an exported model: measured controls, support, joints, captures."""
     card = exported.card
     opened = session.open_bytes(exported.content, card.name)
     question = SuggestQuestion(count=POINTS)
     suggested = trust.suggest(Synthesizer(card.name, opened), question)
     limit = support.fit_support(np.array(card.examples)).limit
-    return limits_chapter(card, limit, suggested.suggestions)
+    return limits_section(card, limit, suggested.suggestions)
 
 
-def limits_chapter(card: ModelCard, limit: float, points: Sequence[Suggestion]) -> Chapter:
+def limits_section(card: ModelCard, limit: float, points: Sequence[Suggestion]) -> Section:
     """Return the limits of a model's predictions.
 
     limit: largest variance of supported controls. points: suggested captures, the one that reduces
@@ -165,8 +163,8 @@ def limits_chapter(card: ModelCard, limit: float, points: Sequence[Suggestion]) 
         for control in card.controls
         if control.measure
     }
-    both = zip(names, card.joint_sigma, strict=True)
-    joints = dict(sorted(both, key=lambda pair: -pair[1]))
+    sigmas = zip(names, card.joint_sigma, strict=True)
+    joints = dict(sorted(sigmas, key=lambda pair: -pair[1]))
     listed = ", ".join(f"{name} ({how})" for name, how in measured.items())
     paragraphs = (
         f"Answers match these measured controls exactly: {listed}."
@@ -181,33 +179,31 @@ def limits_chapter(card: ModelCard, limit: float, points: Sequence[Suggestion]) 
         "within that limit.",
         "Each suggested capture assumes that those above it were captured.",
     )
-    controls = tuple(control.name for control in card.controls)
-    suggested = tuple(
-        (
-            str(place),
-            *(f"{point.controls[name]:.4g}" for name in controls),
-            f"{100 * point.gain:.1f} %",
-        )
-        for place, point in enumerate(points, start=1)
-    )
+    suggestions: list[dict[str, Any]] = [
+        {"controls": dict(point.controls), "gain": point.gain, "lacking": point.lacking}
+        for point in points
+    ]
     shares = tuple((name, f"{share:.2f}") for name, share in list(joints.items())[:LISTED_JOINTS])
     tables = (
-        Table("Suggested captures", ("order", *controls, "mean variance falls by"), suggested),
+        Table.of(
+            "Suggested captures",
+            [{"order": order, **row} for order, row in enumerate(suggestions, start=1)],
+            ("order", "order", str),
+            *((c.name, f"controls/{c.name}", "{:.4g}".format) for c in card.controls),
+            ("mean variance falls by", "gain", lambda gain: f"{100 * gain:.1f} %"),
+        ),
         Table("Joints with the largest error", ("joint", "sigma relative to pose"), shares),
     )
     facts = {
         "measured": measured,
         "support_limit": limit,
         "joint_sigma": joints,
-        "suggestions": [
-            {"controls": dict(one.controls), "gain": one.gain, "lacking": one.lacking}
-            for one in points
-        ],
+        "suggestions": suggestions,
     }
-    return Chapter(facts, Section("trust", "Limits of the answers", paragraphs, tables))
+    return Section("trust", "Limits of the answers", paragraphs, tables, (), facts)
 
 
-def calibration_chapter(trained: TrainedModel) -> Chapter:
+def calibration_section(trained: TrainedModel) -> Section:
     """Return statistics and charts of sigma against the error of left-out clips."""
     predicted = np.sqrt(trained.model.bank.sill * trained.pose.variances)
     actual = np.sqrt(trained.warped_errors)
@@ -222,8 +218,8 @@ def calibration_chapter(trained: TrainedModel) -> Chapter:
     rows = (
         ("mean of error² / sigma²", f"{statistics['mean_squared_ratio']:.3f}"),
         ("median of error / sigma", f"{statistics['median_ratio']:.2f}"),
-        ("clips with an error up to sigma", f"{100 * statistics['within_one_sigma']:.0f} %"),
-        ("clips with an error up to 2 sigma", f"{100 * statistics['within_two_sigma']:.0f} %"),
+        ("clips with an error up to sigma", percent(statistics["within_one_sigma"])),
+        ("clips with an error up to 2 sigma", percent(statistics["within_two_sigma"])),
         ("rank correlation of error and sigma", f"{statistics['rank_correlation']:+.2f}"),
     )
     chart = draw_chart(
@@ -234,10 +230,8 @@ def calibration_chapter(trained: TrainedModel) -> Chapter:
         "Left: one point per left-out clip. Right: distribution of error / sigma.",
     )
     table = Table("Errors of left-out clips", ("measure", "value"), rows)
-    return Chapter(
-        {**statistics, "predicted_m": predicted, "actual_m": actual},
-        Section("calibration", "Accuracy of sigma", paragraphs, (table,), (chart,)),
-    )
+    facts = {**statistics, "predicted_m": predicted, "actual_m": actual}
+    return Section("calibration", "Accuracy of sigma", paragraphs, (table,), (chart,), facts)
 
 
 def calibration_statistics(predicted: Floats, actual: Floats) -> dict[str, float]:
@@ -271,3 +265,67 @@ def _paint_calibration(predicted: Floats, actual: Floats, figure: Figure) -> Non
     right.set(xlabel="error / sigma", ylabel="clips", title="error / sigma")
     right.grid(visible=False, axis="x")
     right.yaxis.get_major_locator().set_params(integer=True)
+
+
+_MEANING = {
+    "pose": "joint rotations and root path",
+    "offsets": "bone lengths",
+    "duration": "length of the clip",
+    "warp": "timing within the clip",
+    "travel": "distance and turn of a cycle",
+}
+
+
+def quantity_section(trained: TrainedModel, controls: tuple[Control, ...]) -> Section:
+    """Return the explained share and the parameters of each kriged quantity, the pose first."""
+    names, label_sets = [control.name for control in controls], tuple(trained.model.bank.labels)
+    bank = {POSE: trained.model.bank.pose, **trained.model.bank.other_models}
+    facts: dict[str, Any] = {}
+    rows = []
+    for name, share in trained.explained.items():
+        model = bank[name]
+        meaning, explained = _MEANING.get(name, ""), percent(share)
+        if not isinstance(model, UniversalKriging):
+            facts[name] = {"explained": share, "answered_with": "mean"}
+            blank = [""] * (1 + 2 * len(label_sets) + len(names))
+            rows.append((name, meaning, explained, "mean", "", *blank))
+            continue
+        hyper, parameters = model.hyper, _parameters(model.hyper, label_sets)
+        facts[name] = {
+            "explained": share,
+            "answered_with": "kriging",
+            "nugget": hyper.nugget,
+            "scales": dict(zip(names, hyper.scales.tolist(), strict=True)),
+            **parameters,
+            "drifts": list(hyper.drifts),
+        }
+        numbers = (hyper.nugget, *parameters.values(), *hyper.scales)
+        rows.append((name, meaning, explained, "kriging", *(f"{value:.3g}" for value in numbers)))
+    paragraphs = (
+        "Explained is the share of the variation between clips that kriging predicts from the "
+        "controls, with each clip left out in turn. All quantities but "
+        "the pose are shrunk to the mean of the clips, as far as these predictions advise.",
+        "The scale of a control is its weight in the distance between clips, per half-range. "
+        "All quantities share the scales. The nugget is the share of the variance that remains "
+        "between clips with equal controls, and the trend the variance of the slope along a "
+        "control. In each label set, such as performers, the correlation is that of the "
+        "motions of two names with equal controls, and the offset the variance of a name's "
+        "own offset.",
+    )
+    pose = next(model.hyper for model in bank.values() if isinstance(model, UniversalKriging))
+    titles = (
+        *("quantity", "meaning", "explained", "predicted by", "nugget"),
+        *_parameters(pose, label_sets),
+        *(f"scale of {name}" for name in names),
+    )
+    table = Table("UniversalKriging models", titles, tuple(rows))
+    return Section("fields", "What the controls explain", paragraphs, (table,), (), facts)
+
+
+def _parameters(hyper: Hyper, label_sets: tuple[str, ...]) -> dict[str, float]:
+    """Return the parameters of a quantity beside its scales and nugget, by name."""
+    parameters = {"trend": hyper.trend}
+    for name, label in zip(label_sets, hyper.labels, strict=True):
+        parameters[f"correlation of {name}s"] = label.correlation
+        parameters[f"offset of {name}s"] = label.offset
+    return parameters

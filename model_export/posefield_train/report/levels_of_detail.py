@@ -15,7 +15,7 @@ from posefield.inference import level_selection, session
 from posefield.inference.level_selection import Camera
 from posefield.model_file.model_card import Level
 from posefield_train.graph.onnx_export import ExportedModel
-from posefield_train.report.page import Chapter, Section, Table
+from posefield_train.report.page import Section, Table, centimetres, product
 
 # Common resolution and field of view of games: 1080 lines, 60 degrees vertically.
 CAMERA = Camera(np.zeros(3), math.radians(60.0), 1080.0)
@@ -49,7 +49,7 @@ class LevelCosts:
         distances = [CAMERA.pixels * level.pose for level in self.levels]
         return tuple(np.maximum.accumulate(distances).tolist())
 
-    def chapter(self) -> Chapter:
+    def section(self) -> Section:
         """Return the use, size, time and error of each level."""
         chosen = list(map(_facts, self.levels, self.seconds))
         for level, distance in zip(chosen, self.distances, strict=True):
@@ -60,22 +60,34 @@ class LevelCosts:
             "field_of_view_rad": CAMERA.fov,
             "levels": chosen,
         }
-        sizes = ("ranks", "clips used", "joints that move", "numbers", "kB")
-        errors = ("RMS", "99th percentile", "RMS of the worst pose", "largest")
+        rows = [{"level": number, **level} for number, level in enumerate(chosen)]
         tables = (
-            Table(
+            Table.of(
                 "Size and time of each level",
-                ("level", *sizes, "multiply-adds per pose", "µs per pose"),
-                tuple(_sizes(number, level) for number, level in enumerate(chosen)),
+                rows,
+                ("level", "level", str),
+                ("ranks", "ranks", product),
+                ("clips used", "clips_asked", str),
+                ("joints that move", "joints_that_move", str),
+                ("numbers", "numbers", "{:,}".format),
+                ("kB", "bytes", lambda count: f"{count / 1000:.1f}"),
+                ("multiply-adds per pose", "operations", "{:,}".format),
+                ("µs per pose", "seconds_per_pose", lambda seconds: f"{1e6 * seconds:.2f}"),
             ),
-            Table(
+            Table.of(
                 "Error of each level (cm)",
-                ("level", *errors, "effector at its event", "below a pixel from (m)"),
-                tuple(_errors(number, level) for number, level in enumerate(chosen)),
+                rows,
+                ("level", "level", str),
+                ("RMS", "rms_m", _three_digits),
+                ("99th percentile", "p99_m", _three_digits),
+                ("RMS of the worst pose", "pose_m", _three_digits),
+                ("largest", "max_m", _three_digits),
+                ("effector at its event", "effector_m", _effector),
+                ("below a pixel from (m)", "one_pixel_from_m", "{:.0f}".format),
             ),
         )
         paragraphs = (_EXPLANATION, *self._uses())
-        return Chapter(facts, Section("levels", "Levels of detail", paragraphs, tables))
+        return Section("levels", "Levels of detail", paragraphs, tables, (), facts)
 
     def _uses(self) -> tuple[str, ...]:
         """Return one sentence per level on its use."""
@@ -95,23 +107,12 @@ class LevelCosts:
         )
 
 
-def _sizes(number: int, level: dict[str, Any]) -> tuple[str, ...]:
-    return (
-        str(number),
-        " × ".join(map(str, level["ranks"])),
-        str(level["clips_asked"]),
-        str(level["joints_that_move"]),
-        f"{level['numbers']:,}",
-        f"{level['bytes'] / 1000:.1f}",
-        f"{level['operations']:,}",
-        f"{1e6 * level['seconds_per_pose']:.2f}",
-    )
+def _three_digits(metres: float) -> str:
+    return f"{100 * metres:.3g}"
 
 
-def _errors(number: int, level: dict[str, Any]) -> tuple[str, ...]:
-    lengths = (f"{100 * level[f'{name}_m']:.3g}" for name in ("rms", "p99", "pose", "max"))
-    effector = "" if level["effector_m"] is None else f"{100 * level['effector_m']:.2f}"
-    return (str(number), *lengths, effector, f"{level['one_pixel_from_m']:.0f}")
+def _effector(metres: float | None) -> str:
+    return "" if metres is None else centimetres(metres)
 
 
 def _facts(level: Level, seconds: float) -> dict[str, Any]:

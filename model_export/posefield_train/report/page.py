@@ -6,8 +6,10 @@ Equal data give equal bytes.
 import base64
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -94,6 +96,25 @@ def plain_logarithm(axis: Axis) -> None:
 _NUMBER = re.compile(r"[-+]?[\d.,]+( ?%| cm)?")
 
 
+Column = tuple[str, str, Callable[[Any], str]]
+"""Title, path of the figure in its row, such as "controls/speed", and function to its text."""
+
+
+def centimetres(metres: float) -> str:
+    """Return a length as centimetres."""
+    return f"{100 * metres:.2f}"
+
+
+def percent(share: float) -> str:
+    """Return a share as whole percent."""
+    return f"{100 * share:.0f} %"
+
+
+def product(sizes: Iterable[int]) -> str:
+    """Return sizes such as 12 × 20 × 15."""
+    return " × ".join(map(str, sizes))
+
+
 @dataclass(frozen=True)
 class Table:
     """Table of text cells: caption, column titles, and rows of as many cells."""
@@ -101,6 +122,15 @@ class Table:
     caption: str
     heading: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, caption: str, figures: Iterable[Mapping[str, Any]], *columns: Column) -> "Table":
+        """Return the table of figures that are in the JSON too, a row each."""
+        rows = tuple(
+            tuple(text(reduce(getitem, path.split("/"), row)) for _, path, text in columns)
+            for row in figures
+        )
+        return cls(caption, tuple(title for title, *_ in columns), rows)
 
     @property
     def numeric(self) -> tuple[bool, ...]:
@@ -113,21 +143,18 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """Section of a page. name: its anchor, of letters and hyphens, unique in the page."""
+    """Section of a page, and its figures.
+
+    name: its anchor, of letters and hyphens, unique in the page. facts: JSON values, in metres,
+    seconds and shares.
+    """
 
     name: str
     title: str
     paragraphs: tuple[str, ...]
     tables: tuple[Table, ...] = ()
     charts: tuple[Chart, ...] = ()
-
-
-@dataclass(frozen=True)
-class Chapter:
-    """Part of a report. facts: JSON values, in metres, seconds and shares. section: of the page."""
-
-    facts: Any
-    section: Section
+    facts: Any = None
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,13 @@ from posefield_train.graph import truncation_cost
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report import clip_errors, page
 from posefield_train.report.page import (
-    Chapter,
     Section,
     Table,
+    centimetres,
     draw_chart,
+    percent,
     plain_logarithm,
+    product,
     short_label,
 )
 from posefield_train.tensor import hosvd
@@ -83,49 +85,42 @@ def measure_truncation(trained: TrainedModel) -> Truncation:
     return Truncation(trained.tensor.rms(hosvd.squared_errors(core)), stored, (r1, r2, r3))
 
 
-def truncation_chapter(trained: TrainedModel) -> Chapter:
+def truncation_section(trained: TrainedModel) -> Section:
     """Return the Pareto front of error and size, and the errors around the chosen size."""
-    every = measure_truncation(trained)
-    chosen = every.facts(every.chosen)
-    smallest = [{"budget_m": b, **every.facts(every.smallest(b))} for b in BUDGETS]
+    truncation = measure_truncation(trained)
+    chosen = truncation.facts(truncation.chosen)
+    smallest = [{"budget_m": b, **truncation.facts(truncation.smallest(b))} for b in BUDGETS]
     error, numbers = 100 * chosen["rms_m"], chosen["numbers_stored"]
     paragraphs = (
-        f"The chosen ranks {_times(every.chosen)} cause an error of {error:.2f} cm (RMS over "
+        f"The chosen ranks {product(truncation.chosen)} cause an error of {error:.2f} cm (RMS over "
         f"joints, frames and clips in the training metric). The model stores {numbers:,} "
-        f"numbers in place of {every.errors.size:,}: a compression of "
+        f"numbers in place of {truncation.errors.size:,}: a compression of "
         f"{chosen['compression_all_in']:.1f} with "
         f"bases and kriging weights, and of {chosen['compression_core_only']:.1f} for the core "
         "alone.",
     )
-    named = [("chosen", chosen), *((f"{100 * one['budget_m']:g} cm", one) for one in smallest)]
-    rows = tuple(
-        (
-            name,
-            _times(one["ranks"]),
-            f"{100 * one['rms_m']:.2f}",
-            f"{one['numbers_stored']:,}",
-            _ratio(one["compression_all_in"]),
-            _ratio(one["compression_core_only"]),
-        )
-        for name, one in named
+    limited = [{"limit": f"{100 * row['budget_m']:g} cm", **row} for row in smallest]
+    table = Table.of(
+        "Smallest size for an error limit",
+        [{"limit": "chosen", **chosen}, *limited],
+        ("error limit", "limit", str),
+        ("ranks", "ranks", product),
+        ("error (cm)", "rms_m", centimetres),
+        ("numbers stored", "numbers_stored", "{:,}".format),
+        ("compression", "compression_all_in", _ratio),
+        ("of the core alone", "compression_core_only", _ratio),
     )
-    titles = ("ranks", "error (cm)", "numbers stored", "compression", "of the core alone")
-    table = Table("Smallest size for an error limit", ("error limit", *titles), rows)
-    missed = 100 * float(np.sqrt(trained.left_out_errors.mean()))
+    left_out_error = 100 * float(np.sqrt(trained.left_out_errors.mean()))
     chart = draw_chart(
         3.7,
-        partial(_paint_sizes, every, (numbers, error), missed),
+        partial(_paint_sizes, truncation, (numbers, error), left_out_error),
         f"Truncation error against numbers stored, and against ranks; chosen: {error:.2f} cm "
         f"at {numbers} numbers.",
         "Left: the smallest error for each size, over all combinations of ranks. Right: error "
         "against two of the ranks, the third as chosen. The orange dot is the chosen size.",
     )
-    facts = {"tensor_numbers": every.errors.size, "chosen": chosen, "smallest": smallest}
-    return Chapter(facts, Section("sizes", "Error against size", paragraphs, (table,), (chart,)))
-
-
-def _times(ranks: Any) -> str:
-    return " × ".join(map(str, ranks))
+    facts = {"tensor_numbers": truncation.errors.size, "chosen": chosen, "smallest": smallest}
+    return Section("sizes", "Error against size", paragraphs, (table,), (chart,), facts)
 
 
 def _ratio(value: float) -> str:
@@ -133,27 +128,27 @@ def _ratio(value: float) -> str:
 
 
 def _paint_sizes(
-    every: Truncation, chosen: tuple[int, float], missed: float, figure: Figure
+    truncation: Truncation, chosen: tuple[int, float], left_out_error: float, figure: Figure
 ) -> None:
-    """Draw the front with the chosen size, and the error over two ranks. missed: error, cm."""
+    """Draw the front with the chosen size, and the error over two ranks. Errors are in cm."""
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    errors, marks = every.front()
+    errors, marks = truncation.front()
     left.loglog(marks, 100 * errors, color=page.BLUE, label="smallest error at this size")
     left.plot(*chosen, "o", color=page.ORANGE, label="chosen", zorder=3)
-    label = f"error of a left-out clip: {missed:.1f} cm"
-    left.axhline(missed, color=page.FAINT, linestyle="--", label=label)
+    label = f"error of a left-out clip: {left_out_error:.1f} cm"
+    left.axhline(left_out_error, color=page.FAINT, linestyle="--", label=label)
     left.set(xlabel="numbers stored", ylabel="error (cm)", title="size")
     plain_logarithm(left.xaxis)
     plain_logarithm(left.yaxis)
     left.legend(loc="lower left")
-    r1, r2, r3 = every.chosen
-    shown = 100 * every.errors[:, r2 - 1, :].T
-    extent = (0.5, shown.shape[1] + 0.5, 0.5, shown.shape[0] + 0.5)
-    image = right.imshow(shown, origin="lower", aspect="auto", extent=extent, cmap="Blues")
-    at = np.arange(1, shown.shape[1] + 1), np.arange(1, shown.shape[0] + 1)
-    levels = [level for level in (0.5, 1, 2, 5, 10) if shown.min() < level < shown.max()]
+    r1, r2, r3 = truncation.chosen
+    errors = 100 * truncation.errors[:, r2 - 1, :].T
+    extent = (0.5, errors.shape[1] + 0.5, 0.5, errors.shape[0] + 0.5)
+    image = right.imshow(errors, origin="lower", aspect="auto", extent=extent, cmap="Blues")
+    ranks = np.arange(1, errors.shape[1] + 1), np.arange(1, errors.shape[0] + 1)
+    levels = [level for level in (0.5, 1, 2, 5, 10) if errors.min() < level < errors.max()]
     if levels:
-        lines = right.contour(*at, shown, levels, colors=page.INK, linewidths=0.7)
+        lines = right.contour(*ranks, errors, levels, colors=page.INK, linewidths=0.7)
         right.clabel(lines, fmt="%g cm", fontsize=8)
     right.plot(r1, r3, "o", color=page.ORANGE, clip_on=False)
     right.grid(visible=False)
@@ -190,7 +185,7 @@ class TimeWarps:
         return self.stretches > NEAR_LIMIT / MINIMUM_INCREMENT
 
 
-def warp_chapter(trained: TrainedModel) -> Chapter:
+def warp_section(trained: TrainedModel) -> Section:
     """Return a chart of the time maps, and the clips with the largest change of speed."""
     warps = TimeWarps(trained.model.timing.basis.evaluate(trained.aligned.logs, FIT_TIMES))
     order = np.argsort(-warps.stretches, kind="stable")
@@ -212,17 +207,14 @@ def warp_chapter(trained: TrainedModel) -> Chapter:
         "phase of the motion. The largest change of speed by this map is a factor of "
         f"{worst[0]['largest_stretch']:.2f}, in {worst[0]['clip']}."
     )
-    rows = tuple(
-        (
-            one["clip"],
-            f"{one['duration_s']:.2f}",
-            f"{one['largest_stretch']:.2f}",
-            f"{100 * one['at_share']:.0f} %",
-        )
-        for one in worst
+    table = Table.of(
+        "Clips with the largest change of speed",
+        worst,
+        ("clip", "clip", str),
+        ("duration (s)", "duration_s", "{:.2f}".format),
+        ("factor", "largest_stretch", "{:.2f}".format),
+        ("at", "at_share", percent),
     )
-    heading = ("clip", "duration (s)", "factor", "at")
-    table = Table("Clips with the largest change of speed", heading, rows)
     chart = draw_chart(
         3.5,
         partial(_paint_maps, warps.maps[order], clips),
@@ -233,34 +225,34 @@ def warp_chapter(trained: TrainedModel) -> Chapter:
         "in the table.",
     )
     paragraphs = (summary, _limit_text(warps), *_shift_text(trained))
-    section = Section("warps", "Alignment in time", paragraphs, (table,), (chart,))
-    return Chapter({"clips": clips}, section)
+    facts = {"clips": clips}
+    return Section("warps", "Alignment in time", paragraphs, (table,), (chart,), facts)
 
 
 def _shift_text(trained: TrainedModel) -> tuple[str, ...]:
     shifts = np.array([example.shift for example in trained.examples])
     if not shifts.any():
         return ()
-    most = int(np.argmax(np.abs(shifts)))
+    farthest = int(np.argmax(np.abs(shifts)))
     return (
         "Before the alignment the start of each cycle was moved to a common phase, by "
         f"{100 * np.sqrt(np.mean(np.square(shifts))):.1f} % of a cycle (RMS), and of "
-        f"{clip_errors.clip_label(trained.examples[most])} by {100 * shifts[most]:+.1f} %. The "
-        "end of the cycle and its landmarks moved with it.",
+        f"{clip_errors.clip_label(trained.examples[farthest])} by {100 * shifts[farthest]:+.1f} %. "
+        "The end of the cycle and its landmarks moved with it.",
     )
 
 
 def _limit_text(warps: TimeWarps) -> str:
-    met = int(warps.at_limit.sum())
+    count = int(warps.at_limit.sum())
     rule = (
         f"The alignment limits the speed to at least about {MINIMUM_INCREMENT:g} of the clip's "
         "mean speed"
     )
-    if not met:
+    if not count:
         return f"{rule}. No clip is near this limit."
     ends = int(np.sum(warps.at_limit & (np.abs(warps.change_times - 0.5) > 0.5 - END_SHARE)))
     return (
-        f"{rule}. {met} of {len(warps.maps)} clips are at this limit, {ends} of them in the "
+        f"{rule}. {count} of {len(warps.maps)} clips are at this limit, {ends} of them in the "
         "first or last tenth. There it usually means that the clip was cut at another phase "
         "than the others, and elsewhere that it pauses where the others do not."
     )
@@ -272,13 +264,13 @@ def _paint_maps(maps: Floats, clips: list[dict[str, Any]], figure: Figure) -> No
     for row in maps[NAMED_CLIPS:]:
         left.plot(FIT_TIMES, row, color=page.FAINT, linewidth=0.8)
     left.plot([0, 1], [0, 1], color=page.INK, linewidth=0.8, linestyle="--")
-    for row, one, style in zip(maps, clips, ("-", "--", ":"), strict=False):
-        label = short_label(one["clip"])
+    for row, clip, style in zip(maps, clips, ("-", "--", ":"), strict=False):
+        label = short_label(clip["clip"])
         left.plot(FIT_TIMES, row, style, color=page.ORANGE, label=label)
     left.legend(loc="lower right", fontsize=7.5)
     left.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")
-    at = np.arange(len(clips))
-    colours = [page.ORANGE if i < NAMED_CLIPS else page.BLUE for i in at]
-    right.bar(at, [one["largest_stretch"] for one in clips], width=0.72, color=colours)
+    bars = np.arange(len(clips))
+    colours = [page.ORANGE if i < NAMED_CLIPS else page.BLUE for i in bars]
+    right.bar(bars, [clip["largest_stretch"] for clip in clips], width=0.72, color=colours)
     right.set(ylabel="largest change of speed (factor)", title="clips", ylim=(1.0, None))
     right.set_xticks([])

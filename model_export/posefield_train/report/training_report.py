@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report import clip_errors, controls, kriging, significant_digits, tensor
+from posefield_train.report import clip_errors, controls, significant_digits, tensor
 from posefield_train.report.levels_of_detail import LevelCosts
-from posefield_train.report.page import Chapter, Page, Section, Table
+from posefield_train.report.page import Page, Section, Table, product
 
 REPORT_VERSION = 2
 """Version of the JSON: increased when a name or a unit changes."""
@@ -86,22 +86,23 @@ def render(
 ) -> RenderedReport:
     """Return the report of a model; equal arguments give equal bytes."""
     card = exported.card
-    chapters = {
-        "fields": kriging.quantity_chapter(trained, card.controls),
-        "clips": clip_errors.error_chapter(trained, card.controls),
-        "figures": clip_errors.drawn_chapter(trained),
-        "calibration": controls.calibration_chapter(trained),
-        "coverage": controls.coverage_chapter(trained, card.controls),
-        "trust": controls.trust_chapter(exported),
-        "sizes": tensor.truncation_chapter(trained),
-        "levels": levels.chapter(),
-        "warps": tensor.warp_chapter(trained),
-        "about": provenance_chapter(exported, steps),
-    }
-    sections = [*(chapter.section for chapter in chapters.values()), TERMS_SECTION]
-    figures = key_figures(exported, sum(step.seconds for step in steps))
-    page = Page("training report", card.name, card.description, figures, sections)
-    parts = {name: significant_digits.round_all(own.facts) for name, own in chapters.items()}
+    sections = (
+        controls.quantity_section(trained, card.controls),
+        clip_errors.error_section(trained, card.controls),
+        clip_errors.drawn_section(trained),
+        controls.calibration_section(trained),
+        controls.coverage_section(trained, card.controls),
+        controls.trust_section(exported),
+        tensor.truncation_section(trained),
+        levels.section(),
+        tensor.warp_section(trained),
+        provenance_section(exported, steps),
+    )
+    key_values = key_figures(exported, sum(step.seconds for step in steps))
+    page = Page(
+        "training report", card.name, card.description, key_values, [*sections, TERMS_SECTION]
+    )
+    parts = {section.name: significant_digits.round_all(section.facts) for section in sections}
     text = json.dumps(
         {"report": REPORT_VERSION, **parts},
         indent=1,
@@ -112,7 +113,7 @@ def render(
     return RenderedReport(page.html(), f"{text}\n".encode())
 
 
-def provenance_chapter(exported: ExportedModel, steps: Sequence[TrainingStep]) -> Chapter:
+def provenance_section(exported: ExportedModel, steps: Sequence[TrainingStep]) -> Section:
     """Return the card's main entries, the size of the file, its notes, and the steps."""
     card = exported.card
     source = card.provenance
@@ -147,7 +148,7 @@ def provenance_chapter(exported: ExportedModel, steps: Sequence[TrainingStep]) -
         Table("Notes on the data", ("note",), notes),
         Table("Training time", ("step", "seconds"), times),
     )
-    return Chapter(facts, Section("about", "Provenance and notes", (), tables))
+    return Section("about", "Provenance and notes", (), tables, (), facts)
 
 
 def key_figures(exported: ExportedModel, seconds: float) -> list[tuple[str, str]]:
@@ -157,7 +158,7 @@ def key_figures(exported: ExportedModel, seconds: float) -> list[tuple[str, str]
     figures = [
         (f"clips, {len(card.skeleton)} joints each", str(card.provenance["clips"])),
         ("size of the model file", f"{len(exported.content) / 1000:.1f} kB"),
-        (f"ranks kept of {_times(measured['tensor'])}", _times(card.levels[0].ranks)),
+        (f"ranks kept of {product(measured['tensor'])}", product(card.levels[0].ranks)),
         ("error by truncation (RMS)", f"{100 * measured['truncation_rms_m']:.2f} cm"),
         ("error of a left-out clip (RMS)", f"{100 * measured['leave_one_out_rms_m']:.2f} cm"),
         ("of the motion explained by controls", f"{100 * measured['explained']['pose']:.0f} %"),
@@ -174,7 +175,3 @@ def key_figures(exported: ExportedModel, seconds: float) -> list[tuple[str, str]
     parity = f"{100 * measured['parity_m']:.5f} cm"
     figures.append(("largest difference from the reference", parity))
     return [*figures, ("training time", f"{seconds:.1f} s")]
-
-
-def _times(sizes: Sequence[int]) -> str:
-    return " × ".join(map(str, sizes))

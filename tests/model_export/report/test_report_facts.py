@@ -11,7 +11,7 @@ from posefield_train.align.warp import FIT_TIMES
 from posefield_train.graph.trained_model import Outlier
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.report import clip_errors, tensor
-from posefield_train.report import controls as chapters
+from posefield_train.report import controls as sections
 from posefield_train.report.tensor import TimeWarps
 
 # JSON holds six digits.
@@ -95,11 +95,11 @@ def test_nothing_lies_below_the_front(trained, rng):
 def test_a_control_with_one_value_a_performer_is_named(trained, controls):
     values = np.stack([example.controls for example in trained.examples])
     performers = [example.row.performer for example in trained.examples]
-    assert chapters.label_controls(controls, values, performers) == ("stature",)
-    assert chapters.label_controls(controls, values, [""] * len(values)) == ()
+    assert sections.label_controls(controls, values, performers) == ("stature",)
+    assert sections.label_controls(controls, values, [""] * len(values)) == ()
     # Negative control: one value changed, and it is a measurement like any other.
     values[0, 0] += 0.01
-    assert chapters.label_controls(controls, values, performers) == ()
+    assert sections.label_controls(controls, values, performers) == ()
 
 
 def test_trust_says_what_to_capture_and_which_joints_err(facts, exported):
@@ -113,10 +113,10 @@ def test_trust_says_what_to_capture_and_which_joints_err(facts, exported):
     assert 0.0 < found["support_limit"] < 1.0
     hand = Measure("height", (card.skeleton.names.index("RightHand"),), "end")
     told = replace(card, controls=(replace(card.controls[0], measure=hand), *card.controls[1:]))
-    limits = chapters.limits_chapter(told, 0.5, ())
+    limits = sections.limits_section(told, 0.5, ())
     assert limits.facts["measured"] == {card.controls[0].name: "height of RightHand at end"}
-    assert "RightHand" in limits.section.paragraphs[0]
-    assert "RightHand" not in chapters.limits_chapter(card, 0.5, ()).section.paragraphs[0]
+    assert "RightHand" in limits.paragraphs[0]
+    assert "RightHand" not in sections.limits_section(card, 0.5, ()).paragraphs[0]
 
 
 def test_coverage_says_where_nothing_is(facts, trained):
@@ -146,24 +146,24 @@ def test_the_largest_stretch_is_that_of_the_slope_or_its_inverse():
 
 def test_clips_are_listed_by_their_change_of_speed_with_the_shifts_of_cycles(trained):
     first, *others = trained.examples
-    shifted = tensor.warp_chapter(
+    shifted = tensor.warp_section(
         replace(trained, examples=(replace(first, shift=-0.125), *others))
     )
     stretches = [clip["largest_stretch"] for clip in shifted.facts["clips"]]
     assert stretches == sorted(stretches, reverse=True) and stretches[-1] >= 1.0
-    assert f"{clip_errors.clip_label(first)} by -12.5 %" in shifted.section.paragraphs[-1]
+    assert f"{clip_errors.clip_label(first)} by -12.5 %" in shifted.paragraphs[-1]
     assert {clip["shift"] for clip in shifted.facts["clips"]} == {0.0, -0.125}
-    plain = tensor.warp_chapter(trained).section.paragraphs
-    assert len(plain) == len(shifted.section.paragraphs) - 1
+    plain = tensor.warp_section(trained).paragraphs
+    assert len(plain) == len(shifted.paragraphs) - 1
 
 
 def test_sigma_is_right_on_average_by_construction(trained):
-    facts = chapters.calibration_chapter(trained).facts
+    facts = sections.calibration_section(trained).facts
     assert facts["mean_squared_ratio"] == pytest.approx(1.0)
     predicted, left_out = facts["predicted_m"], np.sqrt(trained.left_out_errors)
-    on_canonical_time = chapters.calibration_statistics(predicted, left_out)
+    on_canonical_time = sections.calibration_statistics(predicted, left_out)
     assert on_canonical_time["mean_squared_ratio"] > 1.2
-    half = chapters.calibration_statistics(0.5 * predicted, facts["actual_m"])
+    half = sections.calibration_statistics(0.5 * predicted, facts["actual_m"])
     assert half["mean_squared_ratio"] == pytest.approx(4.0)
     # Sigma is less at a known clip than where it is left out.
     bank = trained.model.bank
@@ -173,12 +173,12 @@ def test_sigma_is_right_on_average_by_construction(trained):
 def test_an_outlier_is_listed_with_the_evidence(trained, controls):
     evidence = ("lies far away", "leaps")
     outliers = tuple(Outlier(3, "far", text) for text in evidence)
-    odd = clip_errors.error_chapter(replace(trained, outliers=outliers), controls)
-    first, chart = odd.section.tables[0], odd.section.charts[0]
+    odd = clip_errors.error_section(replace(trained, outliers=outliers), controls)
+    first, chart = odd.tables[0], odd.charts[0]
     assert first.caption == "Possible outliers" and "Outlined" in chart.caption
     label = clip_errors.clip_label(trained.examples[3])
     assert first.rows == ((label, "lies far away; leaps"),)
     assert [clip["clip"] for clip in odd.facts["clips"] if clip["against"]] == [label]
-    clean = clip_errors.error_chapter(trained, controls)
-    assert clean.section.tables[0].caption == "Clips with the largest error"
-    assert "Outlined" not in clean.section.charts[0].caption
+    clean = clip_errors.error_section(trained, controls)
+    assert clean.tables[0].caption == "Clips with the largest error"
+    assert "Outlined" not in clean.charts[0].caption

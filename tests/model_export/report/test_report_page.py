@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from posefield_train.report import clip_errors, training_report
-from posefield_train.report import controls as control_chapters
+from posefield_train.report import controls as control_sections
 from posefield_train.report.page import LABEL, draw_chart
 from posefield_train.report.training_report import TrainingStep
 
@@ -135,17 +135,15 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
     """matplotlib warns, which is an error here, where a label leaves no space."""
     long = "a" * 200
     first, *others = exported.card.controls
-    chapter = control_chapters.coverage_chapter(
-        trained, (replace(first, name=long), *others)
-    ).section
-    (svg,) = (drawn.svg.decode() for drawn in chapter.charts)
+    section = control_sections.coverage_section(trained, (replace(first, name=long), *others))
+    (svg,) = (drawn.svg.decode() for drawn in section.charts)
     assert f"{'a' * (LABEL - 1)}… (m)" in svg and long not in svg
-    assert long in chapter.tables[0].rows[0]
+    assert long in section.tables[0].rows[0]
     examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
-    bars = clip_errors.error_chapter(
+    bars = clip_errors.error_section(
         replace(trained, examples=tuple(examples)), exported.card.controls
     )
-    assert "a…" in bars.section.charts[0].svg.decode()
+    assert "a…" in bars.charts[0].svg.decode()
 
 
 def test_charts_do_not_depend_on_the_users_matplotlib_settings():
