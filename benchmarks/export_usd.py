@@ -25,7 +25,7 @@ from posefield.encode.character.character import CharacterRig
 from posefield.encode.formats import METRES
 from posefield.encode.usd import usd_clip, usd_library
 from posefield.encode.usd_layers import crate_template, layers
-from posefield.encode.usd_layers.layers import LayerBuilder, LayerContent
+from posefield.encode.usd_layers.crate_template import LayerBuilder, LayerContent
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip

@@ -7,7 +7,8 @@ import pytest
 from pxr import Sdf, Vt
 
 from posefield.encode.usd_layers import crate_sections, crate_template, layers
-from posefield.encode.usd_layers.layers import LayerContent, ValueTypes
+from posefield.encode.usd_layers.crate_template import LayerContent
+from posefield.encode.usd_layers.layers import ValueTypes
 
 UNIT, MIX = 0.01, 1.0 / 3.0
 
@@ -54,7 +55,7 @@ def changed(made, **samples):
 
 
 def template(author, made):
-    pattern = layers.first_frame(made).pattern
+    pattern = made.pattern
     return crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
 
 

@@ -57,7 +57,7 @@ def written(given, convention=METRES, write=usd_clip.usdc):
 def both(given, convention=METRES):
     """Return whether both forms hold what usd-core's layers do, the binary one by a template."""
     author, content = next(usd_clip.builders_and_contents(given, convention))
-    pattern = layers.first_frame(content).pattern
+    pattern = content.pattern
     assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
     texts = ordinary(given, convention)
     read = [layers.crate_text(each) for each in written(given, convention)]

@@ -23,7 +23,8 @@ from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims, usd_clip
 from posefield.encode.usd.usd_clip import ClipLayerBuilder
 from posefield.encode.usd_layers import layers
-from posefield.encode.usd_layers.layers import LayerContent, ValueTypes
+from posefield.encode.usd_layers.crate_template import LayerContent
+from posefield.encode.usd_layers.layers import ValueTypes
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
 PERFORMANCE = Sdf.Path("/Performance")

@@ -25,13 +25,8 @@ from posefield.encode.character.extent import AnimationSamples
 from posefield.encode.conventions import Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import crate_template, layers
-from posefield.encode.usd_layers.layers import (
-    WEIGHTS,
-    Array,
-    BaseLayerBuilder,
-    LayerContent,
-    Samples,
-)
+from posefield.encode.usd_layers.crate_template import Array, LayerBuilder, LayerContent
+from posefield.encode.usd_layers.layers import WEIGHTS, Samples
 from posefield.motion.clip import Clip
 from posefield.question.results import SampledClip
 
@@ -114,7 +109,7 @@ ANIMATION = ROOT.AppendChild("Anim")
 
 
 @dataclass(frozen=True)
-class ClipLayerBuilder(BaseLayerBuilder):
+class ClipLayerBuilder(LayerBuilder):
     """Layers of clips of one skeleton. curves: names of the clips' curves."""
 
     rig: CharacterRig
@@ -191,7 +186,7 @@ ANIMATION_NAME = "Anim"
 
 
 @dataclass(frozen=True)
-class AnimationLayerBuilder(BaseLayerBuilder):
+class AnimationLayerBuilder(LayerBuilder):
     """Layers of an animation of joints with given paths, and of curves with given names."""
 
     paths: tuple[str, ...]

@@ -40,7 +40,8 @@ from posefield.encode.usd import character_prims
 from posefield.encode.usd.usd_clip import AnimationLayerBuilder
 from posefield.encode.usd_crowd import crowd_size
 from posefield.encode.usd_layers import crate_template, layers
-from posefield.encode.usd_layers.layers import WEIGHTS, LayerContent, Samples, ValueTypes
+from posefield.encode.usd_layers.crate_template import LayerContent
+from posefield.encode.usd_layers.layers import WEIGHTS, Samples, ValueTypes
 from posefield.motion import quat
 from posefield.motion.clip import CrowdClip, Motions, Placement
 from posefield.question.motion_question import BodyKind

@@ -1,4 +1,4 @@
-"""Binary USD layer split into values, tokens, and sections that refer to tokens by index.
+"""Binary USD layer split into values and sections, and the samples and facts that it is given.
 
 Only the table of contents of the format is parsed, as by every reader.
 
@@ -10,9 +10,17 @@ usd-core writes a layer with a sample for each attribute. The offset that leads 
 its times and samples then leads to others behind all other values, of any number, as the format
 allows (pxr/usd/sdf/crateFile.cpp, `Write(TimeSamples)`). Equal samples are stored once, as usd-core
 does; a loop's last sample is its first.
+
+Facts differ from clip to clip in how many there are and in their texts, so usd-core would lay out
+each layer in another way. Therefore usd-core writes a mark in their place. The offset beside the
+mark then leads to a dictionary behind all other values, as the format allows
+(pxr/usd/sdf/crateFile.cpp, `_RecursiveWrite`), and the texts are appended to the tables of tokens
+and strings. Equal numbers and texts of other parts of the layer are not shared.
 """
 
 import struct
+from collections.abc import Mapping, Sequence
+from ctypes import c_float
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,42 +45,30 @@ TABLE_OFFSET = struct.Struct("<q")
 """Offset of the table of contents in the head, and number of entries in the table."""
 TABLE_OFFSET_POSITION = 16
 ENTRY = struct.Struct("<16sqq")
-TOKEN_SECTION = b"TOKENS"
+TOKEN_SECTION, STRING_SECTION = b"TOKENS", b"STRINGS"
 
 
-@dataclass(frozen=True)
-class CrateSection:
-    """One section: name and bytes."""
-
-    name: bytes
-    content: bytes
+CrateSection = tuple[bytes, bytes]
+"""Name and content of a section."""
 
 
-@dataclass(frozen=True)
-class CrateParts:
-    """Head and values, and the sections, tokens first."""
-
-    values: bytes
-    sections: tuple[CrateSection, ...]
-
-
-def split_crate(data: bytes) -> CrateParts | None:
-    """Return the pieces of a binary layer; None for another layout."""
+def split_crate(data: bytes) -> tuple[bytes, tuple[CrateSection, ...]] | None:
+    """Return head and values of a binary layer, and its sections; None for another layout."""
     try:
         listed = _table_of_contents(data)
     except struct.error:
         return None
     sections = tuple(
-        CrateSection(name.rstrip(b"\0"), data[start : start + size]) for name, start, size in listed
+        (name.rstrip(b"\0"), data[start : start + size]) for name, start, size in listed
     )
     if (
         not sections
-        or sections[0].name != TOKEN_SECTION
+        or sections[0][0] != TOKEN_SECTION
         or listed[0][1] < TABLE_OFFSET_POSITION + TABLE_OFFSET.size
     ):
         return None
-    crate = CrateParts(data[: listed[0][1]], sections)
-    return crate if join_crate(bytearray(crate.values), sections) == data else None
+    values = data[: listed[0][1]]
+    return (values, sections) if join_crate(bytearray(values), sections) == data else None
 
 
 def _table_of_contents(data: bytes) -> list[tuple[bytes, int, int]]:
@@ -87,11 +83,11 @@ def _table_of_contents(data: bytes) -> list[tuple[bytes, int, int]]:
 def join_crate(values: bytearray, sections: tuple[CrateSection, ...]) -> bytes:
     """Return the binary layer of head, values and sections; set the table's offset in the head."""
     start, entries = len(values), []
-    for section in sections:
-        entries.append(ENTRY.pack(section.name, start, len(section.content)))
-        start += len(section.content)
+    for name, content in sections:
+        entries.append(ENTRY.pack(name, start, len(content)))
+        start += len(content)
     TABLE_OFFSET.pack_into(values, TABLE_OFFSET_POSITION, start)
-    contents = (section.content for section in sections)
+    contents = (content for _, content in sections)
     return b"".join((values, *contents, TABLE_OFFSET.pack(len(sections)), *entries))
 
 
@@ -129,7 +125,7 @@ def add_times(values: bytearray, frames: int) -> int:
     return offset
 
 
-def find_place(values: bytes, row: Singles) -> SamplesPlace | None:
+def find_samples(values: bytes, row: Singles) -> SamplesPlace | None:
     """Return the place of an attribute with one sample (1, ...); None for another layout."""
     array = values.find(COUNT.pack(row.shape[1]) + row.tobytes())
     if array < 0:
@@ -195,3 +191,233 @@ def repeated_rows(rows: Singles) -> Indices | None:
 def _all_distinct(numbers: Singles) -> bool:
     ordered = np.sort(numbers)
     return not np.count_nonzero(ordered[1:] == ordered[:-1])
+
+
+LARGEST_INTEGER = 2**63 - 1
+"""Largest integer that every reader of a layer supports."""
+
+
+def plain_fact(fact: Any) -> Any:
+    """Return a fact as what USD holds: a text, truth or number, a list of one kind, a dictionary.
+
+    A list is its kind, str, int or float, and a tuple of its elements. A mixed list is a dictionary
+    by index, and an integer that readers do not support a text. Raises TypeError for any other
+    value.
+    """
+    match fact:
+        case np.generic() | np.ndarray():
+            return plain_fact(fact.tolist())
+        case Mapping():
+            return dict(fact)
+        case str():
+            return str(fact)
+        case bool():
+            return fact
+        case float():
+            return float(fact)
+        case int():
+            return int(fact) if _is_supported(fact) else str(int(fact))
+        case Sequence():
+            return _plain_list(fact)
+    raise TypeError(f"a fact of type {type(fact).__name__}, expected text, a number or several")
+
+
+def _plain_list(facts: Sequence[Any]) -> tuple[type, tuple[Any, ...]] | dict[str, Any]:
+    if all(isinstance(fact, str) for fact in facts):
+        return str, tuple(facts)
+    if all(_is_supported(fact) for fact in facts):
+        return int, tuple(facts)
+    if all(isinstance(fact, float | int) for fact in facts):
+        return float, tuple(facts)
+    return {str(index): fact for index, fact in enumerate(facts)}
+
+
+def _is_supported(fact: Any) -> bool:
+    return isinstance(fact, int) and abs(fact) <= LARGEST_INTEGER
+
+
+MARK = 1.2345678901234567e-300
+"""The number that usd-core writes in place of the facts; float32 does not hold it."""
+
+INLINE_FACT, FLOAT_FACT = struct.Struct("<IqQ"), struct.Struct("<IqdQ")
+"""Index of a name, an offset to a description, and this; in between a number."""
+TOKENS_HEAD = struct.Struct("<QQQ")
+"""Number of tokens, bytes of their texts, and bytes of these when compressed."""
+MARKED = JUMP.pack(JUMP.size + DOUBLE.size) + DOUBLE.pack(MARK)
+"""The mark in a layer: the offset of its description, from here, and its value."""
+TEXT, NUMBER = TYPES[str] | INLINED, TYPES[float] | INLINED
+PLAIN = frozenset((str, float, bool, dict))
+"""Types of facts that are written as they are."""
+ELEMENTS = {str: (TYPES[str], "I"), int: (LONG_INTEGER, "q"), float: (TYPES[float], "d")}
+"""Type of a list's elements, and their form in `struct`."""
+
+
+@dataclass(frozen=True)
+class FactPlace:
+    """The place of the facts in a layer, and its tables of texts.
+
+    jump: position of the offset that leads to the facts. tokens: their number. text_bytes: bytes of
+    their texts. sequences, literals: the compressed texts, without and as their last run. strings:
+    the table, an index of a token each.
+    """
+
+    jump: int
+    tokens: int
+    text_bytes: int
+    sequences: bytes
+    literals: bytes
+    strings: bytes
+
+    def add(self, values: bytearray, facts: Mapping[str, Any]) -> tuple[CrateSection, ...]:
+        """Append facts to values; return the sections of tokens and of strings.
+
+        Raises ValueError for a text with the character NUL, which ends a token.
+        """
+        writer = _FactWriter(values, {}, len(self.strings) // INDEX.size)
+        description = writer.dictionary(facts)
+        JUMP.pack_into(values, self.jump, len(values) - self.jump)
+        values += COUNT.pack(description)
+        return self._tables(list(writer.texts))
+
+    def _tables(self, texts: list[str]) -> tuple[CrateSection, ...]:
+        if any("\0" in text for text in texts):
+            raise ValueError("a fact with the character NUL, expected text without it")
+        more = "".join(f"{text}\0" for text in texts).encode()
+        literals = self.literals + more
+        packed = self.sequences + _literal_run(len(literals)) + literals
+        head = self.tokens + len(texts), self.text_bytes + len(more), len(packed)
+        indices = range(self.tokens, self.tokens + len(texts))
+        strings = self.strings + struct.pack(f"<{len(texts)}I", *indices)
+        return (
+            (TOKEN_SECTION, TOKENS_HEAD.pack(*head) + packed),
+            (STRING_SECTION, COUNT.pack(len(strings) // INDEX.size) + strings),
+        )
+
+
+def find_facts(values: bytes, sections: Sequence[CrateSection]) -> FactPlace | None:
+    """Return the place of the facts in a layer with a mark; None for another layout."""
+    jump = values.find(MARKED)
+    if jump < 0 or [name for name, _ in sections[:2]] != [TOKEN_SECTION, STRING_SECTION]:
+        return None
+    (_, tokens), (_, strings) = sections[:2]
+    count, text_bytes, size = TOKENS_HEAD.unpack_from(tokens)
+    packed = tokens[TOKENS_HEAD.size :]
+    # The first byte counts further parts of a text of gigabytes.
+    if len(packed) != size or packed[0] != 0:
+        return None
+    start, length = _last_run(packed)
+    literals = packed[len(packed) - length :]
+    return FactPlace(jump, count, text_bytes, packed[:start], literals, strings[COUNT.size :])
+
+
+@dataclass
+class _FactWriter:
+    """Writer of facts behind values.
+
+    texts: index in the table of strings, of which the layer has `before`.
+    """
+
+    values: bytearray
+    texts: dict[str, int]
+    before: int
+
+    def dictionary(self, facts: Mapping[str, Any]) -> int:
+        """Return the description of facts, which are written.
+
+        For each there is its name, an offset, a value unless the description holds it, and this.
+        """
+        names = sorted([name for name, fact in facts.items() if fact is not None])
+        description = self._append(COUNT.pack(len(names)))
+        for name in names:
+            fact, index = facts[name], self._string(name)
+            if type(fact) not in PLAIN:
+                fact = plain_fact(fact)
+            if type(fact) is str:
+                self.values += INLINE_FACT.pack(index, JUMP.size, TEXT | self._string(fact))
+            elif type(fact) is float:
+                self.values += _float_fact(index, fact, len(self.values))
+            else:
+                self._fact(index, fact)
+        return TYPES[dict] | description
+
+    def _fact(self, index: int, fact: Any) -> None:
+        """Write a fact of any length, by the index of its name."""
+        jump = self._append(INDEX.pack(index) + bytes(JUMP.size)) + INDEX.size
+        described = self._describe(fact)
+        JUMP.pack_into(self.values, jump, len(self.values) - jump)
+        self.values += COUNT.pack(described)
+
+    def _describe(self, fact: Any) -> int:
+        if isinstance(fact, dict):
+            return self.dictionary(fact)
+        if isinstance(fact, tuple):
+            return self._list(*fact)
+        return TYPES[bool] | INLINED | fact if isinstance(fact, bool) else self._integer(fact)
+
+    def _integer(self, fact: int) -> int:
+        if -(1 << 31) <= fact < 1 << 31:
+            return TYPES[int] | INLINED | fact & 0xFFFFFFFF
+        return LONG_INTEGER | self._append(JUMP.pack(fact))
+
+    def _list(self, element: type, elements: tuple[Any, ...]) -> int:
+        kind, form = ELEMENTS[element]
+        if not elements:
+            return kind | ARRAY
+        items = [self._string(text) for text in elements] if element is str else elements
+        self.values += bytes(-len(self.values) % ALIGNMENT)
+        offset = self._append(COUNT.pack(len(items)) + struct.pack(f"<{len(items)}{form}", *items))
+        return kind | ARRAY | offset
+
+    def _append(self, content: bytes) -> int:
+        """Return the offset of bytes after they are written."""
+        offset = len(self.values)
+        self.values += content
+        return offset
+
+    def _string(self, text: str) -> int:
+        return self.texts.setdefault(text, self.before + len(self.texts))
+
+
+def _float_fact(index: int, fact: float, at: int) -> bytes:
+    """Return a number of a dictionary, by the index of its name, at an offset."""
+    if c_float(fact).value == fact:
+        bits = int.from_bytes(FLOAT.pack(fact), "little")
+        return INLINE_FACT.pack(index, JUMP.size, NUMBER | bits)
+    value = at + INDEX.size + JUMP.size
+    return FLOAT_FACT.pack(index, JUMP.size + DOUBLE.size, fact, TYPES[float] | value)
+
+
+# LZ4, by which tokens are compressed, alternates runs of literal bytes with copies of earlier ones
+# (https://github.com/lz4/lz4/blob/dev/doc/lz4_Block_format.md). A run's length is in four bits,
+# and if these are full, in further bytes, of which the last is below 255.
+FULL = 15
+
+
+def _last_run(packed: bytes) -> tuple[int, int]:
+    """Return the start and the length of the last run of compressed bytes, after the first byte."""
+    at = 1
+    while True:
+        start, head = at, packed[at]
+        length, at = _run_length(packed, at + 1, head >> 4)
+        at += length
+        if at >= len(packed):
+            return start, length
+        _, at = _run_length(packed, at + 2, head & FULL)
+
+
+def _run_length(packed: bytes, at: int, length: int) -> tuple[int, int]:
+    """Return a length of which four bits are known, and the position after it."""
+    while length >= FULL:
+        length += packed[at]
+        at += 1
+        if packed[at - 1] < 255:
+            break
+    return length, at
+
+
+def _literal_run(length: int) -> bytes:
+    """Return the head of a last run of that length."""
+    if length < FULL:
+        return bytes([length << 4])
+    full, rest = divmod(length - FULL, 255)
+    return bytes([FULL << 4]) + b"\xff" * full + bytes([rest])

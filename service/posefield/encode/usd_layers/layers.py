@@ -1,103 +1,24 @@
-"""USD layers: their content, metadata and binary form, and helpers that write prims into them."""
+"""USD layers: their metadata, facts and binary form, and helpers that write prims into them."""
 
 import errno
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from pxr import Sdf, Tf, Vt
 
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, Singles
 from posefield.encode.conventions import METRES, Convention
+from posefield.encode.usd_layers import crate_sections
 
-Array = npt.NDArray[Any]
 Samples = Mapping[str, Singles]
 """Samples (F, ...) of attributes at the time codes 0 to F - 1, by name."""
 
 WEIGHTS = "blendShapeWeights"
 """Name of the samples (F, C) of curves; those of other attributes are vectors (F, N, n)."""
-
-
-class LayerPattern(NamedTuple):
-    """Shapes of a content.
-
-    samples: name and shape. values: name, shape and type. facts: whether it has any.
-    """
-
-    samples: tuple[tuple[str, tuple[int, ...]], ...]
-    values: tuple[tuple[str, tuple[int, ...], str], ...]
-    facts: bool
-
-
-@dataclass(frozen=True)
-class LayerContent:
-    """Content of a layer: samples of attributes, values by name, and facts.
-
-    No number is -0: it counts as equal to 0, and equal samples are stored once.
-    """
-
-    samples: Samples
-    values: Mapping[str, Array]
-    facts: Mapping[str, Any]
-
-    @property
-    def frames(self) -> int:
-        """Return the number of samples of each attribute."""
-        return len(next(iter(self.samples.values())))
-
-    @property
-    def pattern(self) -> LayerPattern:
-        """Return the shapes of the content."""
-        return LayerPattern(
-            tuple((name, rows.shape) for name, rows in self.samples.items()),
-            tuple((name, array.shape, array.dtype.char) for name, array in self.values.items()),
-            bool(self.facts),
-        )
-
-
-class LayerBuilder(Protocol):
-    """Kind of layer; equal kinds build equal layers of equal content."""
-
-    @property
-    def rate(self) -> float:
-        """Return the frames a second."""
-
-    def with_rate(self, rate: float) -> Self:
-        """Return the same kind at other frames a second."""
-
-    def layer(self, content: LayerContent) -> Any:
-        """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
-
-    def __hash__(self) -> int: ...
-
-
-def first_frame(content: LayerContent) -> LayerContent:
-    """Return the content with the first sample of each attribute alone."""
-    return replace(content, samples={name: rows[:1] for name, rows in content.samples.items()})
-
-
-def random_content(pattern: LayerPattern, facts: Mapping[str, Any], seed: int) -> LayerContent:
-    """Return a content of these shapes with these facts, and values at random that all differ."""
-    rng = np.random.default_rng(seed)
-    samples = {name: rng.standard_normal(shape, np.float32) for name, shape in pattern.samples}
-    values = {n: rng.standard_normal(shape).astype(kind) for n, shape, kind in pattern.values}
-    return LayerContent(samples, values, facts)
-
-
-LARGEST_INTEGER = 2**63 - 1
-"""Largest integer that every reader of a layer supports."""
-
-
-class FactList(NamedTuple):
-    """A list of facts of one kind: str, int or float."""
-
-    kind: type
-    items: tuple[Any, ...]
 
 
 ARRAYS = {str: Vt.StringArray, int: Vt.Int64Array, float: Vt.DoubleArray}
@@ -109,48 +30,11 @@ def usd_dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
     return {name: _usd_value(fact) for name, fact in facts.items() if fact is not None}
 
 
-def plain_fact(fact: Any) -> Any:
-    """Return a fact as what USD holds: a text, truth or number, a list of one kind, a dictionary.
-
-    A mixed list is a dictionary by index, and an integer that readers do not support a text. Raises
-    TypeError for any other value.
-    """
-    match fact:
-        case np.generic() | np.ndarray():
-            return plain_fact(fact.tolist())
-        case Mapping():
-            return dict(fact)
-        case str():
-            return str(fact)
-        case bool():
-            return fact
-        case float():
-            return float(fact)
-        case int():
-            return int(fact) if _is_supported(fact) else str(int(fact))
-        case Sequence():
-            return _plain_list(fact)
-    raise TypeError(f"a fact of type {type(fact).__name__}, expected text, a number or several")
-
-
-def _plain_list(facts: Sequence[Any]) -> FactList | dict[str, Any]:
-    if all(isinstance(fact, str) for fact in facts):
-        return FactList(str, tuple(facts))
-    if all(_is_supported(fact) for fact in facts):
-        return FactList(int, tuple(facts))
-    if all(isinstance(fact, float | int) for fact in facts):
-        return FactList(float, tuple(facts))
-    return {str(index): fact for index, fact in enumerate(facts)}
-
-
-def _is_supported(fact: Any) -> bool:
-    return isinstance(fact, int) and abs(fact) <= LARGEST_INTEGER
-
-
 def _usd_value(fact: Any) -> Any:
-    plain = plain_fact(fact)
-    if isinstance(plain, FactList):
-        return ARRAYS[plain.kind](list(plain.items))
+    plain = crate_sections.plain_fact(fact)
+    if isinstance(plain, tuple):
+        kind, items = plain
+        return ARRAYS[kind](list(items))
     return usd_dictionary(plain) if isinstance(plain, dict) else plain
 
 
@@ -183,23 +67,6 @@ def set_custom_data(layer: Any, facts: Mapping[str, Any]) -> None:
     """Set the custom layer data `FACTS` to facts, unless there are none."""
     if dictionary := usd_dictionary(facts):
         layer.customLayerData = {FACTS: dictionary}
-
-
-@dataclass(frozen=True)
-class BaseLayerBuilder:
-    """Layers of one rate and convention."""
-
-    rate: float
-    convention: Convention
-
-    def with_rate(self, rate: float) -> Self:
-        """Return layers of another rate."""
-        return replace(self, rate=rate)
-
-    def set_metadata(self, layer: Any, default: str, content: LayerContent) -> None:
-        """Set the metadata of a layer, with this default prim, and the facts of its content."""
-        set_layer_metadata(layer, default, content.frames, self.rate, self.convention)
-        set_custom_data(layer, content.facts)
 
 
 def crate_bytes(layer: Any, memory: Path = MEMORY_FOLDER) -> bytes:
