@@ -22,7 +22,7 @@ from family import Family
 from rows import Row, table
 from timing import in_turn
 
-from posefield.batch import clip_archive
+from posefield.batch.job import archive_members
 from posefield.encode import archives
 from posefield.http import archive_operations
 from posefield.http.api.settings import Settings
@@ -110,7 +110,7 @@ def _first(client: httpx.Client, body: bytes) -> None:
 def _made(model: Synthesizer, body: bytes) -> int:
     """Bytes of the same archive without a server."""
     order = archive_operations.clip_order(model, body, Settings())
-    return sum(map(len, archives.zip(clip_archive.archive_members(order))))
+    return sum(map(len, archives.zip(archive_members(order.files()))))
 
 
 def _most_memory(process: subprocess.Popen[bytes]) -> int:

@@ -22,11 +22,11 @@ from pathlib import Path
 
 from rows import Row, table
 
-from posefield.batch import chunks, layouts, process_pool, run
+from posefield.batch import clip_files, layouts, process_pool, run
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.job import ExportJob, WorkerInput, manifest_entry, manifest_line
+from posefield.batch.job import ExportJob, WorkerInput, exported_file, manifest_line
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows import Defaults, RowSource, SourceOptions, open_source
+from posefield.batch.rows import RowReader, open_source
 from posefield.batch.target import open_target
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.registry import model_registry
@@ -37,7 +37,7 @@ LONGER = 8
 """Times as many clips where processes are begun, which takes them a second."""
 FAST, TWICE, MEMORY = 2000.0, 1.7, 600.0
 """Goals: clips a second and core, two processes against one, MB of a process."""
-STAGED = chunks.CLIPS
+STAGED = clip_files.CLIPS
 """Clips that the stages are measured with: as many as are held at once."""
 
 
@@ -46,14 +46,14 @@ class Bench:
     """Work for a target that is not said yet, and its queries."""
 
     work: WorkerInput
-    source: RowSource
+    source: RowReader
 
     @classmethod
     def of(cls, model: Path, clips: int, form: str) -> "Bench":
         """Clips at points sampled from a model's controls."""
         content = model.read_bytes()
         opened = model_registry.open_model(model.stem, model, content)
-        source = open_source(SourceOptions(sample=clips), Defaults(form), opened)
+        source = open_source(opened, form, sample=clips)
         digest = hashlib.sha256(content).hexdigest()
         job = ExportJob(opened.identity, digest, source.digest, "folder", 1)
         return cls(WorkerInput(job, content, ""), source)
@@ -188,7 +188,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
 
 def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:
     return [
-        manifest_line(manifest_entry(query.name, "clips/000/name", content, answer))
+        manifest_line(exported_file(query.name, "clips/000/name", answer, content).entry)
         for query, content, answer in zip(asked, files, answers, strict=True)
     ]
 

@@ -12,7 +12,7 @@ import pytest
 from asking import listening
 from test_server import address, process
 
-from posefield.batch.clip_archive import CLIPS
+from posefield.batch.clip_files import SENT_CLIPS
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import archive_operations
@@ -69,12 +69,12 @@ def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, s
             assert next(answer.iter_raw())
             waiting = settled(made)
             assert waiting < MANY / 2
-        assert settled(made) <= waiting + CLIPS
+        assert settled(made) <= waiting + SENT_CLIPS
 
 
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_an_archive_that_cannot_be_finished_breaks_off(kind, served, controls, caplog):
-    encoder, _ = counting(most=2 * CLIPS)
+    encoder, _ = counting(most=2 * SENT_CLIPS)
     got = bytearray()
     headers = {"x-request-id": "id-7"}
     with (

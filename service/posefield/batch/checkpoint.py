@@ -13,7 +13,7 @@ from typing import Any
 import orjson
 
 from posefield.batch import layouts
-from posefield.batch.job import ExportJob, WorkerInput, manifest_line
+from posefield.batch.job import MANIFEST, ExportJob, WorkerInput, manifest_line
 from posefield.batch.rows import RowFault
 from posefield.batch.target import (
     STATE_FOLDER,
@@ -26,7 +26,7 @@ from posefield.batch.target import (
 from posefield.common.errors import FileError
 
 JOB, PARTS = f"{STATE_FOLDER}/job.json", f"{STATE_FOLDER}/parts"
-MANIFEST, SKIPPED, EXPORT = "manifest.jsonl", "skipped.jsonl", "export.json"
+SKIPPED, EXPORT = "skipped.jsonl", "export.json"
 
 
 @dataclass(frozen=True)

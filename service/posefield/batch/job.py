@@ -1,6 +1,7 @@
-"""Job of an export, all parameters that determine its bytes, and the entries of its manifest."""
+"""Job of an export, all parameters that determine its bytes, and its files with their manifest."""
 
 import hashlib
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, lru_cache
 from importlib.metadata import version
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 VERSIONED_PACKAGES = ("numpy", "onnxruntime", "usd-core")
 """Packages whose versions may affect the bytes."""
+MANIFEST = "manifest.jsonl"
 
 
 @dataclass(frozen=True)
@@ -30,10 +32,10 @@ class ExportJob:
     """One export, independent of the processes and runs that make it.
 
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
-    layout: name of the layout. chunk: rows per chunk. unit, up: None for the convention of each
+    layout: name of the layout. chunk: rows per chunk. unit, up, body: None for those of each
     format. names: default naming convention of the joints. root_bone: whether the clips have one by
-    default. body: None for the default of each
-    format. character: name, digest and reference of the character of a user; empty for the model's.
+    default. character: name, digest and reference of the character of a user; empty for the
+    model's.
     """
 
     model: str
@@ -91,20 +93,43 @@ def open_model_of(work: WorkerInput) -> Synthesizer:
     return Synthesizer(identity.partition("@")[0], session.open_bytes(work.model, identity))
 
 
-def manifest_entry(
-    name: str, file: str, content: bytes, answer: ClipAnswer | PerformanceAnswer
-) -> dict[str, Any]:
-    """Return the manifest entry of an answer as plain values: path, checksum, frames and trust.
+@dataclass(frozen=True)
+class ExportedFile:
+    """A file of many: its path, its content and its entry in the manifest."""
 
-    file: path relative to the manifest. content: the file's bytes.
+    path: str
+    content: bytes
+    entry: dict[str, Any]
+
+
+def exported_file(
+    name: str, path: str, answer: ClipAnswer | PerformanceAnswer, content: bytes
+) -> ExportedFile:
+    """Return the file of an answer, with its path, checksum, frames and trust as entry.
+
+    path: relative to the manifest. content: the file's bytes.
     """
-    facts: dict[str, Any] = {"name": name, "file": file, "bytes": len(content)}
-    facts["sha256"] = hashlib.sha256(content).hexdigest()
+    entry: dict[str, Any] = {"name": name, "file": path, "bytes": len(content)}
+    entry["sha256"] = hashlib.sha256(content).hexdigest()
     if isinstance(answer, ClipAnswer):
-        facts |= {"frames": len(answer.clip), "fps": answer.clip.rate}
-    return facts | answer.trust.document()
+        entry |= {"frames": len(answer.clip), "fps": answer.clip.rate}
+    return ExportedFile(path, content, entry | answer.trust.document())
 
 
 def manifest_line(entry: dict[str, Any]) -> bytes:
     """Return an entry as a line of JSON Lines."""
     return orjson.dumps(entry, option=orjson.OPT_APPEND_NEWLINE)
+
+
+def archive_members(
+    files: Iterable[ExportedFile], manifest: str = MANIFEST
+) -> Iterator[tuple[str, bytes]]:
+    """Yield path and content of each file, then the manifest; earlier contents are released."""
+    # Not a list: each bytes object of orjson occupies a page of memory, whatever its length.
+    lines = bytearray()
+    for file in files:
+        lines += manifest_line(file.entry)
+        yield file.path, file.content
+        # Not in memory while the next one is made.
+        del file
+    yield manifest, bytes(lines)

@@ -9,8 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from posefield.batch.job import ExportJob, WorkerInput, manifest_line, open_model_of
-from posefield.batch.rows import ClipQuery
+from posefield.batch.job import (
+    ExportedFile,
+    ExportJob,
+    WorkerInput,
+    archive_members,
+    open_model_of,
+)
+from posefield.batch.rows import Row
 from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField, did_you_mean
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
@@ -18,7 +24,8 @@ from posefield.encode.character import extent
 from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles
-from posefield.question.results import ClipAnswer
+from posefield.question.motion_question import ClipQuestion
+from posefield.question.results import ClipAnswer, SampledClip
 
 ROWS_PER_FOLDER = 1000
 """Files per folder; many more make file systems and file browsers slow."""
@@ -26,17 +33,8 @@ ROWS_PER_FOLDER = 1000
 ManifestEntry = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class ClipFile:
-    """A clip's file: its path, its content and its entry in the manifest."""
-
-    path: str
-    content: bytes
-    entry: ManifestEntry
-
-
 ChunkWriter = Callable[
-    [ExportTarget, int, Iterable[list[ClipFile]]], tuple[list[ManifestEntry], list[WrittenFile]]
+    [ExportTarget, int, Iterable[list[ExportedFile]]], tuple[list[ManifestEntry], list[WrittenFile]]
 ]
 """Write the files of the chunk of a number, which come in batches; return their entries and the
 archives that contain them.
@@ -48,19 +46,16 @@ class Layout:
     """Paths and contents of the files of an export.
 
     chunk: default number of rows in a chunk. write: writes the files of a chunk. encode: returns
-    the encoder of a format. misfit: returns the reason for which a query does not fit this layout,
-    or None; the field is None if every query fits. describe: returns further values of a clip's
-    entry, from its name, path and answer. complete: returns files about the whole export, from all
-    entries.
+    the files of clips; None for the encoder of their format. misfit: returns the reason for which a
+    row does not fit this layout, or None. describe: returns further values of a clip's entry.
+    complete: returns files about the whole export, from all entries.
     """
 
     chunk: int
     write: ChunkWriter
-    encode: Callable[[str], Callable[[Sequence[ClipAnswer], Convention], list[bytes]]] = (
-        lambda extension: CLIP_ENCODERS[extension].write
-    )
-    misfit: Callable[[ExportJob, ClipQuery], str | None] | None = None
-    describe: Callable[[str, str, ClipAnswer], ManifestEntry] = lambda name, path, answer: {}
+    encode: Callable[[Sequence[SampledClip], Convention], list[bytes]] | None = None
+    misfit: Callable[[ExportJob, Row[ClipQuestion]], str | None] = lambda job, row: None
+    describe: Callable[[ClipAnswer], ManifestEntry] = lambda answer: {}
     complete: Callable[[WorkerInput, Iterable[ManifestEntry]], Iterable[tuple[str, bytes]]] = (
         lambda work, entries: ()
     )
@@ -71,8 +66,12 @@ def path(row: int, name: str, extension: str) -> str:
     return f"clips/{row // ROWS_PER_FOLDER:03d}/{name}.{extension}"
 
 
+CHARACTER_FOLDER = path(0, "", "").rpartition("/")[0]
+"""Folder of the first clips in a target; those of all clips are as deep."""
+
+
 def write_loose_files(
-    target: ExportTarget, number: int, batches: Iterable[list[ClipFile]]
+    target: ExportTarget, number: int, batches: Iterable[list[ExportedFile]]
 ) -> tuple[list[ManifestEntry], list[WrittenFile]]:
     """Write each file separately."""
     entries = []
@@ -86,19 +85,19 @@ def archive_chunk_writer(pack: ArchiveWriter) -> ChunkWriter:
     """Return a function that writes one archive per chunk, with its part of the manifest last."""
 
     def archived(
-        target: ExportTarget, number: int, batches: Iterable[list[ClipFile]]
+        target: ExportTarget, number: int, batches: Iterable[list[ExportedFile]]
     ) -> tuple[list[ManifestEntry], list[WrittenFile]]:
         entries: list[ManifestEntry] = []
 
-        def members() -> Iterator[tuple[str, bytes]]:
-            for files in batches:
-                for file in files:
+        def files() -> Iterator[ExportedFile]:
+            for batch in batches:
+                for file in batch:
                     entries.append(file.entry)
-                    yield file.path, file.content
-            yield f"manifest-{number:06d}.jsonl", b"".join(map(manifest_line, entries))
+                    yield file
 
         path = f"clips-{number:06d}.{pack.extension}"
-        archive = put_file(target, path, pack.write(members()))
+        members = archive_members(files(), f"manifest-{number:06d}.jsonl")
+        archive = put_file(target, path, pack.write(members))
         return [{**entry, "archive": path} for entry in entries], [archive]
 
     return archived
@@ -107,25 +106,25 @@ def archive_chunk_writer(pack: ArchiveWriter) -> ChunkWriter:
 STAGE, LIBRARY_FORMAT = "character.usd", "usdc"
 
 
-def _library_misfit(job: ExportJob, query: ClipQuery) -> str | None:
-    """Return the reason for which a query does not fit a library of one character, or None."""
-    if query.format != LIBRARY_FORMAT:
-        return f"format: {query.format!r}, expected {LIBRARY_FORMAT!r} in a library"
+def _library_misfit(job: ExportJob, row: Row[ClipQuestion]) -> str | None:
+    """Return the reason for which a row does not fit a library of one character, or None."""
+    if row.format != LIBRARY_FORMAT:
+        return f"format: {row.format!r}, expected {LIBRARY_FORMAT!r} in a library"
     for name in ("names", "root_bone"):
-        found, expected = getattr(query.question, name), getattr(job, name)
-        if found != expected:
-            return f"{name}: {found!r}, expected {expected!r} as of the library's character"
+        value, expected = getattr(row.question, name), getattr(job, name)
+        if value != expected:
+            return f"{name}: {value!r}, expected {expected!r} as of the library's character"
     return None
 
 
-def _animation_layers(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+def _animation_layers(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, without a character."""
     from posefield.encode.usd import usd_clip  # usd-core, which other layouts do not need.
 
     return usd_clip.animation_usdc(answers, convention)
 
 
-def _clip_box(name: str, file: str, answer: ClipAnswer) -> ManifestEntry:
+def _clip_box(answer: ClipAnswer) -> ManifestEntry:
     """Return the corners, m, of a box that contains the character throughout a clip."""
     clip = answer.clip
     box = extent.pose_independent_box(clip.skeleton, clip.translations[0], clip.root_path)
@@ -153,12 +152,7 @@ def _library_stage(
 LAYOUTS = {
     "folder": Layout(256, write_loose_files),
     "library": Layout(
-        256,
-        write_loose_files,
-        lambda extension: _animation_layers,
-        _library_misfit,
-        _clip_box,
-        _library_stage,
+        256, write_loose_files, _animation_layers, _library_misfit, _clip_box, _library_stage
     ),
     **{
         pack.extension: Layout(1000, archive_chunk_writer(pack))

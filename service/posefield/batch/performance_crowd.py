@@ -20,13 +20,14 @@ import numpy as np
 from msgspec import structs
 
 from posefield.batch import process_pool, scripts
-from posefield.batch.scripts import MAX_FRAMES, ScriptRow, open_models
+from posefield.batch.scripts import ScriptRow, open_models
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import UP, Floats, RootPath, Singles
 from posefield.encode.usd_crowd import FILES
 from posefield.inference import level_selection
-from posefield.inference.level_selection import Camera
+from posefield.inference.level_selection import LevelCriteria
 from posefield.locomotion import floor_plane, walking_crowd
+from posefield.model import MAX_FRAMES
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip, CrowdClip, Motions, Placement
 from posefield.motion.skeleton import Skeleton
@@ -37,17 +38,6 @@ from posefield.question.performance_question import CrowdStageQuestion, Performa
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
-
-Place = tuple[tuple[float, float], float]
-"""Point on the floor, x and z, m, and heading, rad."""
-
-
-@dataclass(frozen=True)
-class View:
-    """A camera, and the largest error of a level that it may see, pixels."""
-
-    camera: Camera
-    pixels: float
 
 
 @dataclass(frozen=True)
@@ -60,7 +50,7 @@ class PerformanceCrowd:
 
     models: tuple[Path, ...]
     path: Path
-    view: View | None = None
+    view: LevelCriteria | None = None
     instancing: str = "references"
     body: BodyKind = DEFAULT_BODY
 
@@ -70,27 +60,25 @@ def from_question(
 ) -> PerformanceCrowd:
     """Return a crowd with the stage of a question; InvalidField as for walking crowds."""
     order = walking_crowd.from_question(WalkQuestion(**structs.asdict(stage)))
-    view = None if order.camera is None else View(order.camera, order.pixels)
+    view = None
+    if order.camera is not None:
+        view = LevelCriteria(order.camera, order.pixels, budget=None, previous=None)
     return PerformanceCrowd(models, path, view, stage.instancing, stage.body or DEFAULT_BODY)
 
 
 @dataclass(frozen=True)
 class StagedMotion:
-    """A performance as a motion in a file, and where its character stands."""
+    """A performance as a motion in a file, and where its character stands.
 
+    index: of its script. position: on the floor, x and z, m. heading: rad.
+    """
+
+    index: int
     file: Path
     level: int
-    place: Place
+    position: tuple[float, float]
+    heading: float
     report: PerformanceReport
-
-
-@dataclass(frozen=True)
-class _Cast:
-    """Facts that all characters of a crowd share, and the number of levels of any script."""
-
-    skeleton: Skeleton
-    rate: float
-    levels: int
 
 
 def write(
@@ -110,14 +98,16 @@ def write(
     if crowd.path.suffix.removeprefix(".") not in FILES:
         name = crowd.path.name
         raise InvalidField("output", f"{name!r} ends in none of {', '.join(FILES)}")
-    cast = _check(crowd, rows)
+    skeleton, level_count = _check(crowd, rows)
     with TemporaryDirectory() as folder:
         work = partial(stage_motion, crowd, Path(folder))
         staged = []
-        for motion in process_pool.results(work, list(enumerate(rows)), workers):
+        runner = process_pool.runner(workers, "the same command resumes")
+        for motion in runner(work, iter(enumerate(rows)), lambda: False):
             staged.append(motion)
             advance(1)
-        clip = _crowd_clip(cast, rows, staged)
+        staged.sort(key=lambda motion: motion.index)
+        clip = _crowd_clip(skeleton, level_count, rows, staged)
         crowd_writer.write(clip, crowd.path, crowd.instancing, crowd.body)
     levels = [motion.level for motion in staged]
     return {
@@ -126,49 +116,59 @@ def write(
         "characters": len(staged),
         "frames": clip.frames,
         "rate": clip.rate,
-        "level_counts": np.bincount(levels, minlength=cast.levels).tolist(),
+        "level_counts": np.bincount(levels, minlength=level_count).tolist(),
         "level_shares": clip.facts["level_shares"],
         "warned": sum(bool(motion.report.warnings) for motion in staged),
     }
 
 
-def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> _Cast:
-    """Return what all scripts share; InvalidField lists those that do not, or have no answer."""
+def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> tuple[Skeleton, int]:
+    """Return the skeleton of all scripts, and the largest number of levels of any.
+
+    Raises InvalidField, which lists the scripts that differ from the first or have no answer.
+    """
     find = open_models(crowd.models).find
-    cast: _Cast | None = None
-    faults: list[str] = []
+    first: tuple[ScriptRow, Skeleton] | None = None
+    level_count, faults = 0, list[str]()
     for row in rows:
         try:
-            script = resolve_script(row.script, find)
+            script = resolve_script(row.question, find)
             character = script.character
             skeleton = joint_roles.rename_joints(
                 character.skeleton, character.roles, script.question.names
             )
-            new = _Cast(skeleton, row.script.fps, len(level_errors(script)))
-            cast = new if cast is None else _joined(cast, new, rows[0].place)
-            for field, value, usual in (("unit", row.script.unit, "m"), ("up", row.script.up, "y")):
+            level_count = max(level_count, len(level_errors(script)))
+            first = first or (row, skeleton)
+            _check_equal(row, skeleton, *first)
+            for field, value, usual in (
+                ("unit", row.question.unit, "m"),
+                ("up", row.question.up, "y"),
+            ):
                 if value not in (None, usual):
                     raise InvalidField(field, f"{value!r}, expected {usual!r} for a crowd")
-            if (body := row.script.body) is not None:
+            if (body := row.question.body) is not None:
                 raise InvalidField("body", f"{body!r}, expected none: --body is that of a crowd")
-        except QueryError as fault:
-            faults.append(f"{row.place}: {fault}")
-    if faults or cast is None:
+        except QueryError as error:
+            faults.append(f"{row.place}: {error}")
+    if faults or first is None:
         raise scripts.faulty_scripts(faults)
-    return cast
+    return first[1], level_count
 
 
-def _joined(cast: _Cast, new: _Cast, first: str) -> _Cast:
-    if new.rate != cast.rate:
-        raise InvalidField("fps", f"{new.rate:g}, expected {cast.rate:g} as in {first}")
-    same = new.skeleton.same_tree(cast.skeleton)
-    if not (same and np.array_equal(new.skeleton.offsets, cast.skeleton.offsets)):
+def _check_equal(
+    row: ScriptRow, skeleton: Skeleton, first: ScriptRow, first_skeleton: Skeleton
+) -> None:
+    """Raise InvalidField if a script has another rate or skeleton than the first."""
+    rate, expected = row.question.fps, first.question.fps
+    if rate != expected:
+        raise InvalidField("fps", f"{rate:g}, expected {expected:g} as in {first.place}")
+    same = skeleton.same_tree(first_skeleton)
+    if not (same and np.array_equal(skeleton.offsets, first_skeleton.offsets)):
         raise InvalidField(
             "character",
-            f"another skeleton than in {first}, expected the same: name one model as the "
+            f"another skeleton than in {first.place}, expected the same: name one model as the "
             "`character` of all scripts",
         )
-    return _Cast(cast.skeleton, cast.rate, max(cast.levels, new.levels))
 
 
 def stage_motion(crowd: PerformanceCrowd, folder: Path, job: tuple[int, ScriptRow]) -> StagedMotion:
@@ -179,52 +179,53 @@ def stage_motion(crowd: PerformanceCrowd, folder: Path, job: tuple[int, ScriptRo
     index, row = job
     find = open_models(crowd.models).find
     try:
-        answer, level = perform_at_level(row.script, find, crowd.view, MAX_FRAMES)
-    except QueryError as fault:
-        raise scripts.faulty_scripts([f"{row.place}: {fault}"]) from fault
-    clip, start = answer.clip, row.script.start
-    place = start.position, start.heading
+        answer, level = perform_at_level(row.question, find, crowd.view, MAX_FRAMES)
+    except QueryError as error:
+        raise scripts.faulty_scripts([f"{row.place}: {error}"]) from error
+    clip, start = answer.clip, row.question.start
+    position, heading = start.position, start.heading
     if start.poses:
         first = floor_plane.project(clip.root_path[0])
-        place = (
-            (float(first.imag), float(first.real)),
-            float(quat.twist(clip.rotations[0, 0], UP)),
-        )
-    rotations, roots = _from_place(place, clip)
+        position = float(first.imag), float(first.real)
+        heading = float(quat.twist(clip.rotations[0, 0], UP))
+    rotations, roots = _relative(clip, position, heading)
     file = folder / f"{index}.npz"
     bones = clip.translations[0].astype(np.float32)
     np.savez(file, rotations=rotations, roots=roots, bones=bones)
-    return StagedMotion(file, level, place, answer.trust)
+    return StagedMotion(index, file, level, position, heading, answer.trust)
 
 
-def _from_place(place: Place, clip: Clip) -> tuple[Singles, Singles]:
+def _relative(clip: Clip, position: tuple[float, float], heading: float) -> tuple[Singles, Singles]:
     """Return rotations (F, J, 4) and root positions (F, 3), m, of a clip seen from a place."""
-    (left, forward), heading = place
+    left, forward = position
     back = floor_plane.unit_vectors(np.full(len(clip), -heading))
     roots = clip.root_path
     floor = (floor_plane.project(roots) - complex(forward, left)) * back
-    seen = floor_plane.at_height(floor, roots[:, 1])
+    relative = floor_plane.at_height(floor, roots[:, 1])
     turned = floor_plane.turn_roots(clip.rotations, np.full(len(clip), -heading))
-    return turned.astype(np.float32), seen.astype(np.float32)
+    return turned.astype(np.float32), relative.astype(np.float32)
 
 
 def _crowd_clip(
-    cast: _Cast, rows: Sequence[ScriptRow], staged: Sequence[StagedMotion]
+    skeleton: Skeleton,
+    level_count: int,
+    rows: Sequence[ScriptRow],
+    staged: Sequence[StagedMotion],
 ) -> CrowdClip:
     frames = max(motion.report.frames for motion in staged)
     # Frames of each level, without those that keep the last pose.
-    shown = np.zeros(cast.levels)
+    level_frames = np.zeros(level_count)
     for motion in staged:
-        shown[motion.level] += motion.report.frames
-    places = np.array([motion.place[0] for motion in staged], dtype=np.float64)
+        level_frames[motion.level] += motion.report.frames
+    positions = np.array([motion.position for motion in staged], dtype=np.float64)
     placement = Placement(
-        np.stack([places[:, 0], np.zeros(len(places)), places[:, 1]], axis=1),
-        np.array([motion.place[1] for motion in staged], dtype=np.float64),
+        np.stack([positions[:, 0], np.zeros(len(positions)), positions[:, 1]], axis=1),
+        np.array([motion.heading for motion in staged], dtype=np.float64),
     )
     models = dict.fromkeys(name for motion in staged for name in motion.report.models)
     return CrowdClip(
-        cast.skeleton,
-        cast.rate,
+        skeleton,
+        rows[0].question.fps,
         frames,
         placement,
         np.arange(len(staged)),
@@ -233,7 +234,7 @@ def _crowd_clip(
             "models": list(models),
             "scripts": [row.name for row in rows],
             "durations": [motion.report.duration for motion in staged],
-            "level_shares": [float(f"{share:.4g}") for share in shown / shown.sum()],
+            "level_shares": [float(f"{share:.4g}") for share in level_frames / level_frames.sum()],
         },
     )
 
@@ -241,12 +242,12 @@ def _crowd_clip(
 def _batches(frames: int, staged: Sequence[StagedMotion]) -> Iterator[Motions]:
     """Yield the motions one at a time, each of this number of frames: the last pose is kept."""
     for motion in staged:
-        with np.load(motion.file) as own:
-            shown = np.minimum(np.arange(frames), len(own["roots"]) - 1)
+        with np.load(motion.file) as arrays:
+            indices = np.minimum(np.arange(frames), len(arrays["roots"]) - 1)
             yield Motions(
-                own["rotations"][None, shown],
-                own["roots"][None, shown],
-                own["bones"][None],
+                arrays["rotations"][None, indices],
+                arrays["roots"][None, indices],
+                arrays["bones"][None],
                 np.full((1, frames), motion.level),
             )
 
@@ -266,7 +267,7 @@ def report_text(facts: dict[str, Any]) -> str:
 def perform_at_level(
     question: PerformanceQuestion,
     find: Callable[[str], Synthesizer],
-    view: View | None,
+    view: LevelCriteria | None,
     most: int,
 ) -> tuple[PerformanceAnswer, int]:
     """Return a performance and its level: the coarsest that the view allows.
@@ -289,7 +290,7 @@ def perform_at_level(
     return answer, level
 
 
-def allowed_level(script: Script, roots: RootPath, view: View) -> int:
+def allowed_level(script: Script, roots: RootPath, view: LevelCriteria) -> int:
     """Return the coarsest level whose error is within the view's limit all along a path.
 
     roots: (F, 3), m. Raises InvalidField if the character contains the camera.
@@ -309,13 +310,13 @@ def allowed_level(script: Script, roots: RootPath, view: View) -> int:
 
 def level_errors(script: Script) -> Floats:
     """Return the errors (L,), m, of the levels that all models of a script have: the largest."""
-    every = [
+    model_errors = [
         [level.pose for level in source.model.session.card.levels]
         for source in script.sources
         if source is not None
     ]
-    count = min(map(len, every))
-    errors: Floats = np.max([errors[:count] for errors in every], axis=0)
+    count = min(map(len, model_errors))
+    errors: Floats = np.max([errors[:count] for errors in model_errors], axis=0)
     return errors
 
 

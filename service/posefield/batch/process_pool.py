@@ -9,42 +9,68 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from contextvars import copy_context
 from functools import partial
 from itertools import chain, islice
 from multiprocessing import connection
 from multiprocessing.connection import Connection
-from typing import TypeVar
+from typing import Any
 
-from posefield.batch import checkpoint, chunks
-from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.chunks import ChunkAbandoned, ChunkTask, StopCheck
-from posefield.batch.job import VERSIONED_PACKAGES, WorkerInput
-from posefield.batch.target import open_target
-from posefield.common.cancellation import SINGLE_THREAD_ENV
-from posefield.common.errors import ClusterError, FileError, WorkerDied
+from posefield.batch.job import VERSIONED_PACKAGES
+from posefield.common import cancellation
+from posefield.common.cancellation import SINGLE_THREAD_ENV, Cancellation, Cancelled
+from posefield.common.errors import ClusterError, WorkerDied
 
 POLL_INTERVAL = 0.1
 """Seconds between two checks for a stop."""
 RESUMES = "finished chunks are kept, and the same command resumes the export"
 
-Job = TypeVar("Job")
-Result = TypeVar("Result")
+StopCheck = Callable[[], bool]
+"""Returns true when the work should stop."""
+Task = Any
+Result = Any
+Function = Callable[[Task], Result]
+"""Function of one task, which can be pickled; it may raise Cancelled to abandon the task."""
+Runner = Callable[[Function, Iterator[Task], StopCheck], Iterator[Result]]
+"""Call a function with tasks until none is left or `stopped()` is true; yield each result.
 
-Runner = Callable[[WorkerInput, Iterator[ChunkTask], StopCheck], Iterator[ChunkResult]]
-"""Run tasks until none is left or `stopped()` is true; yield the part of each finished one.
-
-Parts are in the order of completion. Only a few tasks are taken in advance, so that memory does not
-grow with their number.
+Results are in the order of completion. Only a few tasks are taken in advance, so that memory does
+not grow with their number.
 """
 
 
-def runner(workers: int) -> Runner:
-    """Return the runner with this number of processes; 1 is the calling process."""
-    return run_here if workers == 1 else partial(_run_in_processes, workers)
+class StopSignal(Cancellation):
+    """Cancellation of tasks that should stop, of which `check` asks at intervals."""
+
+    def __init__(self, stopped: StopCheck) -> None:
+        super().__init__()
+        self._stopped = stopped
+        self._checked = 0.0
+
+    @property
+    def requested(self) -> bool:
+        """Return whether the work should stop."""
+        return self._stopped()
+
+    def check(self) -> None:
+        """Raise Cancelled if the work should stop."""
+        now = time.monotonic()
+        if now - self._checked > POLL_INTERVAL:
+            self._checked = now
+            if self._stopped():
+                raise Cancelled
+
+
+def runner(workers: int, resumes: str = RESUMES) -> Runner:
+    """Return the runner with this number of processes; 1 is the calling process.
+
+    resumes: end of the message if a process dies.
+    """
+    return run_here if workers == 1 else partial(_run_in_processes, workers, resumes)
 
 
 def usable_cores() -> int:
@@ -53,32 +79,35 @@ def usable_cores() -> int:
 
 
 def run_here(
-    work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
-) -> Iterator[ChunkResult]:
+    function: Function, tasks: Iterator[Task], stopped: StopCheck = lambda: False
+) -> Iterator[Result]:
     """Run the tasks in this process, one after another."""
+    context = copy_context()
+    context.run(cancellation.current.set, StopSignal(stopped))
     for task in tasks:
         if stopped():
             return
         try:
-            yield chunks.make_chunk(work, task, stopped)
-        except ChunkAbandoned:
+            result = context.run(function, task)
+        except Cancelled:
             return
+        yield result
 
 
 def _run_in_processes(
-    workers: int, work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
-) -> Iterator[ChunkResult]:
+    workers: int, resumes: str, function: Function, tasks: Iterator[Task], stopped: StopCheck
+) -> Iterator[Result]:
     first = list(islice(tasks, workers))
     tasks = chain(first, tasks)
     # Starting a process takes as long as making a thousand clips.
     if len(first) < 2:
-        return run_here(work, tasks, stopped)
-    return _run_in_pool(len(first), work, tasks, stopped)
+        return run_here(function, tasks, stopped)
+    return _run_in_pool(len(first), resumes, function, tasks, stopped)
 
 
 def _run_in_pool(
-    workers: int, work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
-) -> Iterator[ChunkResult]:
+    workers: int, resumes: str, function: Function, tasks: Iterator[Task], stopped: StopCheck
+) -> Iterator[Result]:
     """Run the tasks in a pool.
 
     Raises WorkerDied if a worker process dies, and the MotionError of a failed task.
@@ -87,47 +116,45 @@ def _run_in_pool(
     stop_seen, stop = context.Pipe(duplex=False)
     # Small arguments only: a write beyond a pipe's capacity to a dead worker never returns.
     pool = ProcessPoolExecutor(workers, context, _start_worker, (stop_seen,))
-    pending: set[Future[ChunkResult | None]] = set()
+    pending: set[Future[Result]] = set()
     try:
         while not stopped():
             ahead = islice(tasks, 2 * workers - len(pending))
-            pending |= {_submit(pool, work, task) for task in ahead}
+            pending |= {_submit(pool, function, task) for task in ahead}
             if not pending:
                 return
             done, pending = wait(pending, POLL_INTERVAL, FIRST_COMPLETED)
             yield from _completed_results(done)
         stop.close()
-        left = [future for future in pending if not future.cancel()]
-        yield from _completed_results(wait(left).done)
-    except BrokenProcessPool as fault:
+        running = [future for future in pending if not future.cancel()]
+        yield from _completed_results(wait(running).done)
+    except BrokenProcessPool as error:
         # The pool waits for ever for a worker that was being started when another died.
         for child in multiprocessing.active_children():
             child.terminate()
         # The signal that ended the worker may be about to reach this process.
         time.sleep(POLL_INTERVAL)
         if not stopped():
-            raise WorkerDied(f"a worker process has died; {RESUMES}") from fault
+            raise WorkerDied(f"a worker process has died; {resumes}") from error
     finally:
         stop.close()
         pool.shutdown(cancel_futures=True)
         stop_seen.close()
 
 
-def _completed_results(done: "Iterable[Future[ChunkResult | None]]") -> Iterator[ChunkResult]:
+def _completed_results(done: "Iterable[Future[Result]]") -> Iterator[Result]:
     # An abandoned task has no result.
-    return (part for future in done if (part := future.result()) is not None)
+    return (result for future in done if (result := future.result()) is not None)
 
 
-def _submit(
-    pool: ProcessPoolExecutor, work: WorkerInput, task: ChunkTask
-) -> "Future[ChunkResult | None]":
+def _submit(pool: ProcessPoolExecutor, function: Function, task: Task) -> "Future[Result]":
     # A submission may start a worker, which inherits this environment.
     with worker_environment():
         try:
-            return pool.submit(_run_task, work, task)
-        except OSError as fault:
+            return pool.submit(_run_task, function, task)
+        except OSError as error:
             # Another worker died while this one was started: the pool's pipes are closed already.
-            raise BrokenProcessPool(f"a worker could not be started: {fault}") from fault
+            raise BrokenProcessPool(f"a worker could not be started: {error}") from error
 
 
 @contextmanager
@@ -148,14 +175,9 @@ def worker_environment() -> Iterator[None]:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
-_stopped: StopCheck = lambda: False  # noqa: E731
-"""Returns true in a worker when the export should stop."""
-
-
 def _start_worker(stop_seen: Connection) -> None:
-    global _stopped
     # Readable once the parent has closed its end.
-    _stopped = stop_seen.poll
+    cancellation.current.set(StopSignal(stop_seen.poll))
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -167,36 +189,16 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _run_task(work: WorkerInput, task: ChunkTask) -> ChunkResult | None:
-    """Make a chunk in a worker; return None if it was abandoned."""
+def _run_task(function: Function, task: Task) -> Result:
+    """Run a task in a worker; return None if it was abandoned."""
+    signal = cancellation.current.get()
     # The pool hands over a few tasks in advance, which it cannot cancel.
-    if _stopped():
+    if signal is not None and signal.requested:
         return None
     try:
-        return chunks.make_chunk(work, task, _stopped)
-    except ChunkAbandoned:
+        return function(task)
+    except Cancelled:
         return None
-
-
-def results(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
-    """Yield the result of each job in order.
-
-    work: a function that can be pickled. Raises WorkerDied if a process ended before its work.
-    """
-    if min(workers, len(jobs)) < 2:
-        yield from map(work, jobs)
-        return
-    context = multiprocessing.get_context("spawn")
-    with worker_environment():
-        pool = ProcessPoolExecutor(min(workers, len(jobs)), context)
-        futures = [pool.submit(work, job) for job in jobs]
-    try:
-        for future in futures:
-            yield future.result()
-    except BrokenProcessPool as fault:
-        raise WorkerDied("a worker process has died; the same command resumes") from fault
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -208,25 +210,15 @@ def cluster_runner(address: str) -> Iterator[Runner]:
     # Imported here because distributed is an optional extra.
     from posefield.common import dask_cluster
 
-    def run(
-        work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
-    ) -> Iterator[ChunkResult]:
+    def run(function: Function, tasks: Iterator[Task], stopped: StopCheck) -> Iterator[Result]:
         packages = ("posefield", *VERSIONED_PACKAGES)
-        for part in dask_cluster.results(client, _make_on_cluster, (work,), zip(tasks), packages):
-            yield part
+        for result in dask_cluster.results(client, function, (), zip(tasks), packages):
+            yield result
             if stopped():
                 return
 
     try:
         with dask_cluster.connect(address) as client:
             yield run
-    except ClusterError as fault:
-        raise ClusterError(fault.address, f"{fault.message}; {RESUMES}") from fault
-
-
-def _make_on_cluster(work: WorkerInput, task: ChunkTask) -> ChunkResult:
-    """Make a chunk on a worker; FileError if it does not see the target."""
-    if open_target(work.target).read(checkpoint.JOB) is None:
-        expected = "expected a folder that all machines share, or an object store's URL"
-        raise FileError(work.target, f"holds no export on a worker; {expected}")
-    return chunks.make_chunk(work, task)
+    except ClusterError as error:
+        raise ClusterError(error.address, f"{error.message}; {RESUMES}") from error

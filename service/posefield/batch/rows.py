@@ -5,18 +5,18 @@ values of JSON and Parquet as a body. It leaves open the controls without a valu
 without one have the defaults of the command. A table is CSV, JSON Lines or Parquet, by its ending,
 and is read anew at each pass, a few rows at a time.
 
-    source = open_source(SourceOptions(path), Defaults("usdc"), model)
+    source = open_source(model, "usdc", path=path)
     for row in source.rows(): ...
 """
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain, product
 from math import prod
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import orjson
@@ -32,27 +32,30 @@ from posefield.question.motion_question import LEGAL_NAME, ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
+Question = TypeVar("Question", covariant=True)
+
 MAX_POINTS = 10**9
 """Points of the largest grid; a greater number is considered a typing error."""
 MAX_STEPS = 10**6
 """Values of one axis of a grid, which are held in memory."""
 METHOD, SEED = "latin", 0
+DEFAULTS = ClipQuestion(controls={})
 REPEATED_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
 TEXT_FIELDS = ("exact", "floor", "targets", "labels")
 """Fields that JSON and Parquet may have as text, too."""
 
 
 @dataclass(frozen=True)
-class ClipQuery:
-    """A clip to be made.
+class Row(Generic[Question]):
+    """A question of many, which gives a file.
 
-    name: of the clip. format: of its file. question: its question. place: origin in the source,
-    such as "line 7".
+    name: of the file, without extension. format: its extension; empty where all rows have that of a
+    batch. place: origin of the question, such as "queries.csv:7".
     """
 
     name: str
     format: str
-    question: ClipQuestion
+    question: Question
     place: str
 
 
@@ -64,81 +67,54 @@ class RowFault:
     message: str
 
 
-class RowSource(Protocol):
-    """Source of rows: the same rows in the same order at each pass."""
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 of all parameters and data that determine the queries, except the model."""
-
-    def rows(self) -> Iterator[ClipQuery | RowFault]:
-        """Yield the rows, decoded; FileError if the rest cannot be read or has changed."""
-
-    def check(self, query: ClipQuery) -> None:
-        """Raise the QueryError of a row without an answer, as far as it is known at once."""
-
-
-@dataclass(frozen=True)
-class SourceOptions:
-    """Source options of the command line: exactly one of path, grid and sample.
-
-    path: of a file. grid: NAME=VALUES texts. sample: number of points. method, seed: of a sampling
-    only.
-    """
-
-    path: Path | None = None
-    grid: tuple[str, ...] = ()
-    sample: int | None = None
-    method: str | None = None
-    seed: int | None = None
-
-
-@dataclass(frozen=True)
-class Defaults:
-    """Defaults of missing values; the question's controls are not used."""
-
-    format: str
-    question: ClipQuestion = field(default_factory=lambda: ClipQuestion(controls={}))
+CheckedRow = Row[ClipQuestion] | RowFault
 
 
 @dataclass(frozen=True)
 class RowReader:
-    """Queries of the rows of a source, for one model.
+    """Rows of a source for one model: the same rows in the same order at each pass.
 
     raw: begins a pass. text: whether cells are text. named: whether rows may give names; generated
-    ones are unique. usual: defaults of missing values. digest: of the source.
+    ones are unique. format, question: defaults of missing values; the controls are not used.
+    digest: SHA-256 of all parameters and data that determine the rows, except the model.
     """
 
     raw: RawRows
     text: bool
     named: bool
     model: Synthesizer
-    usual: Defaults
+    format: str
+    question: ClipQuestion
     digest: str
 
-    def rows(self) -> Iterator[ClipQuery | RowFault]:
-        """Yield a query, or the fault of a row that is none or has the name of another."""
+    def rows(self) -> Iterator[CheckedRow]:
+        """Yield a row, or the fault of one that is no question or has the name of another.
+
+        Raises FileError if the rest cannot be read or has changed.
+        """
         names: set[str] = set()
         for index, (place, cells) in enumerate(self.raw()):
             try:
                 if isinstance(cells, QueryError):
                     raise cells
-                query = self._query(place, index, cells)
-                if self.named and query.name.lower() in names:
-                    raise InvalidField("name", f"{query.name!r}, {REPEATED_NAME}")
-            except QueryError as fault:
-                yield RowFault(place, str(fault))
+                row = self._decode(place, index, cells)
+                if self.named and row.name.lower() in names:
+                    raise InvalidField("name", f"{row.name!r}, {REPEATED_NAME}")
+            except QueryError as error:
+                yield RowFault(place, str(error))
                 continue
             if self.named:
-                names.add(query.name.lower())
-            yield query
+                names.add(row.name.lower())
+            yield row
 
-    def check(self, query: ClipQuery) -> None:
-        """Raise the error of a question that the model cannot answer."""
-        clips.check(self.model, query.question)
+    def check(self, row: Row[ClipQuestion]) -> None:
+        """Raise the QueryError of a row without an answer, as far as it is known at once."""
+        clips.check(self.model, row.question)
 
-    def _query(self, place: str, index: int, cells: Iterable[tuple[Column, Any]]) -> ClipQuery:
-        name, extension = generated_name(index), self.usual.format
+    def _decode(
+        self, place: str, index: int, cells: Iterable[tuple[Column, Any]]
+    ) -> Row[ClipQuestion]:
+        name, extension = generated_name(index), self.format
         texts: list[tuple[str, str]] = []
         text_fields: set[str] = set()
         values: dict[str, Any] = {}
@@ -154,22 +130,22 @@ class RowReader:
                 (values.setdefault(column.group, {}) if column.group else values)[column.name] = (
                     cell
                 )
-        question = self.usual.question
+        question = self.question
         if texts:
-            row = text_decoding.decode_question(ClipQuestion, texts)
-            question = _merged(question, row, text_fields)
+            decoded = text_decoding.decode_question(ClipQuestion, texts)
+            question = _merged(question, decoded, text_fields)
         if values:
-            row = json_decoding.convert_question(ClipQuestion, {"controls": {}} | values)
-            question = _merged(question, row, values)
-        return ClipQuery(name, extension, question, place)
+            decoded = json_decoding.convert_question(ClipQuestion, {"controls": {}} | values)
+            question = _merged(question, decoded, values)
+        return Row(name, extension, question, place)
 
 
-def _merged(usual: ClipQuestion, row: ClipQuestion, fields: Iterable[str]) -> ClipQuestion:
+def _merged(defaults: ClipQuestion, row: ClipQuestion, fields: Iterable[str]) -> ClipQuestion:
     """Return a question with the fields of a row that have a value; other labels remain."""
-    given = {name: getattr(row, name) for name in fields}
-    if "labels" in given:
-        given["labels"] = {**usual.labels, **row.labels}
-    return structs.replace(usual, **given)
+    values = {name: getattr(row, name) for name in fields}
+    if "labels" in values:
+        values["labels"] = {**defaults.labels, **row.labels}
+    return structs.replace(defaults, **values)
 
 
 def _checked_format(cell: object) -> str:
@@ -203,42 +179,60 @@ def repeated_names(names: Iterable[str]) -> Iterator[int]:
         seen.add(name.lower())
 
 
-def open_source(asked: SourceOptions, usual: Defaults, model: Synthesizer) -> RowReader:
-    """Return the source of the queries, with defaults for missing values.
+def open_source(
+    model: Synthesizer,
+    format: str,  # noqa: A002  # as the command's option
+    question: ClipQuestion = DEFAULTS,
+    *,
+    path: Path | None = None,
+    grid: Sequence[str] = (),
+    sample: int | None = None,
+    method: str | None = None,
+    seed: int | None = None,
+) -> RowReader:
+    """Return the rows of a file, a grid or a sampling, exactly one of which is given.
 
-    Raises InvalidField, UnknownFormat and OutsideSamples for invalid options, and FileError for a
-    file that cannot be read or has a heading that does not fit the model.
+    format, question: defaults of missing values. grid: NAME=VALUES texts. sample: number of points.
+    method, seed: of a sampling only. Raises InvalidField, UnknownFormat and OutsideSamples for
+    invalid options, and FileError for a file that cannot be read or has a heading that does not fit
+    the model.
     """
-    _check_single_source(asked)
-    _checked_format(usual.format)
+    options = {"a file": path, "--grid": grid or None, "--sample": sample}
+    sources = [name for name, option in options.items() if option is not None]
+    if len(sources) != 1:
+        found = " and ".join(sources) or "none"
+        raise InvalidField("queries", f"{found}, expected one of {', '.join(options)}")
+    for name, option in (("method", method), ("seed", seed)):
+        if option is not None and sample is None:
+            raise InvalidField(name, "without --sample, expected with it")
+    _checked_format(format)
     card = model.session.card
     middle = {control.name: control.default for control in card.controls}
-    clips.check(model, structs.replace(usual.question, controls=middle))
+    clips.check(model, structs.replace(question, controls=middle))
     columns = tables.table_columns(card)
     spec: dict[str, Any]
     raw: RawRows
-    if asked.path:
-        ending = asked.path.suffix.lower()
-        if ending not in TABLES:
-            found = f"{asked.path.name!r} ends in none of {', '.join(TABLES)}"
-            raise UnknownFormat("queries", found)
-        table = tables.open_table(asked.path, columns)
-        raw, text, named = table.rows, ending == ".csv", True
-        spec = {"file": ending, "sha256": table.digest}
-    elif asked.grid:
-        axes = parse_grid(asked.grid, columns)
+    if path:
+        extension = path.suffix.lower()
+        if extension not in TABLES:
+            raise UnknownFormat("queries", f"{path.name!r} ends in none of {', '.join(TABLES)}")
+        table = tables.open_table(path, columns)
+        raw, text, named = table.rows, extension == ".csv", True
+        spec = {"file": extension, "sha256": table.digest}
+    elif grid:
+        axes = parse_grid(grid, columns)
         raw, text, named = partial(_grid_rows, axes), True, False
         spec = {"grid": [[column.field, column.name, texts] for column, texts in axes]}
     else:
-        method, seed = asked.method or METHOD, SEED if asked.seed is None else asked.seed
-        count = asked.sample or 0
+        method, seed, count = method or METHOD, SEED if seed is None else seed, sample or 0
         sampling.check_sampling(method, count, seed)
-        drawn = tuple(columns[f"controls/{control.name}"] for control in card.controls)
-        raw = partial(_sampled_rows, drawn, partial(sampling.METHODS[method], card, count, seed))
+        sampled = tuple(columns[f"controls/{control.name}"] for control in card.controls)
+        raw = partial(_sampled_rows, sampled, partial(sampling.METHODS[method], card, count, seed))
         text, named, spec = False, False, {"method": method, "count": count, "seed": seed}
-    spec |= {"format": usual.format, "usual": to_builtins(usual.question)}
-    plain = orjson.dumps(spec, option=orjson.OPT_SORT_KEYS)
-    return RowReader(raw, text, named, model, usual, hashlib.sha256(plain).hexdigest())
+    spec |= {"format": format, "usual": to_builtins(question)}
+    content = orjson.dumps(spec, option=orjson.OPT_SORT_KEYS)
+    digest = hashlib.sha256(content).hexdigest()
+    return RowReader(raw, text, named, model, format, question, digest)
 
 
 def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
@@ -246,30 +240,16 @@ def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
 
     Raises as `open_source` does, and InvalidField for an invalid row.
     """
-    found = []
-    for row in open_source(SourceOptions(path), Defaults("usdc"), model).rows():
+    controls = []
+    for row in open_source(model, "usdc", path=path).rows():
         if isinstance(row, RowFault):
             raise InvalidField("candidates", f"{row.place}: {row.message}")
         try:
             clips.check(model, row.question)
-        except QueryError as fault:
-            raise InvalidField("candidates", f"{row.place}: {fault}") from fault
-        found.append(model.question(row.question).controls)
-    return found
-
-
-def _check_single_source(asked: SourceOptions) -> None:
-    given = {
-        "a file": asked.path is not None,
-        "--grid": bool(asked.grid),
-        "--sample": asked.sample is not None,
-    }
-    if sum(given.values()) != 1:
-        found = " and ".join(name for name, there in given.items() if there) or "none"
-        raise InvalidField("queries", f"{found}, expected one of {', '.join(given)}")
-    for option in ("method", "seed"):
-        if getattr(asked, option) is not None and asked.sample is None:
-            raise InvalidField(option, "without --sample, expected with it")
+        except QueryError as error:
+            raise InvalidField("candidates", f"{row.place}: {error}") from error
+        controls.append(model.question(row.question).controls)
+    return controls
 
 
 def parse_grid(texts: Sequence[str], columns: Columns) -> list[tuple[Column, list[str]]]:
@@ -296,9 +276,9 @@ def parse_grid(texts: Sequence[str], columns: Columns) -> list[tuple[Column, lis
                 raise ValueError("an empty value, expected one between commas")
         except ValueError as fault:
             raise InvalidField("grid", f"{text!r}: {fault}") from fault
-    used = [column for column, _ in axes]
-    for index, column in enumerate(used):
-        if column in used[:index]:
+    columns_used = [column for column, _ in axes]
+    for index, column in enumerate(columns_used):
+        if column in columns_used[:index]:
             raise InvalidField("grid", f"{column.name!r} twice, expected once")
     count = prod(len(values) for _, values in axes)
     if count > MAX_POINTS:
@@ -325,8 +305,8 @@ def _grid_rows(axes: Sequence[tuple[Column, Sequence[str]]]) -> Iterator[RawRow]
 
 
 def _sampled_rows(
-    columns: Sequence[Column], drawn: Callable[[], Iterator[Floats]]
+    columns: Sequence[Column], draw: Callable[[], Iterator[Floats]]
 ) -> Iterator[RawRow]:
     """Yield the points of a sampling, drawn in blocks (n, d)."""
-    for number, point in enumerate(chain.from_iterable(map(np.ndarray.tolist, drawn())), start=1):
+    for number, point in enumerate(chain.from_iterable(map(np.ndarray.tolist, draw())), start=1):
         yield f"sample {number}", zip(columns, point, strict=True)

@@ -7,15 +7,15 @@ from functools import partial
 from itertools import islice
 from typing import Any, Protocol
 
-from posefield.batch import checkpoint, chunks, layouts, process_pool
+from posefield.batch import checkpoint, clip_files, layouts, process_pool
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.chunks import MAX_KEPT_FAULTS, ChunkTask
-from posefield.batch.job import ExportJob, WorkerInput
+from posefield.batch.clip_files import MAX_KEPT_FAULTS
+from posefield.batch.job import WorkerInput
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows import ClipQuery, RowFault, RowSource
+from posefield.batch.rows import CheckedRow, Row, RowFault, RowReader
 from posefield.batch.target import STATE_FOLDER, open_target
 from posefield.common.errors import FileError, InvalidField, QueryError
-from posefield.encode.formats import CLIP_ENCODERS
+from posefield.question.motion_question import ClipQuestion
 
 
 class RunMonitor(Protocol):
@@ -24,7 +24,7 @@ class RunMonitor(Protocol):
     def begin(self, total: int, done: int) -> None:
         """Begin a run; `done` of the `total` rows were finished by earlier runs."""
 
-    def advance(self, part: ChunkResult) -> None:
+    def advance(self, result: ChunkResult) -> None:
         """Record a finished chunk."""
 
     def note(self, message: str) -> None:
@@ -32,6 +32,10 @@ class RunMonitor(Protocol):
 
     def stopped(self) -> bool:
         """Return whether the run should end; chunks in work are finished or abandoned."""
+
+
+Misfit = Callable[[Row[ClipQuestion]], str | None]
+"""Returns the reason for which a job cannot write a row, or None."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ class RunOutcome:
 
 def run(
     work: WorkerInput,
-    source: RowSource,
+    source: RowReader,
     monitor: RunMonitor,
     runner: Runner = process_pool.run_here,
     shard: Shard = Shard(),
@@ -93,8 +97,9 @@ def run(
             return RunOutcome(rows, rows, facts, already_complete=True)
         monitor.note(f"{work.target}/{path}: missing or damaged; the export is made again")
         checkpoint.reopen(target, job)
-    misfit = _misfit(work)
-    total = check_rows(source, work.skip, misfit)
+    if work.character is not None:
+        check_character_layout(job.layout)
+    total = check_rows(source, work.skip, partial(_misfit, work))
     count = math.ceil(total / job.chunk)
     sizes = {
         number: min(job.chunk, total - number * job.chunk)
@@ -111,10 +116,10 @@ def run(
         }
         done = rows - sum(sizes[number] for number in left)
         monitor.begin(rows, done)
-        tasks = _tasks(_checked_rows(source, misfit), job.chunk, left)
-        for part in runner(work, tasks, monitor.stopped):
-            done += part.clips + len(part.skipped)
-            monitor.advance(part)
+        pending = _chunks(_checked_rows(source, partial(_misfit, work)), job.chunk, left)
+        for result in runner(partial(clip_files.make_chunk, work), pending, monitor.stopped):
+            done += result.clips + len(result.skipped)
+            monitor.advance(result)
     except FileError:
         # Another run of the same export may have completed it meanwhile, or during the survey.
         if (facts := checkpoint.completed_facts(target, work)) is None:
@@ -123,21 +128,17 @@ def run(
     return RunOutcome(rows, done, None if done < rows else checkpoint.finish(target, work, count))
 
 
-def _tasks(
-    rows: Iterator[ClipQuery | RowFault], size: int, numbers: set[int]
-) -> Iterator[ChunkTask]:
-    """Yield the tasks of some chunks of `size` rows, from one pass through the rows."""
+def _chunks(
+    rows: Iterator[CheckedRow], size: int, numbers: set[int]
+) -> Iterator[tuple[int, tuple[CheckedRow, ...]]]:
+    """Yield number and rows of some chunks of `size` rows, from one pass through the rows."""
     for number in range(max(numbers, default=-1) + 1):
         chunk = tuple(islice(rows, size))
         if number in numbers:
-            yield ChunkTask(number, number * size, chunk)
+            yield number, chunk
 
 
-Misfit = Callable[[ClipQuery], str | None]
-"""Returns the reason for which a job cannot write a query, or None."""
-
-
-def check_rows(source: RowSource, skip: bool, misfit: Misfit = lambda query: None) -> int:
+def check_rows(source: RowReader, skip: bool, misfit: Misfit = lambda row: None) -> int:
     """Return the number of rows, each checked, without keeping any.
 
     Raises InvalidField for faults that are not skipped, or if all rows are faults.
@@ -146,41 +147,53 @@ def check_rows(source: RowSource, skip: bool, misfit: Misfit = lambda query: Non
     for row in _checked_rows(source, misfit):
         total += 1
         try:
-            if isinstance(row, ClipQuery):
+            if isinstance(row, Row):
                 source.check(row)
                 continue
-        except QueryError as fault:
-            row = RowFault(row.place, str(fault))
+        except QueryError as error:
+            row = RowFault(row.place, str(error))
         faulty += 1
         faults += [row] if faulty <= MAX_KEPT_FAULTS else []
     if faulty and not skip:
-        raise chunks.invalid_rows_error(faulty, faults)
+        raise clip_files.invalid_rows_error(faulty, faults)
     if faulty == total:
         raise InvalidField("queries", "no row that can be answered, expected at least one")
     return total
 
 
-def _checked_rows(source: RowSource, misfit: Misfit) -> Iterator[ClipQuery | RowFault]:
-    """Yield the rows, with faults in place of the queries that the job cannot write."""
+def _checked_rows(source: RowReader, misfit: Misfit) -> Iterator[CheckedRow]:
+    """Yield the rows, with faults in place of those that the job cannot write."""
     for row in source.rows():
-        why = misfit(row) if isinstance(row, ClipQuery) else None
-        yield row if why is None else RowFault(row.place, why)
+        reason = misfit(row) if isinstance(row, Row) else None
+        yield row if reason is None else RowFault(row.place, reason)
 
 
-def _misfit(work: WorkerInput) -> Misfit:
-    job = work.job
-    if work.character is not None:
-        chunks.check_character_layout(job.layout)
-        return partial(chunks.character_misfit, work)
-    misfit = layouts.find_layout(job.layout).misfit
-    if misfit is None and (job.unit or job.up or job.body):
-        misfit = _convention_misfit
-    return (lambda query: None) if misfit is None else partial(misfit, job)
-
-
-def _convention_misfit(job: ExportJob, query: ClipQuery) -> str | None:
+def _misfit(work: WorkerInput, row: Row[ClipQuestion]) -> str | None:
+    """Return why the clip of a row cannot be written, or delivered to a character; else None."""
+    reason = layouts.find_layout(work.job.layout).misfit(work.job, row)
+    if reason is not None:
+        return reason
     try:
-        CLIP_ENCODERS[query.format].convention(job.unit, job.up, job.body)
-    except InvalidField as fault:
-        return str(fault)
+        delivery = clip_files.clip_format(work, row.format).delivery
+        if delivery is not None:
+            delivery.character.target.check(row.question)
+    except InvalidField as error:
+        return str(error)
     return None
+
+
+CHARACTER_LAYOUT = "folder"
+"""Layout whose files refer to the file of a character."""
+
+
+def check_character_layout(layout: str) -> None:
+    """Raise InvalidField for a layout other than loose files.
+
+    Those of an archive would refer to the character from wherever they are unpacked, and a library
+    has the character of its model.
+    """
+    if layout != CHARACTER_LAYOUT:
+        raise InvalidField(
+            "layout",
+            f"{layout!r} with a character, expected {CHARACTER_LAYOUT!r}: files refer to its file",
+        )

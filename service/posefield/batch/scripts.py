@@ -12,7 +12,7 @@ a model or a version changed.
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -23,7 +23,14 @@ import orjson
 
 from posefield import __version__
 from posefield.batch import checkpoint, process_pool, tables
-from posefield.batch.job import VERSIONED_PACKAGES, manifest_entry, manifest_line
+from posefield.batch.job import (
+    MANIFEST,
+    VERSIONED_PACKAGES,
+    ExportedFile,
+    exported_file,
+    manifest_line,
+)
+from posefield.batch.rows import Row
 from posefield.batch.target import (
     STATE_FOLDER,
     ExportTarget,
@@ -34,13 +41,12 @@ from posefield.batch.target import (
     read_lines,
 )
 from posefield.characters import delivery
-from posefield.characters.delivery import Delivery
 from posefield.characters.user_character import UserCharacter
 from posefield.common import cancellation
 from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode import formats
-from posefield.encode.conventions import Convention
-from posefield.encode.formats import CLIP_ENCODERS, PerformanceEncoder
+from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder
+from posefield.model import MAX_FRAMES
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question import json_decoding
@@ -48,21 +54,12 @@ from posefield.question.performance_question import NamedScript, PerformanceLayo
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
-from posefield.synthesis.poses import MAX_POSES
 
 Entry = dict[str, Any]
+ScriptRow = Row[NamedScript]
 LINES = ".jsonl"
 MAX_LINE_BYTES = 256 * 1024
 MAX_SHOWN_FAULTS = 10
-
-
-@dataclass(frozen=True)
-class ScriptRow:
-    """A script of many. place: file and line, for messages. name: of its file, without ending."""
-
-    place: str
-    name: str
-    script: NamedScript
 
 
 def are_many(path: Path) -> bool:
@@ -84,13 +81,13 @@ def read_scripts(path: Path) -> tuple[ScriptRow, ...]:
             if len(content) > MAX_LINE_BYTES:
                 raise InvalidField("", f"{len(content)} bytes, expected at most {MAX_LINE_BYTES}")
             script = json_decoding.decode_question(NamedScript, content)
-            row = ScriptRow(place, script.name or name, script)
+            row = Row(script.name or name, "", script, place)
             if row.name in rows:
                 other = rows[row.name].place
                 raise InvalidField("name", f"{row.name!r} is that of {other}, expected another")
             rows[row.name] = row
-        except QueryError as fault:
-            faults.append(f"{place}: {fault}")
+        except QueryError as error:
+            faults.append(f"{place}: {error}")
     if faults:
         raise faulty_scripts(faults)
     if not rows:
@@ -122,70 +119,80 @@ def _contents(path: Path) -> Iterator[tuple[str, str, bytes]]:
 
 
 @dataclass(frozen=True)
+class PerformanceFormat:
+    """Files of performances: their format, and the layout of USD files.
+
+    character: of a user, that moves instead of those of the scripts.
+    """
+
+    encoder: ClipEncoder
+    layout: PerformanceLayout = "whole"
+    character: UserCharacter | None = None
+
+    def file(self, script: Script, most: int) -> tuple[PerformanceAnswer, bytes]:
+        """Return the performance of a script of at most so many frames, and its file."""
+        question = script.question
+        if self.character is None:
+            encode = formats.performance_encoder(self.encoder, self.layout)
+            convention = self.encoder.convention(question.unit, question.up, question.body)
+            answer = composition.perform(script, most)
+            return answer, encode(answer, convention)
+        order = delivery.deliver(self.character, self.encoder, question)
+        answer = composition.perform(script, most)
+        answer = order.performance(answer, script.character.roles)
+        return answer, order.encode(answer)
+
+    def check(self, script: Script) -> None:
+        """Raise InvalidField for a script whose performance a file of the format cannot hold."""
+        question, whom = script.question, script.character
+        if self.character is None:
+            self.encoder.convention(question.unit, question.up, question.body)
+        else:
+            order = delivery.deliver(self.character, self.encoder, question)
+            order.check_layout(self.layout)
+            order.check(question, whom.skeleton, whom.roles)
+
+
+@dataclass(frozen=True)
 class ArchivedScript:
     """A planned script.
 
-    file: name of its file, with the extension. convention: unit and up axis of the file. most:
-    largest number of frames. warned: whether its plan has a warning.
+    name: of its file, without extension. frames: largest number of them. warned: whether its plan
+    has a warning.
     """
 
     name: str
-    file: str
     script: Script
-    convention: Convention
-    most: int
+    frames: int
     warned: bool
 
 
 @dataclass(frozen=True)
 class PerformanceOrder:
-    """Planned scripts of one format.
-
-    encode: writes their files. delivery: to a character of a user; None for those of the scripts.
-    """
+    """Planned scripts, and the format of their files."""
 
     scripts: Sequence[ArchivedScript]
-    encode: PerformanceEncoder
-    delivery: Delivery | None = None
-
-    def file(self, one: ArchivedScript) -> tuple[PerformanceAnswer, bytes]:
-        """Return the performance of a script, and its file."""
-        answer = composition.perform(one.script, one.most)
-        if self.delivery is None:
-            return answer, self.encode(answer, one.convention)
-        own = replace(self.delivery, convention=one.convention)
-        made = own.performance(answer, one.script.character.roles)
-        return made, own.encode(made)
+    format: PerformanceFormat
 
     @property
     def warnings(self) -> list[str]:
         """Warning with the number of scripts that have some; the manifest has those of each."""
-        count = sum(own.warned for own in self.scripts)
-        every = len(self.scripts)
-        return [f"{count} of {every} performances have warnings"] if count else []
+        count, total = sum(planned.warned for planned in self.scripts), len(self.scripts)
+        return [f"{count} of {total} performances have warnings"] if count else []
+
+    def files(self) -> Iterator[ExportedFile]:
+        """Yield the file of each performance, which is made when it is requested."""
+        for planned in self.scripts:
+            cancellation.check()
+            path = f"{planned.name}.{self.format.encoder.extension}"
+            # No name for the answer: it is not in memory while the next one is made.
+            yield exported_file(
+                planned.name, path, *self.format.file(planned.script, planned.frames)
+            )
 
 
-def archive_members(order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each performance's file in the order given, then the manifest.
-
-    A performance is made when its file is requested; of earlier ones only manifest lines remain in
-    memory.
-    """
-    lines = bytearray()
-    for own in order.scripts:
-        cancellation.check()
-        answer, content = order.file(own)
-        lines += manifest_line(manifest_entry(own.name, own.file, content, answer))
-        # Not in memory while the next one is made.
-        del answer
-        yield own.file, content
-        del content
-    yield MANIFEST, bytes(lines)
-
-
-MAX_FRAMES = 10 * MAX_POSES
 FOLDER = "performances"
-MANIFEST, PARTS = "manifest.jsonl", f"{STATE_FOLDER}/performances"
+PARTS = f"{STATE_FOLDER}/performances"
 MARK = f"{STATE_FOLDER}/performances.json"
 """File of a target whose performances are not finished."""
 
@@ -208,26 +215,10 @@ class PerformanceBatch:
     def __post_init__(self) -> None:
         formats.performance_encoder(CLIP_ENCODERS[self.form], self.layout)
 
-    def file(self, script: Script) -> tuple[PerformanceAnswer, bytes]:
-        """Return the performance of a script, and its file."""
-        form, question = CLIP_ENCODERS[self.form], script.question
-        if self.character is None:
-            convention = form.convention(question.unit, question.up, question.body)
-            answer = composition.perform(script, MAX_FRAMES)
-            return answer, formats.performance_encoder(form, self.layout)(answer, convention)
-        order = delivery.deliver(self.character, form, question)
-        made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
-        return made, order.encode(made)
-
-    def check(self, script: Script) -> None:
-        """Raise InvalidField for what a file of the form cannot hold."""
-        form, question, own = CLIP_ENCODERS[self.form], script.question, script.character
-        if self.character is None:
-            form.convention(question.unit, question.up, question.body)
-        else:
-            order = delivery.deliver(self.character, form, question)
-            order.check_layout(self.layout)
-            order.check(question, own.skeleton, own.roles)
+    @property
+    def format(self) -> PerformanceFormat:
+        """Format of the files."""
+        return PerformanceFormat(CLIP_ENCODERS[self.form], self.layout, self.character)
 
 
 @dataclass(frozen=True)
@@ -250,10 +241,10 @@ class BatchOutcome:
     @property
     def sentence(self) -> str:
         """Return the totals in a sentence."""
-        found = self.facts("")
-        text = f"{found['performances']} performances, {found['bytes'] / 1e6:.1f} MB"
-        if found["warned"]:
-            text += f", with a warning in the manifest: {found['warned']}"
+        totals = self.facts("")
+        text = f"{totals['performances']} performances, {totals['bytes'] / 1e6:.1f} MB"
+        if totals["warned"]:
+            text += f", with a warning in the manifest: {totals['warned']}"
         return f"{text}, finished before: {self.before}" if self.before else text
 
 
@@ -271,18 +262,19 @@ def run(
     """
     digests = _checked(batch, rows)
     target = open_target(batch.place)
-    found = _finished(target, batch, rows, digests)
+    entries = _finished(target, batch, rows, digests)
     target.prepare()
     target.create(MARK, b"{}\n")
-    advance(len(found))
-    left = [(row, digests[row.name]) for row in rows if row.name not in found]
-    for entry in process_pool.results(partial(make_one, batch), left, workers):
-        found[entry["name"]] = entry
+    advance(len(entries))
+    missing = [(row, digests[row.name]) for row in rows if row.name not in entries]
+    runner = process_pool.runner(workers, "the same command resumes")
+    for entry in runner(partial(make_one, batch), iter(missing), lambda: False):
+        entries[entry["name"]] = entry
         advance(1)
-    entries = tuple(found[row.name] for row in rows)
-    put_file(target, MANIFEST, map(manifest_line, entries))
+    ordered = tuple(entries[row.name] for row in rows)
+    put_file(target, MANIFEST, map(manifest_line, ordered))
     target.remove(STATE_FOLDER)
-    return BatchOutcome(entries, len(rows) - len(left))
+    return BatchOutcome(ordered, len(rows) - len(missing))
 
 
 def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, str]:
@@ -292,11 +284,11 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
     faults: list[str] = []
     for row in rows:
         try:
-            script = resolve_script(row.script, registry.find)
-            batch.check(script)
+            script = resolve_script(row.question, registry.find)
+            batch.format.check(script)
             digests[row.name] = _digest(batch, script, registry)
-        except QueryError as fault:
-            faults.append(f"{row.place}: {fault}")
+        except QueryError as error:
+            faults.append(f"{row.place}: {error}")
     if faults:
         raise faulty_scripts(faults)
     return digests
@@ -304,15 +296,15 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
 
 def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) -> str:
     """Return a digest of all that determines the bytes of a performance."""
-    chosen, whom = script.question.character, batch.character
+    choice, character = script.question.character, batch.character
     facts = [
         batch.form,
         batch.layout,
         __version__,
         *(version(name) for name in VERSIONED_PACKAGES),
         *script.identities,
-        "" if chosen is None else registry.find(chosen.model).identity,
-        *([] if whom is None else whom.facts),
+        "" if choice is None else registry.find(choice.model).identity,
+        *([] if character is None else character.facts),
     ]
     content = msgspec.json.encode(script.question)
     return hashlib.sha256(orjson.dumps(facts) + content).hexdigest()
@@ -326,31 +318,31 @@ def _finished(
 ) -> dict[str, Entry]:
     """Return the entries of intact files by name; FileError for a target of something else."""
     try:
-        known = {entry["name"]: entry for entry in _recorded(target, rows)}
-        found = {
+        recorded = {entry["name"]: entry for entry in _recorded(target, rows)}
+        entries = {
             name: entry
-            for name, entry in known.items()
+            for name, entry in recorded.items()
             if entry["made_of"] == digests.get(name)
             and is_intact(
                 target, WrittenFile(entry["file"], entry["bytes"], entry["sha256"]), verify=False
             )
         }
-    except (ValueError, LookupError, TypeError) as fault:
+    except (ValueError, LookupError, TypeError) as error:
         raise FileError(
-            batch.place, f"holds another export, expected performances or nothing ({fault!r})"
-        ) from fault
+            batch.place, f"holds another export, expected performances or nothing ({error!r})"
+        ) from error
     if target.read(checkpoint.JOB) is not None:
         raise FileError(batch.place, "holds an export of clips, expected performances or nothing")
-    if not known and target.read(MARK) is None and not target.empty(but=STATE_FOLDER):
+    if not recorded and target.read(MARK) is None and not target.empty(but=STATE_FOLDER):
         raise FileError(batch.place, "is not empty and has no manifest of performances")
-    return found
+    return entries
 
 
 def _recorded(target: ExportTarget, rows: Iterable[ScriptRow]) -> Iterator[Entry]:
     """Yield the entries of the manifest, then those of files that were made after it."""
     yield from map(orjson.loads, read_lines(target, MANIFEST))
-    parts = target.names(PARTS)
-    for name in (row.name for row in rows if f"{row.name}.json" in parts):
+    files = target.names(PARTS)
+    for name in (row.name for row in rows if f"{row.name}.json" in files):
         yield orjson.loads(target.read(f"{PARTS}/{name}.json") or b"")
 
 
@@ -361,18 +353,19 @@ def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
     """
     row, digest = job
     try:
-        answer, content = batch.file(resolve_script(row.script, open_models(batch.models).find))
-    except QueryError as fault:
-        raise faulty_scripts([f"{row.place}: {fault}"]) from fault
+        script = resolve_script(row.question, open_models(batch.models).find)
+        answer, content = batch.format.file(script, MAX_FRAMES)
+    except QueryError as error:
+        raise faulty_scripts([f"{row.place}: {error}"]) from error
     path = f"{FOLDER}/{row.name}.{batch.form}"
     target = open_target(batch.place)
     put_file(target, path, [content])
-    entry = {**manifest_entry(row.name, path, content, answer), "made_of": digest}
+    entry = {**exported_file(row.name, path, answer, content).entry, "made_of": digest}
     target.write([(f"{PARTS}/{row.name}.json", manifest_line(entry))])
     return entry
 
 
 @lru_cache(maxsize=1)
-def open_models(places: tuple[Path, ...]) -> ModelRegistry:
+def open_models(paths: tuple[Path, ...]) -> ModelRegistry:
     """Return the models, cached so that a process opens them once."""
-    return model_registry.with_shipped(places)
+    return model_registry.with_shipped(paths)

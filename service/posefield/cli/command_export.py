@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
-from posefield.batch import chunks, layouts, process_pool, run, target
+from posefield.batch import layouts, process_pool, run, target
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.chunks import MAX_KEPT_FAULTS
+from posefield.batch.clip_files import MAX_KEPT_FAULTS
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.layouts import LAYOUTS
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows import Defaults, SourceOptions, open_source
+from posefield.batch.rows import open_source
 from posefield.batch.run import RunOutcome, Shard
 from posefield.common.errors import InvalidField
 from posefield.console.options import (
@@ -117,14 +117,24 @@ def export(
     """
     content = checked_file.read(model)
     opened = model_registry.open_model(model.stem, model, content)
-    source_options = SourceOptions(
-        rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed
+    source = open_source(
+        opened,
+        rows.form,
+        question,
+        path=rows.table,
+        grid=rows.grid or (),
+        sample=rows.sample,
+        method=rows.method,
+        seed=rows.seed,
     )
-    source = open_source(source_options, Defaults(rows.form, question), opened)
     layout = layouts.find_layout(execution.layout)
     character = _character(output, execution)
     if character is not None:
-        chunks.check_character_model(opened.session.card)
+        card = opened.session.card
+        # Modules that only exports for a character need.
+        from posefield.retarget import role_map
+
+        role_map.body_of_motion(card.skeleton, card.skeleton.offsets, card.roles)
     job = ExportJob(
         opened.identity,
         hashlib.sha256(content).hexdigest(),
@@ -163,9 +173,9 @@ def _character(output: str, execution: RunArguments) -> "UserCharacter | None":
         execution.refuse("with a URL as output, expected a folder: files refer to its file")
     if execution.scheduler is not None:
         execution.refuse("with --scheduler, expected --workers: the file is read on this machine")
-    character = execution.open(Path(output) / chunks.CHARACTER_FOLDER)
+    character = execution.open(Path(output) / layouts.CHARACTER_FOLDER)
     if character is not None:
-        chunks.check_character_layout(execution.layout)
+        run.check_character_layout(execution.layout)
     return character
 
 

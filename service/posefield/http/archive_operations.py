@@ -9,10 +9,11 @@ from contextlib import contextmanager
 
 from starlette.responses import Response
 
-from posefield.batch import clip_archive, rows, scripts
-from posefield.batch.clip_archive import ArchiveOrder
-from posefield.batch.rows import ClipQuery
-from posefield.batch.scripts import ArchivedScript, PerformanceOrder
+from posefield.batch import rows
+from posefield.batch.clip_files import ArchiveOrder, ClipFormat
+from posefield.batch.job import archive_members
+from posefield.batch.rows import Row
+from posefield.batch.scripts import ArchivedScript, PerformanceFormat, PerformanceOrder
 from posefield.characters import delivery
 from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common import cancellation
@@ -30,7 +31,7 @@ from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
 from posefield.question.json_decoding import json_pointer
-from posefield.question.motion_question import ClipsQuestion
+from posefield.question.motion_question import ClipsQuestion, NamedClipQuestion
 from posefield.question.performance_question import NamedScript, PerformancesQuestion
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis import clips
@@ -49,7 +50,7 @@ async def answer_clips(request: ServiceRequest) -> Response:
         clip_order, model, content, settings, service.characters, limiter=ARCHIVE_LIMITER
     )
     archive = ARCHIVE_WRITERS[request.format]
-    pieces = archive.write(clip_archive.archive_members(order))
+    pieces = archive.write(archive_members(order.files()))
     warnings, identity = order.warnings, model.identity
     return responses.stream(pieces, archive, model.name, warnings, ARCHIVE_LIMITER, identity)
 
@@ -67,7 +68,7 @@ async def answer_performances(request: ServiceRequest) -> Response:
         limiter=ARCHIVE_LIMITER,
     )
     archive = ARCHIVE_WRITERS[request.format]
-    pieces = archive.write(scripts.archive_members(order))
+    pieces = archive.write(archive_members(order.files()))
     return responses.stream(pieces, archive, "performances", order.warnings, LONG_LIMITER)
 
 
@@ -101,7 +102,7 @@ def clip_order(
             f"target counts as one, as {targets.OPEN_COST} where controls are left open",
         )
     queries = [
-        ClipQuery(name, body.format, clip, json_pointer("clips", str(index)))
+        Row(name, body.format, clip, json_pointer("clips", str(index)))
         for index, (name, clip) in enumerate(zip(names, body.clips, strict=True))
     ]
     card = model.session.card
@@ -113,11 +114,11 @@ def clip_order(
         joints = max(joints, order.joints)
     longest = min(max_poses(settings.output_limit, joints, encoder, len(card.curves)), MAX_POSES)
     previews = _previews(model, queries, longest, settings.clips_poses)
-    return ArchiveOrder(model, encoder, convention, queries, previews, order)
+    return ArchiveOrder(model, ClipFormat(encoder, convention, order), queries, previews)
 
 
 def _previews(
-    model: Synthesizer, queries: Sequence[ClipQuery], longest: int, limit: int
+    model: Synthesizer, queries: Sequence[Row[NamedClipQuestion]], longest: int, limit: int
 ) -> list[ClipPreview]:
     """Return the preview of each clip.
 
@@ -144,7 +145,7 @@ def script_order(
     """
     body = json_decoding.decode_question(PerformancesQuestion, content)
     encoder = _encoder(body.format)
-    encode = formats.performance_encoder(encoder, body.layout)
+    formats.performance_encoder(encoder, body.layout)
     _check_count("scripts", len(body.scripts), settings.performances_limit)
     segments = sum(len(script.segments) for script in body.scripts)
     if segments > settings.performances_segments:
@@ -157,7 +158,7 @@ def script_order(
     _check_names("script", names)
     if body.character is None:
         planned = tuple(_planned(library, encoder, names, body.scripts, settings, 0))
-        return PerformanceOrder(planned, encode)
+        return PerformanceOrder(planned, PerformanceFormat(encoder, body.layout))
     character = characters.find(body.character)
     for index, script in enumerate(body.scripts):
         with _element("scripts", index, "character"):
@@ -171,7 +172,7 @@ def script_order(
         with _element("scripts", index):
             body_of_script = entry.script.character
             order.check(entry.script.question, body_of_script.skeleton, body_of_script.roles)
-    return PerformanceOrder(planned, encode, order)
+    return PerformanceOrder(planned, PerformanceFormat(encoder, body.layout, character))
 
 
 def _planned(
@@ -190,7 +191,7 @@ def _planned(
     for index, (name, question) in enumerate(zip(names, questions, strict=True)):
         cancellation.check()
         with _element("scripts", index):
-            convention = encoder.convention(question.unit, question.up, question.body)
+            encoder.convention(question.unit, question.up, question.body)
             script = resolve_script(question, library.find)
             largest = max(len(script.character.skeleton), joints)
             longest = max_poses(settings.output_limit, largest, encoder)
@@ -199,8 +200,7 @@ def _planned(
         if seconds > limit:
             detail = f"{seconds:.0f} s with script {index}, expected at most {limit} s in all"
             raise InvalidField("scripts", detail)
-        file = f"{name}.{encoder.extension}"
-        yield ArchivedScript(name, file, script, convention, longest, bool(report.warnings))
+        yield ArchivedScript(name, script, longest, bool(report.warnings))
 
 
 def _encoder(extension: str) -> ClipEncoder:

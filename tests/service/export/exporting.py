@@ -6,7 +6,7 @@ from dataclasses import replace
 import orjson
 
 from posefield.batch.job import ExportJob, WorkerInput
-from posefield.batch.rows import ClipQuery
+from posefield.batch.rows import Row
 from posefield.question.motion_question import ClipQuestion
 
 CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
@@ -53,7 +53,7 @@ def question(**more):
 def queries(count, form="json", fps=30.0):
     """Source of so many clips, each turned a little further than the last."""
     return Listed(
-        ClipQuery(
+        Row(
             f"clip-{n:04d}",
             form,
             ClipQuestion(controls={**CONTROLS, "turn": 30.0 * n / count}, fps=fps),

@@ -3,15 +3,26 @@
 import csv
 import json
 from pathlib import Path
+from typing import NamedTuple
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from posefield.batch.rows import ClipQuery, Defaults, RowFault, SourceOptions, open_source
+from posefield.batch.rows import DEFAULTS, Row, RowFault, open_source
 from posefield.batch.tables import OPTION_COLUMNS
 from posefield.common.errors import QueryError
+from posefield.question.motion_question import ClipQuestion
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+
+
+class Usual(NamedTuple):
+    """Values of the command where a row has none."""
+
+    format: str = "usdc"
+    question: ClipQuestion = DEFAULTS
+
+
 TYPES = {"level": pa.int32(), "take": pa.int64(), "loop": pa.bool_(), "detail": pa.bool_()}
 WORDS = ("name", "format", "performer", "extrapolate", "names", "root", "exact", "targets", "feet")
 TYPES |= dict.fromkeys(WORDS, pa.string())
@@ -52,7 +63,7 @@ def text(path: Path, *lines, end="\n"):
 
 
 def source(model, path=None, usual=None, **asked):
-    return open_source(SourceOptions(path, **asked), usual or Defaults("usdc"), model)
+    return open_source(model, *(usual or Usual()), path=path, **asked)
 
 
 def rows(model, path=None, usual=None, **asked):
@@ -64,7 +75,7 @@ def rows(model, path=None, usual=None, **asked):
 def checked(opened, row):
     """Return a row, or its fault."""
     try:
-        if isinstance(row, ClipQuery):
+        if isinstance(row, Row):
             opened.check(row)
     except QueryError as fault:
         return RowFault(row.place, str(fault))
@@ -80,5 +91,5 @@ def faults(model, path, usual=None):
 def asked(found):
     """Return names, formats and questions of rows that are all queries."""
     found = list(found)
-    assert all(isinstance(row, ClipQuery) for row in found), found
+    assert all(isinstance(row, Row) for row in found), found
     return [(row.name, row.format, row.question) for row in found]

@@ -7,7 +7,7 @@ import exporting
 import pytest
 
 from posefield.batch import process_pool, run
-from posefield.batch.rows import ClipQuery
+from posefield.batch.rows import Row
 from posefield.batch.run import Shard
 from posefield.common.errors import FileError, InvalidField
 from posefield.encode.formats import CLIP_ENCODERS
@@ -125,7 +125,7 @@ def test_a_folder_of_something_else_is_refused_and_left(name, source, model_path
 
 def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp_path):
     rows = list(source.rows())
-    rows[10] = ClipQuery("late", "json", exporting.question(end=50.0), "line 13")
+    rows[10] = Row("late", "json", exporting.question(end=50.0), "line 13")
     bad = exporting.Listed(rows)
     work = exporting.work(model_path, bad, tmp_path)
     for by in (process_pool.run_here, process_pool.runner(2)):

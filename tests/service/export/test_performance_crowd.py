@@ -12,10 +12,10 @@ from msgspec import structs
 from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
 from posefield.batch import performance_crowd
-from posefield.batch.performance_crowd import PerformanceCrowd, View
+from posefield.batch.performance_crowd import PerformanceCrowd
 from posefield.batch.scripts import open_models, read_scripts
 from posefield.common.errors import InvalidField
-from posefield.inference.level_selection import Camera, pixels_per_metre
+from posefield.inference.level_selection import Camera, LevelCriteria, pixels_per_metre
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 
@@ -70,7 +70,7 @@ def test_each_character_plays_its_performance_at_its_place(ending, models, rows,
     crowd = PerformanceCrowd((models,), tmp_path / f"crowd.{ending}")
     facts = performance_crowd.write(crowd, rows)
     stage = Usd.Stage.Open(str(crowd.path))
-    clips = [performed(models, row.script).clip for row in rows]
+    clips = [performed(models, row.question).clip for row in rows]
     assert facts["frames"] == max(map(len, clips)) == stage.GetEndTimeCode() + 1
     assert (facts["characters"], facts["rate"]) == (3, 30.0)
     for index, clip in enumerate(clips):
@@ -92,7 +92,7 @@ def test_a_character_stands_where_its_script_begins_and_keeps_its_last_pose(mode
         assert np.allclose(matrix.ExtractTranslation(), (left, 0.0, forward))
         ahead = matrix.TransformDir((0.0, 0.0, 1.0))
         assert np.isclose(np.arctan2(ahead[0], ahead[2]), start["heading"])
-    last = len(performed(models, rows[0].script).clip) - 1
+    last = len(performed(models, rows[0].question).clip) - 1
     assert stage.GetEndTimeCode() > last
     kept = world_joints(stage, 0, stage.GetEndTimeCode())
     assert np.array_equal(kept, world_joints(stage, 0, last))
@@ -100,7 +100,7 @@ def test_a_character_stands_where_its_script_begins_and_keeps_its_last_pose(mode
     said = stage.GetRootLayer().customLayerData["posefield"]
     assert list(said["scripts"]) == ["first", "far", "aside"]
     assert list(said["models"]) == [open_models((models,)).find("walk").identity]
-    durations = [performed(models, row.script).trust.duration for row in rows]
+    durations = [performed(models, row.question).trust.duration for row in rows]
     assert np.allclose(said["durations"], durations)
     # The stage complies, with bodies.
     registry = UsdValidation.ValidationRegistry()
@@ -112,7 +112,7 @@ def test_a_character_stands_where_its_script_begins_and_keeps_its_last_pose(mode
 @pytest.mark.system
 def test_processes_give_the_same_bytes(models, rows, tmp_path):
     found = []
-    view = View(Camera(np.array([0.0, 2.0, -6.0]), 1.0, 1080.0), 1.0)
+    view = LevelCriteria(Camera(np.array([0.0, 2.0, -6.0]), 1.0, 1080.0), 1.0, None, None)
     for workers in (1, 2, 3):
         folder = tmp_path / str(workers)
         folder.mkdir()
@@ -123,15 +123,15 @@ def test_processes_give_the_same_bytes(models, rows, tmp_path):
     assert found[0] == found[1] == found[2] and len(found[0]) == 7
 
 
-VIEW = View(Camera(np.array([0.0, 1.6, -3.0]), 1.0, 1080.0), 4.0)
+VIEW = LevelCriteria(Camera(np.array([0.0, 1.6, -3.0]), 1.0, 1080.0), 4.0, None, None)
 
 
 def test_levels_are_the_coarsest_that_the_view_allows(models, rows, tmp_path):
     find = open_models((models,)).find
     levels = []
     for row in rows:
-        answer, level = performance_crowd.perform_at_level(row.script, find, VIEW, 1000)
-        script = resolve_script(row.script, find)
+        answer, level = performance_crowd.perform_at_level(row.question, find, VIEW, 1000)
+        script = resolve_script(row.question, find)
         errors = performance_crowd.level_errors(script)
         card = find("walk").session.card
         assert errors.tolist() == [each.pose for each in card.levels]
@@ -140,7 +140,7 @@ def test_levels_are_the_coarsest_that_the_view_allows(models, rows, tmp_path):
         assert level == 0 or errors[level] * scale <= VIEW.pixels
         # A coarser level would be seen, within what the path differs by.
         assert level + 1 == len(errors) or errors[level + 1] * scale > 0.95 * VIEW.pixels
-        levelled = structs.replace(row.script, level=level)
+        levelled = structs.replace(row.question, level=level)
         assert np.array_equal(performed(models, levelled).clip.rotations, answer.clip.rotations)
         levels.append(level)
     assert min(levels) < max(levels)

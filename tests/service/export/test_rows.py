@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from msgspec import structs
 from rowing import (
     POINT,
+    Usual,
     asked,
     columns,
     faults,
@@ -24,7 +25,7 @@ from rowing import (
 )
 
 from posefield.batch import run
-from posefield.batch.rows import Defaults, RowFault, generated_name, points, repeated_names
+from posefield.batch.rows import RowFault, generated_name, points, repeated_names
 from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question import json_decoding, text_decoding
@@ -39,7 +40,7 @@ WRITERS = {
     "jsonl": (write_jsonl, "q.jsonl:{}", 1),
     "parquet": (write_parquet, "q.parquet row {}", 1),
 }
-USUAL = Defaults(
+USUAL = Usual(
     "bvh",
     ClipQuestion(controls={}, fps=24.0, start=0.1, end=0.9, performer="short", level=1),
 )
@@ -170,7 +171,7 @@ def test_missing_values_are_those_of_the_command(styled, model, tmp_path):
         plain,
         structs.replace(plain, fps=60.0, performer="tall"),
     ]
-    usual = Defaults("usdc", ClipQuestion(controls={}, labels={"style": "sneaking"}))
+    usual = Usual("usdc", ClipQuestion(controls={}, labels={"style": "sneaking"}))
     path = text(tmp_path / "s.csv", "haste,style", "4,plain", "4,")
     labels = [row.question.labels for row in rows(styled, path, usual)]
     assert labels == [{"style": "plain"}, {"style": "sneaking"}]
@@ -301,12 +302,12 @@ def test_the_digest_is_of_all_that_determines_queries(model, tmp_path):
     path, copy = (write_csv(tmp_path / name, [POINT]) for name in ("q.csv", "copy.csv"))
     other = write_csv(tmp_path / "other.csv", [{**POINT, "turn": 11.0}])
     asks = [
-        *({"path": path, "usual": usual} for usual in (None, USUAL, Defaults("usda"))),
+        *({"path": path, "usual": usual} for usual in (None, USUAL, Usual("usda"))),
         {"path": other},
         *({"sample": n, "seed": s} for n, s in product((5, 6), (0, 1))),
         {"sample": 5, "method": "hull"},
         *({"grid": (text,)} for text in ("turn=1,2", "turn=1,3", "stature=1,2")),
-        {"path": path, "usual": Defaults("usdc", ClipQuestion(controls={}, targets=TARGETS))},
+        {"path": path, "usual": Usual("usdc", ClipQuestion(controls={}, targets=TARGETS))},
     ]
     found = [source(model, **ask).digest for ask in asks]
     assert len(set(found)) == len(found)

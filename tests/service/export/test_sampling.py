@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from msgspec import structs
-from rowing import rows, source
+from rowing import Usual, rows
 from scipy.optimize import linprog
 from scipy.stats import chisquare
 
 from posefield.batch import sampling
 from posefield.batch.rows import RowFault
 from posefield.batch.sampling import BLOCK_SIZE
+from posefield.question.motion_question import ClipQuestion
 from posefield.registry import model_registry
 
 # Chance gives less once in a million times.
@@ -93,8 +93,7 @@ def test_weights_are_even_in_the_simplex(card):
 
 @pytest.mark.parametrize("method", sampling.METHODS)
 def test_every_point_can_be_asked_for_where_it_was_sampled(model, method):
-    usual = source(model, sample=1).usual
-    strict = replace(usual, question=structs.replace(usual.question, extrapolate="refuse"))
+    strict = Usual(question=ClipQuestion(controls={}, extrapolate="refuse"))
     found = rows(model, usual=strict, sample=10_000, method=method)
     faults = [row for row in found if isinstance(row, RowFault)]
     # What was sampled has gaps, in which a box's points fall more often than those of the hull.

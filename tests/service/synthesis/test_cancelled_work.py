@@ -5,7 +5,7 @@ from contextvars import copy_context
 
 import pytest
 
-from posefield.batch import clip_archive
+from posefield.batch.job import archive_members
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS
@@ -77,7 +77,7 @@ def archived(model, walk):
     """An archive of clips."""
     asked = {"format": "usdc", "clips": [{"controls": controls(model)}] * 20}
     found = archive_operations.clip_order(model, json.dumps(asked).encode(), Settings())
-    return list(clip_archive.archive_members(found))
+    return list(archive_members(found.files()))
 
 
 def crowded(model, walk):
