@@ -171,7 +171,6 @@ def report_text(facts: dict[str, Any]) -> str:
 
 
 def _take_text(take: dict[str, Any], motions: int) -> str:
-    """Return the sentence about the takes of a crowd's motions."""
     which = f"take {take['seed']}" if take["seed"] else "no take"
     if take["seed"] == "index":
         which = f"takes 1 to {motions}, one for each motion"

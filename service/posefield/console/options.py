@@ -123,7 +123,6 @@ def with_option_groups(command: Command) -> Command:
 
 
 def _members(group: Any) -> list[inspect.Parameter]:
-    """Return a parameter for each field of a dataclass."""
     hints = get_type_hints(group, include_extras=True)
     return [
         inspect.Parameter(
@@ -157,7 +156,7 @@ def _option(parameter: Parameter, default: Any) -> inspect.Parameter:
 
 
 def _value(parameter: Parameter, value: Any, default: Any) -> Any:
-    """Return the value of a field; `given` is text where typer does not parse the field's type."""
+    """Return the value of a field; `value` is text where typer does not parse the field's type."""
     if value is None or value == []:
         return default
     if parameter.field == LABELS_FIELD:

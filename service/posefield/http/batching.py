@@ -130,13 +130,12 @@ def _uncancelled_context() -> Context:
 
 
 async def _work_batch(work: Work, batch: Pending) -> None:
-    open_items = [(item, future) for item, future in batch if not future.done()]
+    batch = [(item, future) for item, future in batch if not future.done()]
     try:
-        items = [item for item, _ in open_items]
-        results = await to_thread.run_sync(work, items) if open_items else []
+        results = await to_thread.run_sync(work, [item for item, _ in batch]) if batch else []
     except Exception as fault:
-        results = [fault] * len(open_items)
-    for (_, future), result in zip(open_items, results, strict=True):
+        results = [fault] * len(batch)
+    for (_, future), result in zip(batch, results, strict=True):
         if future.done():
             continue
         if isinstance(result, Exception):

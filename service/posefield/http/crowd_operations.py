@@ -145,7 +145,6 @@ def _count(body: CrowdBody, largest: float) -> int:
 
 
 def _column(values: Numbers, count: int) -> Floats:
-    """Return the values (N,)."""
     # np.fromiter takes two thirds of the time of np.array. Adding 0.0 turns -0 into 0.
     column = (
         np.fromiter(values, float, count) if isinstance(values, list) else np.full(count, values)

@@ -137,7 +137,7 @@ def metrics_text() -> bytes:
 
 @contextmanager
 def shared_folder() -> Iterator[str]:
-    """Yield a temporary folder for the metrics of several processes, and set FOLDER to it."""
+    """Yield a temporary folder for the metrics of several processes, set in FOLDER_VARIABLE."""
     with TemporaryDirectory(prefix="posefield-metrics-") as folder:
         os.environ[FOLDER_VARIABLE] = folder
         yield folder

@@ -83,7 +83,6 @@ async def answer_clip(request: ServiceRequest) -> Response:
 async def _answer_delivered_clip(
     request: ServiceRequest, encoder: ClipEncoder, question: FileQuestion, character: str
 ) -> Response:
-    """Answer with the motion of a user's character."""
     model, card = request.model, request.model.session.card
     order = delivery.deliver(request.service.characters.find(character), encoder, question)
     order.check(question, card.skeleton, card.roles)

@@ -108,7 +108,6 @@ def _delivery(
     question: PerformanceQuestion,
     layout: PerformanceLayout,
 ) -> Delivery:
-    """Return the delivery to a character of a user, given as a query parameter."""
     try:
         order = delivery.deliver(request.service.characters.find(character), encoder, question)
         order.check_layout(layout)

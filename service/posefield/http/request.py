@@ -142,7 +142,7 @@ requests succeed while large bodies exhaust the limit."""
 
 @dataclass
 class BodyMemory:
-    """Memory of the bodies of open requests, beyond the first FREE bytes of each.
+    """Memory of the bodies of open requests, beyond the first FREE_BYTES of each.
 
     limit: maximum of their sum, bytes. used: their sum, bytes.
     """

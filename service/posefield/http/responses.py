@@ -286,7 +286,7 @@ MIN_CHUNK_SIZE = 1 << 18
 
 
 def merged_chunks(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the same bytes in pieces of at least ENOUGH bytes, except the last; none is empty."""
+    """Yield the bytes in pieces of at least MIN_CHUNK_SIZE, except the last; none is empty."""
     buffered, size = [], 0
     for piece in pieces:
         buffered.append(piece)

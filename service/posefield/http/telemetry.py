@@ -30,7 +30,7 @@ class LogBuffer:
         self._buffer: list[bytes] = []
 
     def add(self, content: Mapping[str, Any]) -> None:
-        """Buffer a line of JSON; a flush follows within MOMENT. Needs a running event loop."""
+        """Buffer a line of JSON; a flush follows within FLUSH_DELAY. Needs a running event loop."""
         if not self._buffer:
             asyncio.get_running_loop().call_later(FLUSH_DELAY, self.flush)
         self._buffer.append(orjson.dumps(content, option=orjson.OPT_APPEND_NEWLINE))
@@ -48,7 +48,7 @@ def _write(target: int, piece: bytes) -> None:
 
 
 def _pieces(lines: list[bytes]) -> list[bytes]:
-    """Return the lines joined to pieces of at most PIECE bytes; a longer line is a piece."""
+    """Return the lines joined to pieces of at most WRITE_SIZE bytes; a longer line is a piece."""
     pieces, size = [[]], 0  # type: list[list[bytes]], int
     for line in lines:
         if size + len(line) > WRITE_SIZE and pieces[-1]:

@@ -49,6 +49,7 @@ class Parameter:
 
     word: its name in text. kind: type of one value. read: converts a text to a value, and raises
     ValueError for an invalid one. repeated: whether it may occur several times, once per value.
+    default: NODEFAULT for a field that a query must contain.
     """
 
     field: str
@@ -60,11 +61,6 @@ class Parameter:
     help: str
     unit: str | None
     metavar: str | None
-
-    @property
-    def required(self) -> bool:
-        """Return whether a query must contain it."""
-        return self.default is NODEFAULT
 
 
 @cache
@@ -88,20 +84,23 @@ def decode_question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Q
     form_parameters, values, controls = parameters(form), dict[str, Any](), dict[str, float]()
     for name, text in pairs:
         parameter = form_parameters.get(name)
-        where = controls if parameter is None else values
-        field = name if parameter is None else parameter.field
-        if parameter is not None and parameter.repeated:
-            values.setdefault(field, []).append(parse_value(parameter, text))
-        elif field in where:
+        read: Callable[[str], Any] = parse_number
+        field, target, repeated = name, controls, False
+        if parameter is not None:
+            read, field, target = parameter.read, parameter.field, values
+            repeated = parameter.repeated
+        if field in target and not repeated:
             raise FormError(name, "given twice, expected once")
+        try:
+            value = read(text)
+        except ValueError as fault:
+            raise FormError(name, str(fault)) from None
+        if repeated:
+            values.setdefault(field, []).append(value)
         else:
-            where[field] = (
-                _parse(name, parse_number, text)
-                if parameter is None
-                else parse_value(parameter, text)
-            )
+            target[field] = value
     for parameter in form_parameters.values():
-        if parameter.required and parameter.field not in values:
+        if parameter.default is NODEFAULT and parameter.field not in values:
             expected = parameter.help or "the name of a control"
             raise FormError(parameter.word, f"missing, expected {expected}")
     if CONTROLS_FIELD in form.__struct_fields__:
@@ -128,14 +127,10 @@ def parse_value(parameter: Parameter, text: str) -> Any:
 
     Raises FormError for an invalid text.
     """
-    return _parse(parameter.word, parameter.read, text)
-
-
-def _parse(name: str, read: Callable[[str], Any], text: str) -> Any:
     try:
-        return read(text)
+        return parameter.read(text)
     except ValueError as fault:
-        raise FormError(name, str(fault)) from None
+        raise FormError(parameter.word, str(fault)) from None
 
 
 def parse_number(text: str) -> float:
@@ -328,5 +323,4 @@ def _without_none(kind: Any) -> Any:
 
 
 def _without_annotations(kind: Any) -> Any:
-    """Return a type without its annotations, as in READERS."""
     return get_args(kind)[0] if get_origin(kind) is Annotated else kind

@@ -254,8 +254,11 @@ class QuestionValidator:
         """Return whether all controls are floats within the sampled ranges: the fast path."""
         if controls.keys() != self._names:
             return False
-        values = ((controls[name], low, high) for name, low, high in self._ranges)
-        return all(type(value) is float and low <= value <= high for value, low, high in values)
+        for name, low, high in self._ranges:
+            value = controls[name]
+            if type(value) is not float or not low <= value <= high:
+                return False
+        return True
 
     def _complete_controls(
         self, controls: Mapping[str, float], labels: Floats
@@ -327,7 +330,7 @@ def merge_warnings(
 
     A deviation tells the sampled range, too, so it replaces the warning of `range_warnings`.
     """
-    if extrapolate == "ok":
+    if extrapolate == "ok" or not deviations:
         return tuple(warnings)
     sentences = {f"{change.control} =": change.sentence for change in deviations}
     # A range warning begins with the control's name, an equals sign and the value.

@@ -15,6 +15,7 @@ import re
 import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -176,7 +177,7 @@ class AccessPolicy:
     tokens: "TokenVerifier | None"
     metrics_open: bool
 
-    @property
+    @cached_property
     def requires_credentials(self) -> bool:
         """True if requests need credentials."""
         return bool(self.keys.principals) or self.tokens is not None

@@ -173,7 +173,7 @@ def internal_error_response(request: Request) -> Response:
 
 
 def _shortened(detail: str) -> str:
-    """Return the detail, shortened in the middle to LONGEST: it may quote the request."""
+    """Return the detail, shortened in the middle: it may quote the request."""
     if len(detail) <= MAX_DETAIL_LENGTH:
         return detail
     return f"{detail[: MAX_DETAIL_LENGTH - 105]} ... {detail[-100:]}"
