@@ -244,7 +244,7 @@ def benchmark_levels(
     sessions: Sequence[tuple[Session, int]],
     rounds: int,
     progress: ProgressCallback = ignore_progress,
-) -> Annotated[Floats, "{len(asked)}"]:
+) -> Annotated[Floats, "{len(sessions)}"]:
     """Return the seconds per pose (N,) of levels of sessions: the median of the rounds.
 
     rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
