@@ -22,7 +22,7 @@ from posefield.motion import contact_detection
 from posefield.motion.clip import Clip
 from posefield.motion.contact_detection import FootContact
 from posefield.performance import join_quality, joins
-from posefield.performance.join_quality import JoinFacts, UsualMotion
+from posefield.performance.join_quality import JoinFacts
 from posefield.performance.joins import Blend, Cut
 from posefield.performance.passage import RATE, Passage
 from posefield_train.graph import trained_card
@@ -90,14 +90,14 @@ def takes(name: str, data: Path) -> list[Take]:
     return found
 
 
-def captured(name: str, data: Path) -> UsualMotion:
+def captured(name: str, data: Path) -> float:
     """Return the accelerations of a recipe's clips, as the card of its model has them."""
     path = next(Path(data_folder.__file__).parents[1].glob(f"recipes/{name}.toml"))
     examples, _ = ingest.ingest(recipe.read(path), data)
     found = trained_card.captured_acceleration(examples)
     if found is None:
         raise ValueError(f"{name} has no clip of three frames, expected longer ones")
-    return UsualMotion(found.p99, "captured")
+    return found.p99
 
 
 def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
@@ -139,7 +139,7 @@ def pairs(found: Sequence[Take], every: bool = False) -> Iterator[tuple[Take, Ta
             yield from ((take, other) for other in (others if every else others[:1]))
 
 
-def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: UsualMotion) -> Join:
+def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: float) -> Join:
     """Return the measures of a join of two takes. usual: what it is compared with."""
     body, rest = own.character, len(other.passage)
     before = own.passage.part(0, own.event + 1)
@@ -157,10 +157,11 @@ def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: UsualMotion) 
     joined = joins.join(before, after, cut, kind)
     stepped, _ = join_quality.add_steps(body, before, after, cut, joined)
     placed, slides, lowered = _placed(own, stepped, cut)
-    found = join_quality.describe_cut((before, after), cut, kind, usual)
+    drop = abs(float(before.roots[cut.exit, 1] - after.roots[cut.entry, 1]))
     real, blended, peak = (_peak(body, each, cut.exit) for each in (own.passage, joined, placed))
     high, low = (float(side.passage.roots[side.event, 1]) for side in (own, other))
-    return Join(JoinFacts(found, peak), real, blended, slides, lowered, (high, low))
+    facts = JoinFacts(cut.distance, drop, kind, usual, "captured", peak=peak)
+    return Join(facts, real, blended, slides, lowered, (high, low))
 
 
 def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float, ...], float]:
@@ -204,9 +205,9 @@ def rows(data: Path) -> list[Row]:
     usual = captured("hdm05_deposit_floor", data)
     joins = [join(*pair, False, "dead", usual) for pair in pairs(deposits, True)]
     other = [own for own in joins if min(own.height) < SQUAT and max(own.height) > STOOP]
-    share = 100.0 * float(np.mean([own.facts.hard for own in other]))
+    share = 100.0 * float(np.mean([bool(own.facts.reasons) for own in other]))
     same = [own for own in joins if own not in other]
-    alike = 100.0 * float(np.mean([own.facts.hard for own in same]))
+    alike = 100.0 * float(np.mean([bool(own.facts.reasons) for own in same]))
     said = f"of {len(other)} joins of a squat and a stoop; {alike:.0f} % of {len(same)} others"
     missed = Row("hdm05_deposit_floor: joins not flagged", 100.0 - share, "%", said, None, 0.0)
     return [*found, missed]
@@ -218,11 +219,11 @@ def _rows(title: str, joins: Sequence[Join], goal: float | None) -> list[Row]:
         float(np.median(peaks))
         for peaks in ([own.blended for own in joins], [own.facts.peak for own in joins])
     )
-    distance = 100.0 * float(np.median([own.facts.cut.distance for own in joins]))
+    distance = 100.0 * float(np.median([own.facts.distance for own in joins]))
     slides = [round(100.0 * one, 3) for own in joins for one in own.slides]
     slide, worst = float(np.percentile(slides, 90)), max(slides)
     lowered = 100.0 * float(np.mean([own.lowered for own in joins]))
-    hard = 100.0 * float(np.mean([own.facts.hard for own in joins]))
+    hard = 100.0 * float(np.mean([bool(own.facts.reasons) for own in joins]))
     against = f"median peak {plain:.3g} m/s², real continuation {real:.3g}"
     return [
         Row(f"{title}: peak over the real one", plain / real, "times", against, None, goal),

@@ -16,9 +16,9 @@ from threadpoolctl import threadpool_limits
 
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.performance import composition
-from posefield.performance.composition import Composed
 from posefield.performance.passage import RATE
 from posefield.performance.script import Script, resolve_script
+from posefield.performance.timeline import Timeline
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -48,7 +48,7 @@ class Made:
     """A performance and what it is made of."""
 
     script: Script
-    composed: Composed
+    timeline: Timeline
     answer: PerformanceAnswer
 
 

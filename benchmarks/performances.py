@@ -80,8 +80,8 @@ def _sliding(name: str, slides: Sequence[float]) -> Row:
 
 def stood(made: Made) -> tuple[list[float], Frames]:
     """Return how far each foot that stands at a join slides, and how low the pelvis is, cm."""
-    plan = composition.plan_feet(made.script, made.composed)
-    motion, timeline = made.composed.motion, made.composed.timeline
+    timeline = made.timeline
+    plan, motion = composition.plan_feet(made.script, timeline), timeline.performed
     times = np.arange(len(motion)) / RATE
     ((_, paths),) = foot_placement.foot_paths([plan])
     slides = []

@@ -281,7 +281,7 @@ def perform_at_level(
         return composition.perform(script, most), question.level
     if question.level:
         raise InvalidField("level", f"{question.level}, expected none: the camera chooses it")
-    level = allowed_level(script, composition.compose(script).motion.roots, view)
+    level = allowed_level(script, composition.compose(script).performed.roots, view)
     answer = composition.perform(_at_level(script, level), most)
     # At another level the character may come nearer.
     while (needed := allowed_level(script, answer.clip.root_path, view)) < level:

@@ -44,14 +44,18 @@ class Act:
         """Heading of the root in the first frame, rad."""
         return self.passage.heading()
 
-    def motion_to(self, position: complex, facing: float) -> FloorMotion:
-        """Return the motion after which the first frame's root is at a place of the floor, facing.
+    def motion_to(
+        self, position: complex, facing: float, point: complex | None = None
+    ) -> FloorMotion:
+        """Return the motion after which a point of the act is at a place of the floor, facing.
 
-        position: forward is its real part, left its imaginary part, m. facing: heading, rad.
+        position: forward is its real part, left its imaginary part, m. facing: heading of the first
+        frame, rad. point: in the frame of the segment; None for the first frame's root.
         """
         turn = facing - self.heading
-        start = complex(floor_plane.project(self.passage.roots[0]))
-        return FloorMotion(turn, complex(position - np.exp(1j * turn) * start))
+        if point is None:
+            point = complex(floor_plane.project(self.passage.roots[0]))
+        return FloorMotion(turn, complex(position - np.exp(1j * turn) * point))
 
     def frame_of(self, when: TargetTime, parents: tuple[int, ...], joint: int) -> int:
         """Return the frame of a target of a joint: at a time, s, of the clip, or at a moment."""

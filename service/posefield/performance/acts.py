@@ -5,7 +5,6 @@ An act takes place at a point of the floor, or where the joint of a target meets
 
 import dataclasses
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,34 +35,6 @@ from posefield.validation.question_validation import ValidatedQuestion
 MAX_ROUNDS, PLACE_TOLERANCE = 16, 1e-5
 
 
-@dataclass(frozen=True)
-class PlacedAct:
-    """An act in the frame of its segment, and the motion that places it in the world."""
-
-    act: Act
-    by: FloorMotion
-
-
-@dataclass(frozen=True)
-class TargetedAct:
-    """An act that takes place where a joint meets a target of the world.
-
-    point: where on the floor the joint is at its moment, in the frame of the segment. goal: where
-    on the floor the target is in the world.
-    """
-
-    act: Act
-    point: complex
-    goal: complex
-
-    def facing(self, facing: float) -> PlacedAct:
-        """Return the act with the heading `facing`, rad, of its first frame."""
-        turn = facing - self.act.heading
-        return PlacedAct(
-            self.act, FloorMotion(turn, complex(self.goal - np.exp(1j * turn) * self.point))
-        )
-
-
 def act_at(
     model: Synthesizer, asked: MotionQuestion, by: FloorMotion, world: Iterable[int] = ()
 ) -> Act:
@@ -86,8 +57,8 @@ def act_from(
     facing: float,
     world: Iterable[int] = (),
     rounds: int = MAX_ROUNDS,
-) -> PlacedAct:
-    """Return the act whose first frame's root is at a place of the floor with a heading.
+) -> tuple[Act, FloorMotion]:
+    """Return the act whose first frame's root is at a place of the floor, and what places it.
 
     position: forward is its real part, left its imaginary part, m. facing: rad. world: as in
     `act_at`. rounds: largest number of them. Raises InvalidField for targets that move the first
@@ -97,7 +68,7 @@ def act_from(
     rest = tuple(own for index, own in enumerate(asked.targets) if index not in world)
     free = act_motion.act_passage(model, replace(asked, targets=rest))
     if not world:
-        return PlacedAct(free, free.motion_to(position, facing))
+        return free, free.motion_to(position, facing)
     by = free.motion_to(position, facing)
     trial = replace(asked, extrapolate="ok")
     for _ in range(rounds):
@@ -105,16 +76,19 @@ def act_from(
         start = complex(floor_plane.project(by.place(found.passage.roots[:1]))[0])
         gap, turn = abs(start - position), abs(by.turn + found.heading - facing)
         if max(gap, turn) < PLACE_TOLERANCE:
-            return PlacedAct(act_at(model, asked, by, world), by)
+            return act_at(model, asked, by, world), by
         by = found.motion_to(position, facing)
     raise InvalidField(
         "at", f"the targets move the first pose {gap:.3g} m from it, expected targets that do not"
     )
 
 
-def place_by_target(model: Synthesizer, asked: MotionQuestion, world: int = 0) -> TargetedAct:
+def place_by_target(
+    model: Synthesizer, asked: MotionQuestion, world: int = 0
+) -> tuple[Act, complex]:
     """Return the act that takes place where its target in the world is.
 
+    Second is where on the floor the joint then is, in the frame of the segment.
     world: index of the target whose position is in the world; the other ones are in the frame of
     the segment. The target's height constrains the motion; over the floor the joint stays where the
     motion without that target takes it, so that the motion does not depend on the place. Raises
@@ -137,11 +111,7 @@ def place_by_target(model: Synthesizer, asked: MotionQuestion, world: int = 0) -
     if asked.extrapolate != "ok" and not results[world].reached:
         said = synthesizer.miss_warnings(results[world : world + 1])[0]
         raise _out_of_reach(model, asked, world, said)
-    return TargetedAct(
-        act,
-        complex(floor_plane.project(point)),
-        complex(floor_plane.project(np.array(target.position))),
-    )
+    return act, complex(floor_plane.project(point))
 
 
 def _at(target: Target, position: Vector) -> Target:
@@ -261,17 +231,21 @@ def stage_after_walk(script: Script, index: int) -> StagedAct:
     own, source = act_of(script, index)
     asked, world = question_of(script, own), world_targets(own)
     if own.at is None:
-        free = place_by_target(source.model, asked, world[0])
-        by = None if own.facing is None else free.facing(own.facing).by
-        return StagedAct(index, free.act, by, free.goal, lambda angle: free.facing(angle).by)
+        free, point = place_by_target(source.model, asked, world[0])
+        goal = complex(floor_plane.project(np.array(own.targets[world[0]].position)))
+
+        def facing(angle: float) -> FloorMotion:
+            return free.motion_to(goal, angle, point)
+
+        by = None if own.facing is None else facing(own.facing)
+        return StagedAct(index, free, by, goal, facing)
     goal = complex(own.at[1], own.at[0])
     if own.facing is None and not world:
         act = act_motion.act_passage(source.model, asked)
         return StagedAct(index, act, None, goal, lambda angle: act.motion_to(goal, angle))
     if own.facing is None:
         raise InvalidField("facing", "none, expected one: the act has a place and a target")
-    found = act_from(source.model, asked, goal, own.facing, world)
-    return StagedAct(index, found.act, found.by)
+    return StagedAct(index, *act_from(source.model, asked, goal, own.facing, world))
 
 
 def stage_at_join(timeline: Timeline, script: Script, index: int) -> StagedAct:
@@ -281,15 +255,13 @@ def stage_at_join(timeline: Timeline, script: Script, index: int) -> StagedAct:
     if own.at is not None:
         goal = complex(own.at[1], own.at[0])
         facing = script.question.start.heading if own.facing is None else own.facing
-        found = act_from(source.model, asked, goal, facing, world)
-        return StagedAct(index, found.act, found.by)
+        return StagedAct(index, *act_from(source.model, asked, goal, facing, world))
     if own.facing is not None:
         raise InvalidField("facing", f"{own.facing:g} without at, expected with at only")
     if timeline.motion is None:
         x, z = script.question.start.position
         heading = script.question.start.heading
-        found = act_from(source.model, asked, complex(z, x), heading, world)
-        return StagedAct(index, found.act, found.by)
+        return StagedAct(index, *act_from(source.model, asked, complex(z, x), heading, world))
     if not world:
         return StagedAct(index, act_motion.act_passage(source.model, asked), None)
     rest = tuple(each for place, each in enumerate(asked.targets) if place not in world)

@@ -1,31 +1,41 @@
 """Performances: one motion of all segments of a script, its feet, and the report about it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Annotated, Any
 
 import numpy as np
 import orjson
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
-from posefield.common.units import Frames, RootPath, Rotations
+from posefield.common.units import Floats, Frames, RootPath, Rotations, round_micrometres
+from posefield.constraints.gauss_newton import MISS_TOLERANCE
 from posefield.feet import body_plans, foot_placement
 from posefield.feet.footsteps import FeetPlan, SampledMotion
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip, assemble
-from posefield.performance import acts, holds, join_quality, limb_targets, reporting, walk_steps
+from posefield.performance import acts, holds, join_quality, limb_targets, walk_steps
 from posefield.performance.act_motion import StagedAct
 from posefield.performance.join_quality import JoinFacts
 from posefield.performance.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
-from posefield.performance.timeline import Composed, Timeline, from_poses, resample
+from posefield.performance.timeline import Span, Timeline, from_poses, resample
+from posefield.performance.walk_plan import WalkPlan
 from posefield.question.performance_question import Act, Hold, Walk
 from posefield.question.performance_report import (
     HeldJoint,
+    JoinReport,
+    PathReport,
     PerformanceAnswer,
     PerformanceReport,
+    ScriptWarning,
+    SegmentReport,
 )
-from posefield.question.results import FeetResult
+from posefield.question.results import ConstraintResult, FeetResult
 from posefield.synthesis import standing_feet
 
 
@@ -34,10 +44,10 @@ def plan(script: Script, most: int) -> PerformanceReport:
 
     Raises QueryError with a pointer into the script.
     """
-    composed = compose(script)
-    times = frame_times(composed, script.question.fps, most)
-    joins = _judge_joins(script, composed, composed.motion)
-    return reporting.report(script, composed, joins, len(times), None)
+    timeline = compose(script)
+    times = frame_times(timeline, script.question.fps, most)
+    joins = _judge_joins(script, timeline, timeline.performed)
+    return _report(script, timeline, joins, len(times), None)
 
 
 def perform(script: Script, most: int) -> PerformanceAnswer:
@@ -45,63 +55,61 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
 
     Raises QueryError with a pointer into the script.
     """
-    composed = compose(script)
-    times = frame_times(composed, script.question.fps, most)
-    told: FeetResult | None = None
-    planned: FeetPlan | None = None
-    every = composed.motion
-    if script.question.feet == "stand" and script.character.feet:
-        planned = plan_feet(script, composed)
-        (told,) = standing_feet.describe([planned], script.character.skeleton.names)
-        even = np.arange(len(composed.motion)) / RATE
-        rotations, roots = foot_placement.place_feet(planned, even, every.rotations, every.roots)
-        every = replace(every, rotations=rotations, roots=roots)
-    judged = _judge_joins(script, composed, every)
-    rotations, roots = _at_times(script, composed.motion, planned, every, times)
-    character = script.character
-    joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
-    turns = quat.normalize(rotations)
-    own = script.question
-    bone = own.root == "bone" or (own.root is None and own.names == "ue5")
-    clip = replace(assemble(joints, turns, roots, character.bones, own.fps), root_bone=bone)
-    report = reporting.report(script, composed, judged, len(clip), told)
-    return PerformanceAnswer(clip, report, _held_joints(composed.timeline, clip))
+    timeline = compose(script)
+    question, character = script.question, script.character
+    times = frame_times(timeline, question.fps, most)
+    feet: FeetResult | None = None
+    feet_plan: FeetPlan | None = None
+    motion = timeline.performed
+    if question.feet == "stand" and character.feet:
+        feet_plan = plan_feet(script, timeline)
+        (feet,) = standing_feet.describe([feet_plan], character.skeleton.names)
+        grid = np.arange(len(motion)) / RATE
+        rotations, roots = foot_placement.place_feet(
+            feet_plan, grid, motion.rotations, motion.roots
+        )
+        motion = replace(motion, rotations=rotations, roots=roots)
+    joins = _judge_joins(script, timeline, motion)
+    rotations, roots = _at_times(question.fps, timeline, feet_plan, motion, times)
+    joints = joint_roles.rename_joints(character.skeleton, character.roles, question.names)
+    clip = assemble(joints, quat.normalize(rotations), roots, character.bones, question.fps)
+    bone = question.root == "bone" or (question.root is None and question.names == "ue5")
+    clip = replace(clip, root_bone=bone)
+    report = _report(script, timeline, joins, len(clip), feet)
+    return PerformanceAnswer(clip, report, _held_joints(timeline, clip))
 
 
 def _held_joints(timeline: Timeline, clip: Clip) -> tuple[HeldJoint, ...]:
     """Return the targets within a performance."""
-    found = []
-    for own in timeline.targets:
-        begins, ends = ((frame - timeline.begin) / RATE for frame in (own.begin, own.end))
-        if ends >= 0.0 and begins <= clip.duration:
-            x, y, z = own.position.tolist()
-            times = max(begins, 0.0), min(ends, clip.duration)
-            found.append(HeldJoint(clip.skeleton.names[own.joint], *times, (x, y, z)))
-    return tuple(found)
+    joints = []
+    for target in timeline.targets:
+        begin, end = ((frame - timeline.begin) / RATE for frame in (target.begin, target.end))
+        if end >= 0.0 and begin <= clip.duration:
+            x, y, z = target.position.tolist()
+            times = max(begin, 0.0), min(end, clip.duration)
+            joints.append(HeldJoint(clip.skeleton.names[target.joint], *times, (x, y, z)))
+    return tuple(joints)
 
 
-def _judge_joins(script: Script, composed: Composed, every: Passage) -> Sequence[JoinFacts]:
+def _judge_joins(script: Script, timeline: Timeline, motion: Passage) -> list[JoinFacts]:
     """Judge the joins as they are sent: with targets met, and feet placed where they stand.
 
     Each hard one has a warning, and so has each act that is too fast.
     """
-    timeline = composed.timeline
-    joins = [(own.frame - timeline.begin, own.cut) for own in timeline.joins]
-    found = join_quality.judge(script.character.body, joins, every)
-    for made, facts in zip(timeline.joins, found, strict=True):
-        if facts.hard:
-            timeline.warn(f"/segments/{made.segment}", "; ".join(facts.reasons))
+    body = script.character.body
+    joins = join_quality.judge(body, timeline.joins, motion, timeline.begin)
+    for join in joins:
+        if join.reasons:
+            timeline.warn(f"/segments/{join.segment}", "; ".join(join.reasons))
     # Acts may be faster than captured clips, as extrapolated ones are.
     ends = [*(span.begin for span in timeline.spans[1:]), len(timeline.done)]
     for index, (span, end) in enumerate(zip(timeline.spans, ends, strict=True)):
-        if span.kind != "act" or not timeline.captured:
-            continue
-        frames = (span.begin - timeline.begin, end - timeline.begin)
-        body, captured = script.character.body, timeline.captured[index]
-        said = join_quality.judge_act(body, every, frames, captured)
-        if said:
-            timeline.warn(f"/segments/{index}", said)
-    return found
+        if span.kind == "act" and timeline.captured:
+            frames = (span.begin - timeline.begin, end - timeline.begin)
+            warning = join_quality.judge_act(body, motion, frames, timeline.captured[index])
+            if warning:
+                timeline.warn(f"/segments/{index}", warning)
+    return joins
 
 
 def plan_document(report: PerformanceReport) -> bytes:
@@ -109,41 +117,42 @@ def plan_document(report: PerformanceReport) -> bytes:
     return orjson.dumps({"trust": report.document()})
 
 
-def compose(script: Script) -> Composed:
-    """Return the motion of all segments, joined one after another."""
-    timeline = Timeline(script.character, _captured_accelerations(script))
-    if script.question.start.poses:
-        poses = script.question.start.poses
-        timeline.begin_with_given(from_poses(poses, script.question.fps, script.character))
+def compose(script: Script) -> Timeline:
+    """Return the motion of all segments, joined one after another, with targets met."""
+    character, question = script.character, script.question
+    timeline = Timeline(character, _captured_accelerations(script))
+    if question.start.poses:
+        timeline.begin_with_given(from_poses(question.start.poses, question.fps, character))
     staged: StagedAct | None = None
-    for index, own in enumerate(script.segments):
+    for index, segment in enumerate(script.segments):
         cancellation.check()
-        ahead = _stage_ahead(script, index)
+        following = _stage_ahead(script, index)
         with errors_under("segments", index):
-            if isinstance(own, Walk):
-                staged = walk_steps.add_walk(timeline, script, index, ahead)
-            elif isinstance(own, Hold):
+            if isinstance(segment, Walk):
+                staged = walk_steps.add_walk(timeline, script, index, following)
+            elif isinstance(segment, Hold):
                 holds.add_hold(timeline, script, index)
             else:
                 act = staged or acts.stage_at_join(timeline, script, index)
                 acts.add_act(timeline, script, act)
                 staged = None
             timeline.check_duration()
-    motion, missed = limb_targets.meet_targets(
-        script.character.body, timeline.done, timeline.targets
-    )
-    return Composed(motion.part(timeline.begin, len(motion)), timeline, missed)
+    if timeline.targets:
+        timeline.motion, timeline.misses = limb_targets.meet_targets(
+            character.body, timeline.done, timeline.targets
+        )
+    return timeline
 
 
 def _captured_accelerations(script: Script) -> tuple[float, ...]:
     """Return `Timeline.captured`, zero for holds."""
-    found = []
-    for own in script.sources:
-        known = None if own is None else own.model.session.card.captured_acceleration
-        if own is not None and known is None:
+    accelerations = []
+    for source in script.sources:
+        captured = None if source is None else source.model.session.card.captured_acceleration
+        if source is not None and captured is None:
             return ()
-        found.append(0.0 if known is None else known.p99)
-    return tuple(found)
+        accelerations.append(0.0 if captured is None else captured.p99)
+    return tuple(accelerations)
 
 
 def _stage_ahead(script: Script, index: int) -> StagedAct | None:
@@ -151,9 +160,9 @@ def _stage_ahead(script: Script, index: int) -> StagedAct | None:
 
     Its errors are of the act's segment.
     """
-    own = script.segments[index]
-    if not isinstance(own, Walk) or any(
-        end is not None for end in (own.along, own.to, own.seconds)
+    walk = script.segments[index]
+    if not isinstance(walk, Walk) or any(
+        end is not None for end in (walk.along, walk.to, walk.seconds)
     ):
         return None
     following = script.segments[index + 1] if index + 1 < len(script.segments) else None
@@ -169,9 +178,9 @@ def _stage_ahead(script: Script, index: int) -> StagedAct | None:
         return acts.stage_after_walk(script, index + 1)
 
 
-def frame_times(composed: Composed, fps: float, most: int) -> Frames:
+def frame_times(timeline: Timeline, fps: float, most: int) -> Frames:
     """Return the times (F,), s, of the frames; InvalidField for more than `most`."""
-    seconds = (len(composed.motion) - 1) / RATE
+    seconds = (len(timeline.performed) - 1) / RATE
     count = int(seconds * fps + 1e-6) + 1
     if count > most:
         raise InvalidField(
@@ -180,27 +189,197 @@ def frame_times(composed: Composed, fps: float, most: int) -> Frames:
     return np.arange(count) / fps
 
 
-def plan_feet(script: Script, composed: Composed) -> FeetPlan:
+def plan_feet(script: Script, timeline: Timeline) -> FeetPlan:
     """Return the plan of the feet over a whole performance, in which targets stay met."""
-    character, timeline, own = script.character, composed.timeline, composed.motion
-    frames = range(timeline.begin, timeline.begin + len(own))
-    body, led = limb_targets.find_leads(character.body, timeline.targets, frames)
-    motion = SampledMotion(own.rotations, own.roots, RATE, walking=composed.walking)
-    return body_plans.plan_feet(body, motion, script.contacts, own.contacts, led=led)
+    body, passage, leads = script.character.body, timeline.performed, None
+    if timeline.targets:
+        frames = range(timeline.begin, timeline.begin + len(passage))
+        body, leads = limb_targets.find_leads(body, timeline.targets, frames)
+    motion = SampledMotion(passage.rotations, passage.roots, RATE, walking=timeline.walking)
+    return body_plans.plan_feet(body, motion, script.contacts, passage.contacts, led=leads)
 
 
 def _at_times(
-    script: Script, motion: Passage, planned: FeetPlan | None, every: Passage, times: Frames
+    fps: float, timeline: Timeline, feet_plan: FeetPlan | None, motion: Passage, times: Frames
 ) -> tuple[Rotations, RootPath]:
     """Return rotations and roots at the times (F,), s, of the clip, with placed feet.
 
-    every: the motion at `RATE` with placed feet. Times between its frames have feet placed anew.
+    motion: at `RATE`, with placed feet. Times between its frames have feet placed anew.
     """
-    step = round(RATE / script.question.fps)
-    if step * script.question.fps == RATE:
+    step = round(RATE / fps)
+    if step * fps == RATE:
         rows = slice(0, step * len(times), step)
-        return every.rotations[rows], every.roots[rows]
-    rotations, roots = resample(motion.rotations, motion.roots, RATE, times)
-    if planned is None:
+        return motion.rotations[rows], motion.roots[rows]
+    predicted = timeline.performed
+    rotations, roots = resample(predicted.rotations, predicted.roots, RATE, times)
+    if feet_plan is None:
         return rotations, roots
-    return foot_placement.place_feet(planned, times, rotations, roots)
+    return foot_placement.place_feet(feet_plan, times, rotations, roots)
+
+
+@dataclass(frozen=True)
+class PathErrors:
+    """Root mean squares of the errors of a walk, each error a mean over one cycle of phase.
+
+    lateral, along: of the root across and along the path, m. heading: of the direction of travel,
+    rad. facing: of the root's heading relative to the path about its own mean, rad. speed: m/s.
+    cycles: number of whole cycles; without one, all errors are zero.
+    """
+
+    lateral: float
+    along: float
+    heading: float
+    facing: float
+    speed: float
+    cycles: float
+
+
+def path_errors(walk: WalkPlan, roots: RootPath, rotations: Rotations) -> PathErrors:
+    """Return the errors of a finished motion of F frames against its plan.
+
+    roots: (F, 3), m, and rotations: (F, J, 4), in the plan's place.
+    """
+    cycles = float(walk.phases[-1] - walk.phases[0])
+    if cycles < 1.0:
+        return PathErrors(0.0, 0.0, 0.0, 0.0, 0.0, cycles)
+    centres, tangents = walk.path.at(walk.distances)
+    floor = floor_plane.project(roots)
+    offsets = _means(walk.phases, (floor - centres) * np.exp(-1j * tangents))
+    travel, planned_travel = _travel(walk, floor), _travel(walk, centres)
+    forward = floor_plane.project(quat.rotate(rotations[:, 0], np.array([0.0, 0.0, 1.0])))
+    facing = _means(walk.phases, np.unwrap(np.angle(forward)) - tangents)
+    return PathErrors(
+        _rms(offsets.imag),
+        _rms(offsets.real),
+        _rms(np.angle(travel / planned_travel)),
+        _rms(facing - facing.mean()),
+        _rms(np.abs(travel) - np.abs(planned_travel)),
+        cycles,
+    )
+
+
+def _travel(
+    walk: WalkPlan, floor: Annotated[FloorVectors, "frames"]
+) -> Annotated[FloorVectors, "means"]:
+    """Return velocities (M,) from one cycle's beginning to its end, m/s."""
+    begins, ends, times = _cycles(walk.phases)
+    frames = np.arange(len(floor))
+    steps = np.interp(ends, frames, floor) - np.interp(begins, frames, floor)
+    return np.asarray(steps / times)
+
+
+def _means(
+    phases: Annotated[Floats, "frames"], values: Annotated[Floats | FloorVectors, "frames"]
+) -> Annotated[Any, "means"]:
+    """Return the means (M,) of values over one cycle of phase that begins at each frame."""
+    begins, ends, _ = _cycles(phases)
+    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(phases)
+    sums, frames = np.pad(np.cumsum(steps), (1, 0)), np.arange(len(values))
+    return np.asarray(np.interp(ends, frames, sums) - np.interp(begins, frames, sums))
+
+
+def _cycles(
+    phases: Annotated[Floats, "frames"],
+) -> tuple[Annotated[Floats, "means"], Annotated[Floats, "means"], Annotated[Floats, "means"]]:
+    """Return frames (M,) at which cycles begin and end, and their durations, s."""
+    begins = np.flatnonzero(phases <= phases[-1] - 1.0)
+    ends = np.interp(phases[begins] + 1.0, phases, np.arange(len(phases)))
+    return begins.astype(float), ends, (ends - begins) / RATE
+
+
+def _rms(values: Annotated[Floats, "means"]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _report(
+    script: Script,
+    timeline: Timeline,
+    joins: Sequence[JoinFacts],
+    frames: int,
+    feet: FeetResult | None,
+) -> PerformanceReport:
+    """Return the report of a performance.
+
+    joins: judged, in order. frames: of its clip. feet: None as predicted.
+    """
+    motion, ends = timeline.performed, [later.begin for _, later in pairwise(timeline.spans)]
+    misses = {
+        target.pointer: miss for target, miss in zip(timeline.targets, timeline.misses, strict=True)
+    }
+    warnings = [
+        ScriptWarning(pointer, f"stays {100.0 * miss:.1f} cm from its target: out of reach")
+        for pointer, miss in misses.items()
+        if miss > MISS_TOLERANCE
+    ]
+    return PerformanceReport(
+        script.identities,
+        script.character.identity,
+        round_micrometres((len(motion) - 1) / RATE),
+        frames,
+        round_micrometres(float(np.sqrt(np.mean(np.square(motion.sigmas))))),
+        all(span.supported for span in timeline.spans),
+        tuple(
+            _segment(timeline, index, end, misses)
+            for index, end in enumerate([*ends, len(timeline.done) - 1])
+        ),
+        tuple(_join(join, timeline.begin) for join in joins),
+        (*timeline.warnings, *warnings),
+        feet,
+    )
+
+
+def _segment(timeline: Timeline, index: int, end: int, misses: dict[str, float]) -> SegmentReport:
+    """Return the report of a segment. misses: distances of targets by their pointers, m."""
+    span, shift = timeline.spans[index], timeline.begin
+    root = complex(floor_plane.project(timeline.done.roots[span.begin]))
+    return SegmentReport(
+        span.kind,
+        span.model,
+        round_micrometres((span.begin - shift) / RATE),
+        round_micrometres((end - shift) / RATE),
+        (round_micrometres(root.imag), round_micrometres(root.real)),
+        round_micrometres(timeline.done.heading(span.begin)),
+        round_micrometres(span.sigma),
+        {name: round_micrometres(value) for name, value in span.controls.items()},
+        None if span.phase is None else round_micrometres(span.phase),
+        None if span.event is None else round_micrometres((span.event - shift) / RATE),
+        tuple(
+            _on_character(target, misses[f"/segments/{index}/targets/{number}"])
+            for number, target in enumerate(span.targets)
+        ),
+        _path(timeline, span),
+        span.notes,
+    )
+
+
+def _on_character(target: ConstraintResult, miss: float) -> ConstraintResult:
+    """Return the result of a target on the character, which is not that on the model's bones."""
+    return replace(target, miss=round_micrometres(miss), reached=miss <= MISS_TOLERANCE)
+
+
+def _path(timeline: Timeline, span: Span) -> PathReport | None:
+    """Return how far a walk is from its path; None for other segments and less than a cycle."""
+    if span.plan is None:
+        return None
+    walked = timeline.done.part(span.first, span.first + len(span.plan))
+    if len(walked) < len(span.plan):
+        return None
+    errors = path_errors(span.plan, walked.roots, walked.rotations)
+    if errors.cycles < 1.0:
+        return None
+    numbers = (errors.lateral, errors.along, errors.heading, errors.speed)
+    return PathReport(*map(round_micrometres, numbers))
+
+
+def _join(join: JoinFacts, shift: int) -> JoinReport:
+    return JoinReport(
+        join.segment,
+        round_micrometres((join.frame - shift) / RATE),
+        round_micrometres(join.distance),
+        join.blend,
+        round_micrometres(join.seconds),
+        round_micrometres(join.peak),
+        round_micrometres(join.usual),
+        bool(join.reasons),
+        join.reference,
+    )

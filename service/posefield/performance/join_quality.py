@@ -39,68 +39,47 @@ MOTIONS: Mapping[Reference, str] = {
 
 
 @dataclass(frozen=True)
-class UsualMotion:
-    """Usual largest acceleration of the motions of a join, and where it was measured.
-
-    acceleration: 99th percentile of the frames' accelerations, m/s². reference: of the models'
-    captured clips, or of the motions as they were synthesised.
-    """
-
-    acceleration: float
-    reference: Reference
-
-
-@dataclass(frozen=True)
-class CutFacts:
-    """Facts about a join that stay when targets are met and feet are placed.
+class JoinFacts:
+    """Facts about a join.
 
     distance: RMS distance of the joints at the cut, m. drop: difference of the roots' heights
-    there, m. blend: its kind. usual: of the motions on both sides.
+    there, m. blend: its kind, and seconds that it lasts. usual: larger 99th percentile of the
+    accelerations of the motions on both sides, m/s², and reference: in which motions it was
+    measured. segment: index of the one that begins, and frame at which it does. peak: largest mean
+    over the joints of the acceleration relative to the root, m/s², from 0.1 s before to 0.6 s after
+    the cut, in the motion that is sent; 0 until it is known.
     """
 
     distance: float
     drop: float
     blend: Blend
-    usual: UsualMotion
-
-
-@dataclass(frozen=True)
-class JoinFacts:
-    """Facts about a join in the motion that is sent.
-
-    peak: largest mean over the joints of the acceleration relative to the root, m/s², from 0.1 s
-    before to 0.6 s after the cut.
-    """
-
-    cut: CutFacts
-    peak: float
-
-    @property
-    def hard(self) -> bool:
-        """Say whether the poses are too far apart, or change too fast."""
-        return bool(self.reasons)
+    usual: float
+    reference: Reference
+    segment: int = 0
+    frame: int = 0
+    seconds: float = 0.0
+    peak: float = 0.0
 
     @property
     def reasons(self) -> tuple[str, ...]:
         """Return why a join is hard, in words; empty if it is not."""
-        cut, found = self.cut, []
-        if cut.distance > MOST_DISTANCE:
-            found.append(
-                f"the poses are {100 * cut.distance:.0f} cm apart, expected at most"
+        reasons = []
+        if self.distance > MOST_DISTANCE:
+            reasons.append(
+                f"the poses are {100 * self.distance:.0f} cm apart, expected at most"
                 f" {100 * MOST_DISTANCE:.0f}"
             )
-        if cut.drop > MOST_DROP:
-            found.append(
-                f"the root is {100 * cut.drop:.0f} cm higher on one side, expected at most"
+        if self.drop > MOST_DROP:
+            reasons.append(
+                f"the root is {100 * self.drop:.0f} cm higher on one side, expected at most"
                 f" {100 * MOST_DROP:.0f}"
             )
-        usual = cut.usual
-        if self.peak > MOST_PEAK * usual.acceleration:
-            found.append(
+        if self.peak > MOST_PEAK * self.usual:
+            reasons.append(
                 f"joints accelerate by {self.peak:.0f} m/s2, expected at most {MOST_PEAK:g} times"
-                f" the {usual.acceleration:.1f} m/s2 of the {MOTIONS[usual.reference]}"
+                f" the {self.usual:.1f} m/s2 of the {MOTIONS[self.reference]}"
             )
-        return tuple(found)
+        return tuple(reasons)
 
 
 def accelerations(character: Character, passage: Passage, begin: int, end: int) -> Frames:
@@ -126,22 +105,11 @@ def usual_acceleration(character: Character, passages: Sequence[Passage]) -> flo
     )
 
 
-def describe_cut(
-    sides: tuple[Passage, Passage], cut: Cut, blend: Blend, usual: UsualMotion
-) -> CutFacts:
-    """Return the facts about a cut. sides: passages before and after it."""
-    apart = (sides[0].roots[cut.exit] - sides[1].roots[cut.entry]) @ UP
-    return CutFacts(cut.distance, abs(float(apart)), blend, usual)
-
-
 def judge(
-    character: Character, joins: Sequence[tuple[int, CutFacts]], sent: Passage
+    character: Character, joins: Sequence[JoinFacts], motion: Passage, begin: int = 0
 ) -> list[JoinFacts]:
-    """Return the facts about joins in the motion that is sent.
-
-    joins: frame and cut of each. sent: all frames of the performance, at `RATE`.
-    """
-    return [JoinFacts(cut, _peak(character, sent, frame)) for frame, cut in joins]
+    """Return joins with their peaks in the motion that is sent, whose first frame is `begin`."""
+    return [replace(join, peak=_peak(character, motion, join.frame - begin)) for join in joins]
 
 
 def judge_act(character: Character, sent: Passage, frames: tuple[int, int], captured: float) -> str:

@@ -46,22 +46,6 @@ class StandingEnds:
         return StandingEnds(self.pose, opening, closing)
 
 
-@dataclass(frozen=True)
-class Travel:
-    """Frames that travel with a walker, which are those of a `WalkPlan`.
-
-    places: over the floor (F,). headings: (F,), rad. phases: (F,), without wrapping.
-    """
-
-    places: Annotated[FloorVectors, "frames"]
-    headings: Frames
-    phases: Frames
-
-    def part(self, frames: slice) -> "Travel":
-        """Return some of the frames."""
-        return Travel(self.places[frames], self.headings[frames], self.phases[frames])
-
-
 def opening_frames(pose: StandingPose, phases: Frames) -> int:
     """Return the frames from a passing of the feet to the next double support; 0 if too few."""
     first = float(phases[0])
@@ -83,8 +67,17 @@ def _enough(frames: int, phases: Frames) -> int:
     return frames if SHORTEST * RATE <= frames < len(phases) else 0
 
 
-def add_standing_ends(walked: Passage, travel: Travel, ends: StandingEnds) -> Passage:
-    """Return a walk of F frames whose first and last ones are its opening and closing steps."""
+def add_standing_ends(
+    walked: Passage,
+    places: Annotated[FloorVectors, "frames"],
+    headings: Frames,
+    phases: Frames,
+    ends: StandingEnds,
+) -> Passage:
+    """Return a walk of F frames whose first and last ones are its opening and closing steps.
+
+    places, headings, phases: (F,), of the plan of the walk.
+    """
     count = len(walked)
     if ends.opening:
         rows = slice(ends.opening - 1, None, -1)
@@ -92,10 +85,16 @@ def add_standing_ends(walked: Passage, travel: Travel, ends: StandingEnds) -> Pa
         # The foot of an opening step is on the floor from the double support on: contacts are
         # likely from the landing of the heel on, and a ball that is put down then turns the knee.
         part = replace(part, contacts=np.zeros_like(part.contacts))
-        walked = _replaced(walked, rows, _close(ends.pose, part, travel.part(rows)))
+        walked = _replaced(
+            walked, rows, _close(ends.pose, part, places[rows], headings[rows], phases[rows])
+        )
     if ends.closing:
         rows = slice(count - ends.closing, count)
-        walked = _replaced(walked, rows, _close(ends.pose, _part(walked, rows), travel.part(rows)))
+        walked = _replaced(
+            walked,
+            rows,
+            _close(ends.pose, _part(walked, rows), places[rows], headings[rows], phases[rows]),
+        )
     return walked
 
 
@@ -126,17 +125,24 @@ class _Course:
     swing: Frames
 
 
-def _close(pose: StandingPose, walked: Passage, travel: Travel) -> Passage:
+def _close(
+    pose: StandingPose,
+    walked: Passage,
+    places: Annotated[FloorVectors, "frames"],
+    headings: Frames,
+    phases: Frames,
+) -> Passage:
     """Return a step that ends in the standing pose, from the frames of the walk on."""
-    course = _course(pose, walked, float(travel.phases[-1]))
+    course = _course(pose, walked, float(phases[-1]))
     poses = _poses(pose, walked.rotations, walked.roots)
     balls = np.stack([poses.position(leg.tip) for leg in pose.legs], axis=1)
-    shift, stood = _stand(pose, travel, balls, course.swinging)
-    count = len(travel.places)
+    towards = complex(np.exp(1j * headings[-1]))
+    shift, stood = _stand(pose, complex(places[-1]), towards, balls, course.swinging)
+    count = len(places)
     turned = np.broadcast_to(pose.rotations, (count, *pose.rotations.shape))
-    standing = floor_plane.turn_roots(turned, travel.headings)
-    places = travel.places + np.exp(1j * travel.headings) * (pose.place + shift)
-    ends = floor_plane.at_height(places, np.full(count, pose.height))
+    standing = floor_plane.turn_roots(turned, headings)
+    floor = places + np.exp(1j * headings) * (pose.place + shift)
+    ends = floor_plane.at_height(floor, np.full(count, pose.height))
     rotations = quat.nlerp(walked.rotations, standing, course.pose)
     roots = quat.lerp(walked.roots, ends, course.pose)
     poses = _poses(pose, rotations, roots)
@@ -173,17 +179,21 @@ def _eased(share: Frames) -> Frames:
 
 
 def _stand(
-    pose: StandingPose, travel: Travel, balls: Annotated[Floats, "frames 2 3"], swinging: int
+    pose: StandingPose,
+    root: complex,
+    towards: complex,
+    balls: Annotated[Floats, "frames 2 3"],
+    swinging: int,
 ) -> tuple[complex, Annotated[Floats, "2 3"]]:
     """Return where a walker stands beside the foot on which the step is made.
 
     First the shift of the root from its place in the standing pose, in the frame that travels, then
     the balls of both feet, m. The root ends where the walk does, give or take `MOST_BESIDE` ahead
     and the sway to the standing foot. If that foot is farther ahead or behind, the other one is set
-    as far to the other side, so that the root is between them.
+    as far to the other side, so that the root is between them. root, towards: where the walk ends,
+    and its direction there.
     """
-    towards = np.exp(1j * travel.headings[-1])
-    own = travel.places[-1] + towards * pose.balls
+    own = root + towards * pose.balls
     foot = 1 - swinging
     stood = complex(floor_plane.project(balls[:, foot]).mean())
     off = complex((stood - own[foot]) / towards)

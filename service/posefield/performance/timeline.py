@@ -10,14 +10,14 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Booleans, Floats, RootPath, Rotations
 from posefield.motion import quat
 from posefield.performance import join_quality, joins
-from posefield.performance.join_quality import CutFacts, UsualMotion
+from posefield.performance.join_quality import JoinFacts
 from posefield.performance.joins import Blend, Cut
 from posefield.performance.limb_targets import WorldTarget
 from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import MAX_SECONDS, ScriptCharacter
 from posefield.performance.walk_plan import WalkPlan
 from posefield.question.performance_question import GivenPose, Join
-from posefield.question.performance_report import Reference, ScriptWarning, SegmentKind
+from posefield.question.performance_report import ScriptWarning, SegmentKind
 from posefield.question.results import ConstraintResult
 
 RESAMPLED_AT_ONCE = 4096
@@ -46,16 +46,6 @@ class Span:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class MadeJoin:
-    """A join that was made. segment: index of the one that begins. frame: at which it does."""
-
-    segment: int
-    frame: int
-    seconds: float
-    cut: CutFacts
-
-
 @dataclass
 class Timeline:
     """A growing motion.
@@ -63,7 +53,8 @@ class Timeline:
     motion: so far; None before the first segment. exits: frames from which the next segment may go
     on. begin: first frame that belongs to the performance; earlier ones are of the given poses.
     captured: 99th percentile of the captured accelerations of each segment's model, m/s²; empty if
-    a card lacks it. usual: largest usual acceleration of the last segment's motion, m/s².
+    a card lacks it. usual: largest usual acceleration of the last segment's motion, m/s². misses:
+    distances of the targets from their joints, m, when they are met.
     """
 
     character: ScriptCharacter
@@ -73,8 +64,9 @@ class Timeline:
     begin: int = 0
     usual: float = 0.0
     spans: list[Span] = field(default_factory=list)
-    joins: list[MadeJoin] = field(default_factory=list)
+    joins: list[JoinFacts] = field(default_factory=list)
     targets: list[WorldTarget] = field(default_factory=list)
+    misses: tuple[float, ...] = ()
     warnings: list[ScriptWarning] = field(default_factory=list)
 
     @property
@@ -83,6 +75,19 @@ class Timeline:
         if self.motion is None:
             raise ValueError("no motion, expected a segment before this one")
         return self.motion
+
+    @property
+    def performed(self) -> Passage:
+        """Return the motion from the first frame of the performance on."""
+        return self.done.part(self.begin, len(self.done))
+
+    @property
+    def walking(self) -> Annotated[Booleans, "frames"]:
+        """Return whether each frame of the performance belongs to a walk (F,)."""
+        walking = np.zeros(len(self.performed), bool)
+        for span in self.spans:
+            walking[max(span.begin - self.begin, 0) :] = span.kind == "walk"
+        return walking
 
     def find_cut(self, after: Passage, entries: range, motion: FloorMotion | None = None) -> Cut:
         """Return the best cut from an exit of the motion to an entry of a passage."""
@@ -128,12 +133,20 @@ class Timeline:
         fits = min(seconds, max(len(placed) - 1 - cut.entry, 0) / RATE)
         joined = joins.join(before, placed, cut, kind, fits)
         self.motion, _ = join_quality.add_steps(body, before, placed, cut, joined)
-        own = self._usual(placed)
-        reference: Reference = "captured" if self.captured else "synthesised"
-        usual = UsualMotion(max(self.usual, own), reference)
-        facts = join_quality.describe_cut((before, placed), cut, kind, usual)
-        self.joins.append(MadeJoin(segment, cut.exit, fits, facts))
-        self.usual = own
+        usual = self._usual(placed)
+        self.joins.append(
+            JoinFacts(
+                cut.distance,
+                abs(float(before.roots[cut.exit, 1] - placed.roots[cut.entry, 1])),
+                kind,
+                max(self.usual, usual),
+                "captured" if self.captured else "synthesised",
+                segment,
+                cut.exit,
+                fits,
+            )
+        )
+        self.usual = usual
         return cut.exit - cut.entry
 
     def check_duration(self) -> None:
@@ -143,27 +156,6 @@ class Timeline:
             raise InvalidField(
                 "", f"{seconds:.0f} s with this segment, expected {MAX_SECONDS:g} s at most"
             )
-
-
-@dataclass(frozen=True)
-class Composed:
-    """Motion of a script at `RATE`, before its feet are placed.
-
-    motion: from its first frame. timeline: with frames of its own. missed: distances of the
-    timeline's targets, m.
-    """
-
-    motion: Passage
-    timeline: Timeline
-    missed: tuple[float, ...]
-
-    @property
-    def walking(self) -> Annotated[Booleans, "frames"]:
-        """Return whether each frame of the motion belongs to a walk (F,)."""
-        found = np.zeros(len(self.motion), bool)
-        for span in self.timeline.spans:
-            found[max(span.begin - self.timeline.begin, 0) :] = span.kind == "walk"
-        return found
 
 
 def choose_blend(join: Join, gaits: tuple[bool, bool]) -> tuple[Blend, float]:

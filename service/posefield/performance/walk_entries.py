@@ -16,7 +16,6 @@ from posefield.performance.joins import Cut
 from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script, Source
 from posefield.performance.standing_pose import StandingPose
-from posefield.performance.standing_steps import Travel
 from posefield.performance.timeline import Timeline
 from posefield.performance.walk_plan import WalkPlan
 from posefield.performance.walk_request import Disc, WalkRequest
@@ -32,37 +31,30 @@ CYCLE_FRAMES = 60
 SIGMA_STEP = 6
 
 
-@dataclass(frozen=True)
-class SynthesisSettings:
-    """Level of detail and take of a walk; None for the prediction."""
-
-    level: int = 0
-    take: TakeSettings | None = None
-
-
 def walk_passage(
-    model: Synthesizer, plan: WalkPlan, settings: SynthesisSettings = SynthesisSettings()
+    model: Synthesizer, plan: WalkPlan, level: int = 0, take: TakeSettings | None = None
 ) -> Passage:
-    """Return the motion of a plan.
+    """Return the motion of a plan, at a level of detail; take: None for the prediction.
 
     contacts: probabilities of the contacts of `walking_feet.foot_contacts`, in their order. Phases
     are those of the plan, wrapped.
     """
     phases = plan.phases % 1.0
-    done = plan.walker.strides(plan.controls, settings.level)
-    posed = _poses(model, plan.walker, plan.controls, done, (phases, settings))
+    done = plan.walker.strides(plan.controls, level)
+    posed = _poses(model, plan.walker, plan.controls, done, phases, level, take)
     places = plan.places + posed.places * np.exp(1j * plan.headings)
     walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
         floor_plane.at_height(places, posed.heights),
-        _contacts(model, plan.walker, plan.controls, done, (phases, settings)),
+        _contacts(model, plan.walker, plan.controls, done, phases, level),
         _sigmas(model, plan.walker, plan.controls),
         phases,
     )
     if plan.standing is None:
         return walked
-    travel = Travel(plan.places, plan.headings, plan.phases)
-    return standing_steps.add_standing_ends(walked, travel, plan.standing)
+    return standing_steps.add_standing_ends(
+        walked, plan.places, plan.headings, plan.phases, plan.standing
+    )
 
 
 def cycle_passage(
@@ -70,7 +62,8 @@ def cycle_passage(
     walker: Walker,
     controls: Annotated[Floats, "controls"],
     frames: int = CYCLE_FRAMES,
-    settings: SynthesisSettings = SynthesisSettings(),
+    level: int = 0,
+    take: TakeSettings | None = None,
 ) -> Passage:
     """Return one steady cycle at controls (d,), from phase 0, at the origin and heading along z.
 
@@ -78,16 +71,16 @@ def cycle_passage(
     """
     rows = np.repeat(controls[None], frames, axis=0)
     phases = np.arange(frames) / frames
-    own = walker.strides(controls[None], settings.level)
-    done = walker.strides(rows, settings.level)
-    posed = _poses(model, walker, rows, done, (phases, settings))
+    own = walker.strides(controls[None], level)
+    done = walker.strides(rows, level)
+    posed = _poses(model, walker, rows, done, phases, level, take)
     turned = phases * own.turns
     places = floor_plane.arc_displacement(phases * own.travels, turned)
     places = places + posed.places * np.exp(1j * turned)
     return Passage(
         floor_plane.turn_roots(posed.rotations, turned),
         floor_plane.at_height(places, posed.heights),
-        _contacts(model, walker, rows, done, (phases, settings)),
+        _contacts(model, walker, rows, done, phases, level),
         _sigmas(model, walker, rows),
         phases,
     )
@@ -109,11 +102,12 @@ def _poses(
     walker: Walker,
     controls: PointControls,
     own: Strides,
-    asked: tuple[PerPoint, SynthesisSettings],
+    phases: PerPoint,
+    level: int,
+    take: TakeSettings | None,
 ) -> RelativePoses:
     """Return the poses (F) at controls (F, d), whose strides are known, and at phases (F,)."""
-    phases, settings = asked
-    labels, level, take = walker.labels(len(controls)), settings.level, settings.take
+    labels = walker.labels(len(controls))
     if take is None:
         return stride.poses_of_strides(model.session, (controls, labels), own, phases, level)
     count = len(controls)
@@ -130,16 +124,17 @@ def _contacts(
     walker: Walker,
     controls: PointControls,
     own: Strides,
-    asked: tuple[PerPoint, SynthesisSettings],
+    phases: PerPoint,
+    level: int,
 ) -> Annotated[Floats, "frames feet"]:
     """Return the probabilities (F, K) of the feet's contacts; arguments as for `_poses`."""
     card = model.session.card
     feet = walking_feet.foot_contacts(card)
     if not feet:
         return np.zeros((len(controls), 0))
-    labels, (phases, settings) = walker.labels(len(controls)), asked
+    labels = walker.labels(len(controls))
     found = stride.contact_probabilities(
-        model.session, controls, labels, phases, settings.level, own.durations
+        model.session, controls, labels, phases, level, own.durations
     )
     return np.clip(found[:, [card.contacts.index(own) for own in feet]], 0.0, 1.0)
 
@@ -172,10 +167,10 @@ class WalkEntry:
     continues: bool = False
 
 
-def synthesis_settings(question: PerformanceQuestion) -> SynthesisSettings:
-    """Return the level of detail and the take of a script."""
+def take_settings(question: PerformanceQuestion) -> TakeSettings | None:
+    """Return the take of a script; None for the prediction."""
     take = TakeSettings(question.take, question.variety, question.detail)
-    return SynthesisSettings(question.level, take if take.seed or take.detail else None)
+    return take if take.seed or take.detail else None
 
 
 def walk_of(script: Script, index: int) -> tuple[Walk, Source]:
@@ -227,29 +222,23 @@ def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> Walk
     return WalkEntry(own, plan.end, float(plan.phases[-1] % 1.0), continues=True)
 
 
-@dataclass(frozen=True)
-class SteadyCycle:
-    """One cycle of a walker straight ahead at one speed.
+SteadyCycle = tuple[Strides, Passage, complex]
+"""One cycle of a walker straight ahead at one speed: its stride, the poses of the model, and the
+mean place of the root in the frame that travels."""
 
-    stride: of it. poses: of the model. offset: mean place of the root, in the frame that travels.
-    """
-
-    stride: Strides
-    poses: Passage
-    offset: complex
-
-
-_cycles: ValueCache[tuple[WalkerKey, float, SynthesisSettings], SteadyCycle] = ValueCache(
+_cycles: ValueCache[tuple[WalkerKey, float, int, TakeSettings | None], SteadyCycle] = ValueCache(
     KEPT_CYCLES
 )
 
 
-def _cycle(source: Source, who: Walker, speed: float, settings: SynthesisSettings) -> SteadyCycle:
+def _cycle(
+    source: Source, who: Walker, speed: float, level: int, take: TakeSettings | None
+) -> SteadyCycle:
     controls = who.controls(np.clip([speed], *source.gait.region.speeds), np.zeros(1))
     stride = who.strides(controls)
     frames = max(round(float(stride.durations[0]) * RATE), 8)
-    cycle = cycle_passage(source.model, who, controls[0], frames, settings)
-    return SteadyCycle(stride, cycle, complex(who.mean_offsets(controls)[0]))
+    poses = cycle_passage(source.model, who, controls[0], frames, level, take)
+    return stride, poses, complex(who.mean_offsets(controls)[0])
 
 
 def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
@@ -273,16 +262,15 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
         at_rest = replace(cut, motion=FloorMotion())
         return WalkEntry(request, cut.motion.after(begin), first, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
-    settings = synthesis_settings(script.question)
-    own_cycle = _cycles.find(
-        (who.key, float(speed), settings), lambda: _cycle(source, who, speed, settings)
+    level, take = script.question.level, take_settings(script.question)
+    stride, poses, offset = _cycles.find(
+        (who.key, float(speed), level, take), lambda: _cycle(source, who, speed, level, take)
     )
-    stride, frames = own_cycle.stride, len(own_cycle.poses)
-    cut = timeline.find_cut(script.adapted(index, own_cycle.poses), range(frames))
+    frames = len(poses)
+    cut = timeline.find_cut(script.adapted(index, poses), range(frames))
     phase = cut.entry / frames
     turned = phase * float(stride.turns[0])
     travelled = floor_plane.arc_displacement(phase * stride.travels[0], np.array(turned))
-    offset = own_cycle.offset
     # The path of a walk is that of the mean root, and runs the way it travels.
     place = complex(travelled + np.exp(1j * turned) * offset)
     local = FloorMotion(turned + float(stride.drifts[0]), place)

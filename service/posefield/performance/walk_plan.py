@@ -16,17 +16,15 @@ from posefield.common.units import Floats, Frames, PerPoint, PointControls
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.performance import (
-    speed_profile,
     standing_pose,
     standing_steps,
     walk_paths,
     walk_request,
 )
 from posefield.performance.passage import RATE, FloorMotion
-from posefield.performance.speed_profile import SpeedRamps
 from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
-from posefield.performance.walk_request import WalkNote, WalkRequest
+from posefield.performance.walk_request import SpeedRamps, WalkNote, WalkRequest
 from posefield.performance.walker import Walker, find_walker
 from posefield.question.motion_question import check_number, check_range
 
@@ -132,7 +130,7 @@ DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 """Clearances of ways around obstacles that are tried, as shares of the larger radius."""
 # Frames between the points at which controls are solved, and the most points of mean offsets.
 STEP, OFFSET_POINTS = 6, 12
-SECONDS_RANGE = (0.1, speed_profile.MAX_SECONDS)
+SECONDS_RANGE = (0.1, walk_request.MAX_SECONDS)
 TURN_EASING = 1.0
 """Time in which the rate of turning changes from the one at the start to that of the curve, s."""
 
@@ -223,16 +221,16 @@ def _route(
 ) -> tuple[FloorPath, Annotated[Floats, "frames"], list[WalkNote]]:
     """Return the path of a walk, the distances (F,), m, at its frames, and notes."""
     limits = gait.region.speeds
-    curve = speed_profile.check_speeds(request.speed, request.speed_over, limits)
+    curve = walk_request.check_speeds(request.speed, request.speed_over, limits)
     ramps = _ramps(request, limits)
     if request.seconds is not None:
         seconds = check_number("seconds", request.seconds)
         check_range("seconds", seconds, *SECONDS_RANGE, "s")
-        gone = speed_profile.distances_over_time(curve, request.speed_over, seconds, ramps)
+        gone = walk_request.distances_over_time(curve, request.speed_over, seconds, ramps)
         turns = _turns(request, gone, limits[0])
         return walk_paths.turning(start or FloorMotion(), gone, turns), gone, []
     path, notes = _path(gait, request, start, curve[1])
-    gone = speed_profile.distances_over_length(curve, request.speed_over, path.length, ramps)
+    gone = walk_request.distances_over_length(curve, request.speed_over, path.length, ramps)
     return path, gone, notes
 
 
@@ -257,7 +255,7 @@ def _turns(
     """
     turn = 0.0 if request.turn is None else request.turn
     times = np.arange(len(gone)) / RATE
-    rates = np.interp(times, *speed_profile.check_curve("turn", turn))
+    rates = np.interp(times, *walk_request.check_curve("turn", turn))
     if request.entry_turn is not None:
         left = np.clip(times / TURN_EASING, 0.0, 1.0)
         change = check_number("entry_turn", request.entry_turn) - rates[0]

@@ -22,7 +22,7 @@ from posefield.performance.joins import Cut
 from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
-from posefield.performance.walk_entries import WalkEntry, find_entry, synthesis_settings, walk_of
+from posefield.performance.walk_entries import WalkEntry, find_entry, take_settings, walk_of
 from posefield.performance.walk_plan import WalkPlan
 from posefield.question.performance_question import Act
 
@@ -153,10 +153,14 @@ def _last_cycle(
     """Return the last cycle of a plan for an act with the frames at which it may be entered."""
     _, source = walk_of(script, index)
     last = plan.part(int(np.argmax(plan.phases >= plan.phases[-1] - 1.0)), len(plan))
-    poses = source.adapted(
-        walk_entries.walk_passage(source.model, last, synthesis_settings(script.question))
-    )
+    poses = source.adapted(_walked(script, index, last))
     return LastCycle(script.character.body, last, poses, *act)
+
+
+def _walked(script: Script, index: int, plan: WalkPlan) -> Passage:
+    _, source = walk_of(script, index)
+    question = script.question
+    return walk_entries.walk_passage(source.model, plan, question.level, take_settings(question))
 
 
 def _travelling(plan: WalkPlan, frame: int) -> FloorMotion:
@@ -230,9 +234,7 @@ def add_walk(
         plan = walk_plan.plan_walk(source.gait, entry.request, entry.start, entry.phase)
     else:
         plan, ahead = lead_to(timeline, script, index, entry, ahead)
-    passage = script.adapted(
-        index, walk_entries.walk_passage(source.model, plan, synthesis_settings(script.question))
-    )
+    passage = script.adapted(index, _walked(script, index, plan))
     first = 0
     if entry.continues:
         first = timeline.go_on(passage)

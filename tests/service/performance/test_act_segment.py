@@ -109,9 +109,9 @@ def hand_to(place):
     return MotionQuestion(controls={}, targets=(Target("RightHand", place, at="event"),))
 
 
-def hand(reach, placed):
+def hand(reach, act, by):
     """Return the position of the right hand in the world at the event, m."""
-    return acting.joint_path(reach, placed.act, "RightHand", placed.by)[placed.act.event]
+    return acting.joint_path(reach, act, "RightHand", by)[act.event]
 
 
 @pytest.mark.parametrize("facing", [0.0, 2.5])
@@ -120,11 +120,11 @@ def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     near = act_motion.act_passage(reach, MotionQuestion(controls={})).motion_to(position, facing)
     wanted = near.place(np.array([-0.1, 1.5, 0.5]))
     asked = hand_to(tuple(wanted))
-    found = acts.act_from(reach, asked, position, facing, [0])
-    first = found.act.passage.placed(found.by).part(0, 1)
+    act, by = acts.act_from(reach, asked, position, facing, [0])
+    first = act.passage.placed(by).part(0, 1)
     assert abs(floor_plane.project(first.roots)[0] - position) < 1e-4
     assert first.heading() == pytest.approx(facing, abs=1e-4)
-    assert np.linalg.norm(hand(reach, found) - wanted) < EXACT
+    assert np.linalg.norm(hand(reach, act, by) - wanted) < EXACT
     # One round is not enough: the target moves the first pose.
     once = acts.act_at(reach, asked, near, [0]).passage.placed(near)
     assert abs(floor_plane.project(once.roots)[0] - position) > 1e-4
@@ -133,16 +133,17 @@ def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
 def test_targets_that_move_the_first_pose_on_and_on_are_refused(reach):
     near = act_motion.act_passage(reach, MotionQuestion(controls={})).motion_to(0j, 0.0)
     asked = hand_to(tuple(near.place(np.array([-0.1, 1.5, 0.5]))))
-    assert acts.act_from(reach, asked, 0j, 0.0, [0]).act.trust.targets[0].reached
+    assert acts.act_from(reach, asked, 0j, 0.0, [0])[0].trust.targets[0].reached
     with pytest.raises(InvalidField, match=r"^at: the targets move the first pose 0\.\d+ m from"):
         acts.act_from(reach, asked, 0j, 0.0, [0], rounds=1)
 
 
 def test_a_free_act_takes_place_where_its_target_is(reach):
     for facing in (-2.0, 0.0, 1.0):
-        found = acts.place_by_target(reach, hand_to((2.0, 1.5, -3.0))).facing(facing)
-        assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
-        first = found.act.passage.placed(found.by)
+        act, point = acts.place_by_target(reach, hand_to((2.0, 1.5, -3.0)))
+        by = act.motion_to(-3.0 + 2.0j, facing, point)
+        assert np.linalg.norm(hand(reach, act, by) - (2.0, 1.5, -3.0)) < EXACT
+        first = act.passage.placed(by)
         assert first.heading() == pytest.approx(facing)
 
 

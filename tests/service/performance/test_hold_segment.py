@@ -9,7 +9,7 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.motion import quat, skeleton
-from posefield.performance import act_motion, gaze, holds
+from posefield.performance import act_motion, holds
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.question.motion_question import MotionQuestion
 from posefield.synthesis.synthesizer import Synthesizer
@@ -145,8 +145,8 @@ def test_neck_head_and_a_part_of_the_trunk_turn(posed):
     found, after, _ = turned(body, own, (1.0, 1.6, 2.0))
     apart = 2.0 * np.arccos(np.clip(np.abs(np.sum(after * own.rotations[-1], axis=-1)), -1.0, 1.0))
     total = np.linalg.norm(found.turn)
-    shares = {role: apart[body.joints[role]] / total for role in gaze.TRUNK + gaze.NECK}
-    assert sum(shares[role] for role in gaze.TRUNK) == pytest.approx(gaze.TRUNK_SHARE, abs=1e-3)
+    shares = {role: apart[body.joints[role]] / total for role in holds.TRUNK + holds.NECK}
+    assert sum(shares[role] for role in holds.TRUNK) == pytest.approx(holds.TRUNK_SHARE, abs=1e-3)
     assert shares["neck"] == pytest.approx(shares["head"], abs=1e-3)
     rest = np.ones(len(apart), dtype=bool)
     rest[[body.joints[role] for role in shares]] = False

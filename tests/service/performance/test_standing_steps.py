@@ -22,7 +22,7 @@ from posefield.performance import (
 from posefield.performance.act_motion import Act, StagedAct
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.script import resolve_script
-from posefield.performance.standing_steps import StandingEnds, Travel
+from posefield.performance.standing_steps import StandingEnds
 from posefield.performance.timeline import Timeline
 from posefield.performance.walk_plan import plan_walk
 from posefield.performance.walk_request import WalkRequest
@@ -107,10 +107,11 @@ def test_a_walk_begins_and_ends_with_its_feet_beside_each_other(length, end):
     assert np.hypot(root[0], root[2] - place) < 0.06
     assert root[0] == pytest.approx(feet[:, 0].mean(), abs=0.01)
     # Without the steps one foot is in the air or ahead.
-    travel = Travel(plan.places, plan.headings, plan.phases)
     bare = walk_entries.walk_passage(walk(), replace(plan, standing=None))
     assert np.abs(balls(bare)[frame, :, 1] - pose().levels).max() > 0.01
-    none = standing_steps.add_standing_ends(bare, travel, StandingEnds(pose()))
+    none = standing_steps.add_standing_ends(
+        bare, plan.places, plan.headings, plan.phases, StandingEnds(pose())
+    )
     assert none.rotations.tobytes() == bare.rotations.tobytes()
 
 

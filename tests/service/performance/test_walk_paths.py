@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.locomotion import floor_plane
-from posefield.performance import speed_profile, walk_paths, walk_request
+from posefield.performance import walk_paths, walk_request
 from posefield.performance.passage import RATE, FloorMotion
-from posefield.performance.speed_profile import SpeedRamps
 from posefield.performance.walk_paths import Radii
-from posefield.performance.walk_request import Disc
+from posefield.performance.walk_request import Disc, SpeedRamps
 
 ROLLING, STANDING = SpeedRamps(None, None), SpeedRamps(0.0, 0.0)
 angles = st.floats(-3.1, 3.1)
@@ -79,7 +78,7 @@ def test_there_is_no_way_out_of_a_ring_of_discs():
 def test_distances_reach_the_length_and_never_go_back(speeds, length, scale, standing):
     curve = 4.0 * np.arange(len(speeds)), np.array(speeds)
     ramps = STANDING if standing else ROLLING
-    gone = speed_profile.distances_over_length(curve, scale, length, ramps)
+    gone = walk_request.distances_over_length(curve, scale, length, ramps)
     assert gone[0] == 0.0
     assert gone[-1] == pytest.approx(length)
     assert np.all(np.diff(gone) > -1e-12)
@@ -88,10 +87,10 @@ def test_distances_reach_the_length_and_never_go_back(speeds, length, scale, sta
 
 def test_an_even_acceleration_takes_the_time_of_mechanics():
     curve = np.zeros(1), np.array([1.2])
-    gone = speed_profile.distances_over_length(curve, "distance", 20.0, STANDING)
+    gone = walk_request.distances_over_length(curve, "distance", 20.0, STANDING)
     # Two ramps of 3 s and 1.8 m each.
     assert (len(gone) - 1) / RATE == pytest.approx(6.0 + 16.4 / 1.2, abs=1.0 / RATE)
     times = np.arange(120) / RATE
     assert gone[:120] == pytest.approx(0.2 * times**2, abs=2e-3)
-    rolled = speed_profile.distances_over_length(curve, "distance", 20.0, ROLLING)
+    rolled = walk_request.distances_over_length(curve, "distance", 20.0, ROLLING)
     assert (len(rolled) - 1) / RATE == pytest.approx(20.0 / 1.2, abs=1.0 / RATE)

@@ -11,9 +11,8 @@ from posefield.common.errors import InvalidField
 from posefield.constraints.take_variation import TakeSettings
 from posefield.inference import session
 from posefield.locomotion import floor_plane, gait
-from posefield.performance import reporting, walk_entries
+from posefield.performance import composition, walk_entries
 from posefield.performance.passage import RATE, FloorMotion
-from posefield.performance.walk_entries import SynthesisSettings
 from posefield.performance.walk_plan import plan_walk
 from posefield.performance.walk_request import Disc, WalkRequest
 from posefield.synthesis.synthesizer import Synthesizer
@@ -62,7 +61,7 @@ def planned(walking, request, start=ORIGIN, phase=0.1):
 def test_walks_follow_their_paths(walk, walking, name):
     plan = planned(walking, WALKS[name])
     made = walk_entries.walk_passage(walk, plan)
-    found = reporting.path_errors(plan, made.roots, made.rotations)
+    found = composition.path_errors(plan, made.roots, made.rotations)
     assert found.lateral < 0.005
     assert found.along < 0.005
     assert np.degrees(found.heading) < 0.5
@@ -71,9 +70,9 @@ def test_walks_follow_their_paths(walk, walking, name):
     # The measure sees a body that is 2 cm beside its path and one that crabs.
     left = np.exp(1j * plan.path.at(plan.distances)[1]) * 0.02j
     beside = made.roots + floor_plane.at_height(left, np.zeros(len(plan)))
-    assert reporting.path_errors(plan, beside, made.rotations).lateral > 0.015
+    assert composition.path_errors(plan, beside, made.rotations).lateral > 0.015
     crabs = made.roots + floor_plane.at_height(0.03 * plan.distances * 1j, np.zeros(len(plan)))
-    assert np.degrees(reporting.path_errors(plan, crabs, made.rotations).heading) > 0.5
+    assert np.degrees(composition.path_errors(plan, crabs, made.rotations).heading) > 0.5
 
 
 @pytest.mark.parametrize("name", WALKS)
@@ -155,14 +154,13 @@ def test_given_controls_and_performers_are_kept(walking):
 def test_takes_and_details_differ_and_stay_on_the_path(walk, walking):
     plan = planned(walking, WalkRequest(1.1, to=(0.0, 10.0)))
     mean = walk_entries.walk_passage(walk, plan)
-    settings = SynthesisSettings(take=TakeSettings(7, 0.7, detail=True))
-    take = walk_entries.walk_passage(walk, plan, settings)
-    again = walk_entries.walk_passage(walk, plan, settings)
+    settings = TakeSettings(7, 0.7, detail=True)
+    take = walk_entries.walk_passage(walk, plan, take=settings)
+    again = walk_entries.walk_passage(walk, plan, take=settings)
     assert take.rotations.tobytes() == again.rotations.tobytes()
     assert np.abs(take.rotations - mean.rotations).max() > 0.01
-    assert reporting.path_errors(plan, take.roots, take.rotations).lateral < 0.025
-    nothing = SynthesisSettings(take=TakeSettings(0, 0.7, detail=False))
-    same = walk_entries.walk_passage(walk, plan, nothing)
+    assert composition.path_errors(plan, take.roots, take.rotations).lateral < 0.025
+    same = walk_entries.walk_passage(walk, plan, take=TakeSettings(0, 0.7, detail=False))
     assert np.allclose(same.rotations, mean.rotations, atol=1e-4)
 
 
@@ -215,7 +213,7 @@ def test_models_without_contacts_and_performers_walk(request, fixture):
     low, high = own.region.speeds
     plan = planned(own, WalkRequest(0.5 * (low + high), to=(0.0, 8.0), **BOTH))
     made = walk_entries.walk_passage(model, plan)
-    found = reporting.path_errors(plan, made.roots, made.rotations)
+    found = composition.path_errors(plan, made.roots, made.rotations)
     assert found.lateral < 0.005
     assert found.along < 0.01
     assert np.isfinite(made.rotations).all()
