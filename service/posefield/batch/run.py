@@ -176,7 +176,7 @@ def _misfit(work: WorkerInput, row: Row[ClipQuestion]) -> str | None:
     try:
         delivery = clip_files.clip_format(work, row.format).delivery
         if delivery is not None:
-            delivery.character.target.check(row.question)
+            delivery.character.check(row.question)
     except InvalidField as error:
         return str(error)
     return None

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from posefield.characters.user_character import UserCharacter
+from posefield.characters.user_character import FileAxes, UserCharacter
 from posefield.common.errors import InvalidField
 from posefield.encode.conventions import Convention
 from posefield.encode.formats import ClipEncoder
-from posefield.encode.user_rig.rig_files import FileAxes
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
@@ -59,7 +58,7 @@ class Delivery:
         clip, facts, warnings = self._retargeted(answer.clip, roles, stances, hands, travel)
         if question.loop:
             left_out += _loop_note(clip)
-        notes = (*warnings, *left_out, *self.character.target.notes(self.form, clip))
+        notes = (*warnings, *left_out, *self.character.notes(self.form, clip))
         told_trust = structs.replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
         return ClipAnswer(clip, told_trust)
 
@@ -73,7 +72,7 @@ class Delivery:
         stances = None if report.feet is None else report.feet.stances
         hands, left_out = _held_hands(answer.held, self._hands(roles))
         clip, facts, new_warnings = self._retargeted(answer.clip, roles, stances, hands, "kept")
-        notes = (*new_warnings, *left_out, *self.character.target.notes(self.form, clip))
+        notes = (*new_warnings, *left_out, *self.character.notes(self.form, clip))
         warnings = tuple(ScriptWarning(POINTER, sentence) for sentence in notes)
         delivered = structs.replace(
             report, script_warnings=(*report.script_warnings, *warnings), retargeting=facts
@@ -90,7 +89,7 @@ class Delivery:
 
         skeleton, roles: of the model, joints by role.
         """
-        self.character.target.check(question)
+        self.character.check(question)
         role_map.body_of_motion(skeleton, skeleton.offsets, roles)
 
     def check_layout(self, layout: PerformanceLayout) -> None:
@@ -100,7 +99,7 @@ class Delivery:
 
     def encode(self, answer: SampledClip) -> bytes:
         """Return the file of a motion of the character."""
-        return self.character.target.encode(self.form, answer, self.convention)
+        return self.character.encode(self.form, answer, self.convention)
 
     def _hands(self, roles: Mapping[str, str]) -> dict[str, str]:
         """Return the role of each joint of the model that is a hand which the character has."""
@@ -125,8 +124,8 @@ class Delivery:
         retargeted, report = retarget(
             clip, character.rig, roles, stances=stances, hands=hands, travel=travel
         )
-        facts = {"character": character.name, "file": character.target.file, **report.facts()}
-        bone = clip.root_bone or character.target.has_floor_root
+        facts = {"character": character.name, "file": character.file, **report.facts()}
+        bone = clip.root_bone or character.has_floor_root
         return replace(retargeted, root_bone=bone), facts, tuple(facts.pop("warnings"))
 
 
@@ -135,7 +134,7 @@ def deliver(character: UserCharacter, form: ClipEncoder, axes: FileAxes) -> Deli
 
     Raises InvalidField for what the files of a character cannot hold.
     """
-    return Delivery(character, form, character.target.convention(form, axes))
+    return Delivery(character, form, character.convention(form, axes))
 
 
 def _stances(feet: FeetResult | None, question: ClipQuestion) -> Sequence[StanceResult] | None:

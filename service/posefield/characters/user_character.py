@@ -4,51 +4,193 @@ import hashlib
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from posefield.common.errors import FileError, InvalidField, did_you_mean
-from posefield.encode.user_rig.rig_files import RigTarget
-from posefield.question.motion_question import LEGAL_NAME
+from posefield.common.units import LengthUnit, UpAxis
+from posefield.encode import glb
+from posefield.encode.conventions import METRES, Convention
+from posefield.encode.formats import ClipEncoder
+from posefield.motion import root_bone
+from posefield.motion.clip import Clip
+from posefield.question.motion_question import LEGAL_NAME, BodyKind, ClipQuestion
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.results import SampledClip
 from posefield.rigs import rest_joints
 from posefield.rigs.rig import Rig, read_rig
+
+if TYPE_CHECKING:
+    from posefield.encode.usd.rig_layer import RigStage
 
 MOST_ROLES_BYTES = 128_000
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz", ".glb")
 """Endings of files with a rig."""
 
 
+LAYERS = ("usda", "usdc", "usdz")
+"""Formats of USD."""
+TABLES = ("json", "npz", "arrow", "msgpack")
+"""Formats of numbers, which hold the curves of the model beside the joints."""
+
+
+class FileAxes(Protocol):
+    """Question with the unit, up axis and body of its files."""
+
+    @property
+    def unit(self) -> LengthUnit | None:
+        """Return the unit of length; None for the format's."""
+
+    @property
+    def up(self) -> UpAxis | None:
+        """Return the up axis; None for the format's."""
+
+    @property
+    def body(self) -> BodyKind | None:
+        """Return the body; None for the format's."""
+
+
 @dataclass(frozen=True)
 class UserCharacter:
-    """Character of a user's file.
+    """Character of a user's file, for which files of motions are written.
 
     digest: SHA-256 of the file, of the files that it refers to as far as its rig and the extent of
-    its meshes depend on them, and of the roles that were stated. target: rig, and the path by which
-    written files refer to it.
+    its meshes depend on them, and of the roles that were stated. file: its name. reference: path by
+    which USD files refer to it. stage: place of its skeleton in a USD file; None for glTF.
     """
 
     name: str
     digest: str
-    target: RigTarget
-
-    @property
-    def rig(self) -> Rig:
-        """Return the rig of the file."""
-        return self.target.rig
+    rig: Rig
+    file: str
+    reference: str
+    stage: "RigStage | None"
 
     @property
     def facts(self) -> tuple[str, ...]:
         """Return name, digest and reference: all that determines files, besides the motion."""
-        return self.name, self.digest, self.target.reference
+        return self.name, self.digest, self.reference
 
     @property
     def height(self) -> float:
         """Return the height of the joints at rest, m."""
         joints = self.rig.skeleton
         return float(np.ptp(joints.at_rest(joints.offsets)[:, 1]))
+
+    @property
+    def has_floor_root(self) -> bool:
+        """Return whether the root is a joint above the hips, near the floor at rest."""
+        heights = self.rig.skeleton.at_rest(self.rig.skeleton.offsets)[:, 1]
+        hips = self.rig.joints["hips"]
+        return hips > 0 and bool(np.ptp(heights[[0, hips]]) > 0.8 * (heights[hips] - heights.min()))
+
+    def check(self, question: ClipQuestion | PerformanceQuestion) -> None:
+        """Raise InvalidField for what no file of a user's character holds."""
+        if question.names != "own":
+            raise InvalidField(
+                "names",
+                f"{question.names!r} with a character, expected 'own': joints have the names of "
+                "its file",
+            )
+        if question.root == "bone" and not self.rig.joints["hips"]:
+            raise InvalidField(
+                "root",
+                f"'bone' with a character, expected one with a joint above the hips: {self.file} "
+                "has none",
+            )
+        if isinstance(question, ClipQuestion) and question.joint_sigma:
+            raise InvalidField(
+                "joint_sigma",
+                "true with a character, expected false: sigma is of the joints of the model",
+            )
+
+    def convention(self, form: ClipEncoder, axes: FileAxes) -> Convention:
+        """Return the convention of files in a format.
+
+        Raises InvalidField for a body, for a package, and for another unit or up axis than that of
+        the character's file.
+        """
+        if axes.body is not None:
+            raise InvalidField(
+                "body",
+                f"{axes.body!r} with a character, expected none given: the body is in its file",
+            )
+        if form.extension == "usdz" and self.stage is not None:
+            raise InvalidField(
+                "character",
+                "a USD file with the format usdz, expected usda or usdc: a package holds all its "
+                f"files, and {self.file} is referred to, not copied",
+            )
+        convention = form.convention(axes.unit, axes.up)
+        if form.extension not in LAYERS:
+            return convention
+        character_axes = METRES
+        if self.stage is not None:
+            character_axes = Convention(self.rig.rest.metres_per_unit, self.rig.rest.up)
+        if axes.unit is not None and convention.metres_per_unit != character_axes.metres_per_unit:
+            raise InvalidField("unit", f"{axes.unit!r}, {self._expected(character_axes)}")
+        if axes.up is not None and convention.up != character_axes.up:
+            raise InvalidField("up", f"{axes.up!r}, {self._expected(character_axes)}")
+        return character_axes
+
+    def _expected(self, character_axes: Convention) -> str:
+        return (
+            f"expected none given: the layer has the unit, {character_axes.metres_per_unit:g} m, "
+            f"and the up axis, {character_axes.up}, of the character {self.file}"
+        )
+
+    def notes(self, form: ClipEncoder, clip: Clip) -> tuple[str, ...]:
+        """Return a sentence for each thing that a file in a format lacks."""
+        notes = []
+        if form.extension in LAYERS and self.stage is None:
+            notes.append(
+                f"USD cannot refer to glTF files: the layer has the skeleton of {self.file} "
+                "without its skin; glb binds to the file by the names of its joints"
+            )
+        if form.extension in LAYERS and self.stage is not None:
+            notes += self.stage.notes
+        if form.extension == "glb":
+            notes.append(
+                "glTF cannot refer to the skin of another file: this one has the animation alone, "
+                f"which binds to {self.file} by the names of its joints"
+            )
+        curves = clip.curves
+        if curves is not None and form.has_curves and form.extension not in TABLES:
+            notes.append(
+                f"files of a character in {form.extension} carry no curves: {len(curves.curves)} "
+                f"are left out ({', '.join(curves.names)}); {', '.join(TABLES)} have them"
+            )
+        return tuple(notes)
+
+    def encode(self, form: ClipEncoder, answer: SampledClip, convention: Convention) -> bytes:
+        """Return the file of a motion of the rig's skeleton, in the convention of `convention`."""
+        if answer.clip.root_bone and form.extension not in TABLES:
+            clip = root_bone.move_root(answer.clip, self.rig.joints["hips"])
+            answer = SampledClip(clip, answer.trust)
+        if form.extension in LAYERS:
+            # usd-core takes 0.12 CPU seconds to import.
+            from posefield.encode.usd import usd_clip
+            from posefield.encode.usd_layers import layers
+
+            layer = self._layer(answer)
+            if form.extension == "usda":
+                return bytes(layer.ExportToString(), "utf-8")
+            binary = layers.crate_bytes(layer)
+            return binary if form.extension == "usdc" else usd_clip.usdz_package(binary)
+        if form.extension == "glb":
+            rest = self.rig.rest if self.stage is None else self.rig.rest.in_metres()
+            return glb.rig_animation(answer, rest)
+        return form.encode(answer, replace(convention, body="none"))
+
+    def _layer(self, answer: SampledClip) -> Any:
+        from posefield.encode.usd import rig_layer
+
+        if self.stage is None:
+            return rig_layer.skeleton_layer(answer, self.rig.rest)
+        return rig_layer.referring_layer(answer, self.rig.rest, self.stage, self.reference)
 
 
 def open_character(
@@ -66,12 +208,16 @@ def open_character(
     rest = rig.rest
     for numbers in (rest.rotations, rest.translations, rest.scales):
         digest.update(np.ascontiguousarray(numbers).tobytes())
-    with rest_joints.naming_faults(str(path), RuntimeError, ValueError, TypeError, LookupError):
-        target = RigTarget.of(rig, path, reference)
-    if target.stage is not None:
+    stage = None
+    if rig.format == "USD":
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode.usd import rig_layer
+
+        with rest_joints.naming_faults(str(path), RuntimeError, ValueError, TypeError, LookupError):
+            stage = rig_layer.read_stage(path, rig.skeleton_path, rig.joint_paths)
         # Meshes of files that this one refers to decide the extent.
-        digest.update(np.ascontiguousarray(target.stage.radii).tobytes())
-    return UserCharacter(path.stem, digest.hexdigest(), target)
+        digest.update(np.ascontiguousarray(stage.radii).tobytes())
+    return UserCharacter(path.stem, digest.hexdigest(), rig, path.name, reference, stage)
 
 
 def _content(path: Path) -> bytes:
@@ -131,7 +277,7 @@ class CharacterFolder:
         """Return a digest of all characters, by which answers with them are cached."""
         checksum = hashlib.sha256()
         for name, character in self.characters.items():
-            checksum.update(f"{name} {character.digest} {character.target.reference}\n".encode())
+            checksum.update(f"{name} {character.digest} {character.reference}\n".encode())
         return checksum.digest()
 
     def find(self, name: str) -> UserCharacter:
@@ -197,7 +343,7 @@ def _facts(character: UserCharacter) -> dict[str, Any]:
     rig = character.rig
     return {
         "name": character.name,
-        "file": character.target.file,
+        "file": character.file,
         "format": rig.format,
         "digest": character.digest,
         "joints": len(rig.skeleton),

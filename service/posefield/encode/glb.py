@@ -13,7 +13,7 @@ import re
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -27,11 +27,12 @@ from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig, RestPose
 from posefield.encode.conventions import Convention
-from posefield.motion import quat
+from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import CurveValues
 from posefield.motion.skeleton import Skeleton
 from posefield.question.results import SampledClip
+from posefield.rigs.rest_joints import RestJoints
 
 MAGIC, VERSION, TEXT, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 VERTICES, CORNERS = 34962, 34963
@@ -380,3 +381,66 @@ def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[st
         "_ANCHORS": store.add(anchors, "VEC2", target=VERTICES),
         "_SHARE": store.add(shares, "SCALAR", target=VERTICES),
     }
+
+
+OUTER = "Armature"
+"""Name of the node above the joints of a user's character."""
+
+
+def rig_animation(answer: SampledClip, rest: RestJoints) -> bytes:
+    """Return the glTF file of a motion of a user's character, without its skin.
+
+    glTF cannot refer to the skin of another file. Engines and three.js bind an animation to the
+    user's own file by the names of its nodes: those of the joints in its rest pose, whose local
+    transforms it holds.
+
+    A node above them has the transform from the space of the root joint to the world, unless it
+    is the identity.
+    """
+    store = GlbBuffer()
+    clip = replace(
+        answer.clip,
+        rotations=quat.normalize(rest.file_rotations(answer.clip.rotations)),
+        translations=rest.file_translations(answer.clip.translations),
+        curves=None,
+    )
+    motion = animation(store, answer, clip, rest.translations)
+    return container({"scene": 0, **_rig_nodes(rest), **motion}, store)
+
+
+def _rig_nodes(rest: RestJoints) -> dict[str, Any]:
+    """Return the scene and its nodes; node j is joint j."""
+    nodes: list[dict[str, Any]] = [
+        {"name": name, "rotation": turn, "translation": translation} | _scale(size)
+        for name, turn, translation, size in zip(
+            rest.names,
+            rest.rotations[:, [1, 2, 3, 0]].tolist(),
+            rest.translations.tolist(),
+            rest.scales,
+            strict=True,
+        )
+    ]
+    for joint, parent in enumerate(rest.parents[1:], start=1):
+        nodes[parent].setdefault("children", []).append(joint)
+    outer = _outer_node(rest)
+    root = 0
+    if outer:
+        root = len(nodes)
+        name = joint_roles.free_name(OUTER, set(rest.names))
+        nodes.append({"name": name, **outer, "children": [0]})
+    return {"scenes": [{"nodes": [root]}], "nodes": nodes}
+
+
+def _outer_node(rest: RestJoints) -> dict[str, Any]:
+    """Return the transform above the root joint; nothing for the identity."""
+    outer = rest.outer
+    node = _scale(outer.scale)
+    if not np.isclose(abs(outer.rotation[0]), 1.0):
+        node["rotation"] = outer.rotation[[1, 2, 3, 0]].tolist()
+    if not np.allclose(outer.translation, 0.0):
+        node["translation"] = outer.translation.tolist()
+    return node
+
+
+def _scale(size: Floats) -> dict[str, Any]:
+    return {} if np.allclose(size, 1.0) else {"scale": size.tolist()}

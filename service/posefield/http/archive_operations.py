@@ -163,7 +163,7 @@ def script_order(
     for index, script in enumerate(body.scripts):
         with _element("scripts", index, "character"):
             order = delivery.deliver(character, encoder, script)
-            character.target.check(script)
+            character.check(script)
         order.check_layout(body.layout)
     joints = len(character.rig.skeleton)
     planned = tuple(_planned(library, encoder, names, body.scripts, settings, joints))

@@ -315,3 +315,18 @@ class RestJoints:
         in_file[:, 0] -= self._upright.translation
         turned = quat.rotate(quat.conj(self._outer_orientations), in_file)
         return turned / self.unit_lengths[:, None]
+
+    def in_metres(self) -> "RestJoints":
+        """Return the joints with the same axes in a world of metres with Y up, without scales."""
+        above = np.concatenate([quat.IDENTITY[None], self.orientations[list(self.parents[1:])]])
+        return RestJoints(
+            self.source,
+            self.names,
+            self.parents,
+            quat.normalize(quat.mul(quat.conj(above), self.orientations)),
+            quat.rotate(quat.conj(above), self.skeleton.offsets),
+            np.ones((len(self.names), 3)),
+            WORLD,
+            1.0,
+            "y",
+        )

@@ -44,8 +44,8 @@ def motion(character):
 
 
 def written(character, motion, form):
-    target, encoder = character.target, CLIP_ENCODERS[form]
-    return target.encode(encoder, motion, target.convention(encoder, ASKED))
+    encoder = CLIP_ENCODERS[form]
+    return character.encode(encoder, motion, character.convention(encoder, ASKED))
 
 
 def usd_file(character, motion, form="usda"):
@@ -72,7 +72,7 @@ def test_usd_refers_to_the_file_and_copies_neither_bind_nor_skin(character, moti
     layer = Sdf.Layer.FindOrOpen(str(path))
     (reference,) = layer.GetPrimAtPath("/Character").referenceList.prependedItems
     assert (reference.assetPath, str(reference.primPath)) == (
-        f"./{character.target.file}",
+        f"./{character.file}",
         "/Character",
     )
     text = path.read_text()
@@ -132,8 +132,8 @@ def test_glb_animates_the_nodes_of_the_file(character, motion):
 def test_what_a_file_cannot_hold_is_refused(character, form, asked, said):
     question = replace_question(asked)
     with pytest.raises(InvalidField, match=said):
-        character.target.check(question)
-        character.target.convention(CLIP_ENCODERS[form], question)
+        character.check(question)
+        character.convention(CLIP_ENCODERS[form], question)
 
 
 def replace_question(asked):

@@ -9,21 +9,20 @@ USD cannot refer, the layer has a skeleton of the same joints without a skin.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from posefield.common.errors import UsdError
-from posefield.common.units import Floats, Singles
+from posefield.common.units import Floats, JointWeights, Positions, Rotations, Singles
 from posefield.encode.character import character
 from posefield.encode.conventions import METRES, Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import layers
 from posefield.encode.usd_layers.layers import ValueTypes
-from posefield.encode.user_rig import rig_stage
-from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion import joint_roles, quat
 from posefield.question.results import SampledClip
 from posefield.rigs import usd_rig
@@ -31,6 +30,70 @@ from posefield.rigs.rest_joints import RestJoints
 
 ANIMATION = "Anim"
 """Name of the animation below the root prim, followed by a number where the file has it."""
+
+
+def matrices(
+    rotations: Annotated[Floats, "*batch joints 4"],
+    translations: Annotated[Floats, "*batch joints 3"],
+) -> Annotated[Floats, "*batch joints 4 4"]:
+    """Return matrices (..., 4, 4) for row vectors, as in USD."""
+    stacked = np.zeros((*rotations.shape[:-1], 4, 4))
+    stacked[..., :3, :3] = np.swapaxes(quat.to_matrix(rotations), -1, -2)
+    stacked[..., 3, :3] = translations
+    stacked[..., 3, 3] = 1.0
+    return stacked
+
+
+BLOCK = 256
+"""Frames whose matrices are computed together: those of a long motion take gigabytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigStage:
+    """Place of a skeleton in a USD file.
+
+    skeleton, skel_root: paths of prims. animation: free path for the animation. joints: tokens in
+    the order of the rig. to_root (4, 4): for row vectors, from the space of the skeleton to that of
+    the SkelRoot. radii (J,): largest distance of a point from a joint that moves it, in the space
+    of the skeleton. notes: on what a reference to the root prim lacks.
+    """
+
+    skeleton: str
+    skel_root: str
+    animation: str
+    joints: tuple[str, ...]
+    to_root: Floats
+    radii: JointWeights
+    notes: tuple[str, ...] = ()
+
+    @property
+    def root(self) -> str:
+        """Return the name of the root prim, to which layers refer."""
+        return self.skeleton.split("/")[1]
+
+    def extent(self, rest: RestJoints, rotations: Rotations, translations: Positions) -> Floats:
+        """Return the lowest and highest corner (2, 3) of the character in the space of its root.
+
+        rotations (F, J, 4), translations (F, J, 3): of the file's joints. A skinned point is a mean
+        of points, each as far from a joint as at rest, so it lies within spheres about the joints.
+        """
+        corners = [
+            self._box(rest, rotations[first : first + BLOCK], translations[first : first + BLOCK])
+            for first in range(0, len(rotations), BLOCK)
+        ]
+        low, high = np.stack(corners, axis=1)
+        return np.stack([low.min(axis=0), high.max(axis=0)])
+
+    def _box(self, rest: RestJoints, rotations: Rotations, translations: Positions) -> Floats:
+        placed = np.zeros((len(rotations), len(rest.names), 4, 4))
+        local = matrices(rotations, translations)
+        local[..., :3, :3] *= rest.scales[:, :, None]
+        for joint, parent in enumerate(rest.parents):
+            joint_matrices = local[:, joint]
+            placed[:, joint] = joint_matrices @ (self.to_root if parent < 0 else placed[:, parent])
+        sizes = np.linalg.norm(self.to_root[:3, :3], axis=1).max()
+        origins, reach = placed[..., 3, :3], (sizes * self.radii)[:, None]
+        return np.stack([(origins - reach).min(axis=(0, 1)), (origins + reach).max(axis=(0, 1))])
 
 
 def read_stage(path: Path, skeleton: str, joints: tuple[str, ...]) -> RigStage:
@@ -148,7 +211,7 @@ def referring_layer(answer: SampledClip, rest: RestJoints, stage: RigStage, refe
 
 def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
     """Return a layer of the same joints in metres with Y up and their motion, without a skin."""
-    rest_in_metres = rig_stage.in_metres(rest)
+    rest_in_metres = rest.in_metres()
     layer = Sdf.Layer.CreateAnonymous("clip.usda")
     paths = character.joint_paths(
         character.legal_names(rest_in_metres.names), rest_in_metres.parents
@@ -198,8 +261,8 @@ def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
         ("bindTransforms", (rest.orientations, positions)),
         ("restTransforms", (rest.rotations, rest.translations)),
     ):
-        matrices = Vt.Matrix4dArray.FromNumpy(rig_stage.matrices(*poses))
-        layers.uniform_attribute(skeleton, name, ValueTypes.Matrix4dArray, matrices)
+        transforms = Vt.Matrix4dArray.FromNumpy(matrices(*poses))
+        layers.uniform_attribute(skeleton, name, ValueTypes.Matrix4dArray, transforms)
 
 
 def _add_animation(

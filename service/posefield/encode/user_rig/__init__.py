@@ -1,1 +1,0 @@
-"""Motions of a user's own character: layers that refer to its file, and named animations."""
