@@ -15,7 +15,7 @@ import hand_cuts
 import numpy as np
 from rows import Row, record, table
 
-from posefield_train.discover import family_search, motion_features, stride_detection
+from posefield_train.discover import family_search, found_clips, motion_features
 from posefield_train.discover.motion_features import Span
 from posefield_train.discover.recordings import read_recordings
 
@@ -29,7 +29,7 @@ SAME_STRIDE = 0.8
 def strides(folder: Path) -> list[Row]:
     """Return the figures of strides against those of strides.csv, at 120 frames a second."""
     found = {
-        recording.file: [one for one in stride_detection.find_strides(recording) if one.travels]
+        recording.file: [one for one in found_clips.find_strides(recording) if one.travels]
         for recording in read_recordings(folder).recordings
     }
     cuts = hand_cuts.records(folder / "strides.csv")

@@ -10,12 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefield_train.discover import (
-    family_search,
-    found_clips,
-    motion_features,
-    stride_detection,
-)
+from posefield_train.discover import family_search, found_clips, motion_features
 from posefield_train.discover.motion_features import Span
 from posefield_train.discover.recordings import read_recordings
 
@@ -52,7 +47,7 @@ def table(path):
 def test_strides_are_those_cut_by_hand(unpacked):
     folder = unpacked("cmu_walk")
     found = {
-        recording.file: [one for one in stride_detection.find_strides(recording) if one.travels]
+        recording.file: [one for one in found_clips.find_strides(recording) if one.travels]
         for recording in read_recordings(folder).recordings
     }
     offsets, cuts = [], table(folder / "strides.csv")
@@ -115,7 +110,7 @@ def test_families_are_the_actions_of_long_takes(unpacked):
         )
     clips, right, hits = 0, 0, set()
     for family in family_search.find_families(corpus):
-        if found_clips.assess(joined, family).reasons:
+        if family_search.assess(joined, family).reasons:
             continue
         own = [
             [at for at, (_, span) in enumerate(truth) if shared(span, member.span) >= 0.5]

@@ -270,15 +270,14 @@ class JointJump:
 def largest_jump(clip: Clip) -> JointJump | None:
     """Return the largest jump of a clip; None if there is none."""
     steps = np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1)
-    leaping = frame_faults.leaping_steps(steps, clip.rate)
-    if not len(leaping.frames):
+    frames, joints, paces = frame_faults.leaping_steps(steps, clip.rate)
+    if not len(frames):
         return None
-    ways = steps[leaping.frames, leaping.joints]
-    farthest = int(np.argmax(ways - leaping.paces))
-    frame, joint = int(leaping.frames[farthest]), int(leaping.joints[farthest])
-    speed, pace = float(ways[farthest]), float(leaping.paces[farthest])
-    whole_body = bool(np.sum(leaping.frames == frame) > 0.5 * steps.shape[1])
-    return JointJump(frame, joint, speed, speed / pace, whole_body)
+    ways = steps[frames, joints]
+    farthest = int(np.argmax(ways - paces))
+    frame, joint, distance = int(frames[farthest]), int(joints[farthest]), float(ways[farthest])
+    whole_body = bool(np.sum(frames == frame) > 0.5 * steps.shape[1])
+    return JointJump(frame, joint, distance, distance / float(paces[farthest]), whole_body)
 
 
 # Multiple of the median distance above which a clip is tested for mirroring, turns and swaps.

@@ -8,6 +8,7 @@ from families.face_motion import FaceTrial
 from posefield.common.units import Floats
 from posefield.motion import bvh_writer
 from posefield_train.sample import sample_files
+from posefield_train.source import clip_table
 
 RECIPE = """\
 schema = 1
@@ -78,7 +79,7 @@ def write_family(output: Path, chosen: Iterable[FaceTrial] | None = None) -> Pat
         files[motion] = bvh_writer.dumps(each.clip, metres_per_unit=1.0)
         files[curves] = curve_text(face_motion.CURVE_NAMES, each.clip.curve_values).encode()
         rows.append([motion, curves, f"{each.smile:.4f}", f"{each.openness:.4f}"])
-    files |= {"clips.csv": sample_files.csv_text(rows).encode(), "recipe.toml": RECIPE.encode()}
+    files |= {"clips.csv": clip_table.csv_text(rows).encode(), "recipe.toml": RECIPE.encode()}
     return sample_files.write_folder(output, files)
 
 
@@ -87,4 +88,4 @@ def curve_text(names: Sequence[str], values: Floats) -> str:
     rows = [["frame", *names]]
     for frame, row in enumerate(values.tolist()):
         rows.append([str(frame), *(f"{value:.{DECIMALS}f}" for value in row)])
-    return sample_files.csv_text(rows)
+    return clip_table.csv_text(rows)

@@ -4,7 +4,7 @@ import discover_takes
 import numpy as np
 import pytest
 
-from posefield_train.discover import family_search, found_clips, motion_features
+from posefield_train.discover import family_search, motion_features
 
 SECONDS, TAKES = 24.0, 3
 ORDERS = ("RCCRRC", "CRRRCC", "CCRCRR")
@@ -68,7 +68,7 @@ def kinds(span):
 def offered(corpus):
     joined = motion_features.join_features(corpus)
     found = family_search.find_families(corpus)
-    return [one for one in found if not found_clips.assess(joined, one).reasons]
+    return [one for one in found if not family_search.assess(joined, one).reasons]
 
 
 def test_planted_motions_are_found_as_families_of_their_own(corpus):

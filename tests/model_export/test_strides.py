@@ -6,8 +6,8 @@ import discover_takes
 import numpy as np
 import pytest
 
-from posefield_train.discover import stride_detection
-from posefield_train.discover.stride_detection import alternating_extrema, find_strides, moving_mean
+from posefield_train.discover import found_clips
+from posefield_train.discover.found_clips import alternating_extrema, find_strides, moving_mean
 
 WALK = {"speed": 1.0, "swing": 0.6, "period": 1.2}
 """Feet 0.6 leg lengths apart; a stride recordings 72 frames and begins at a multiple of 72."""
@@ -56,7 +56,7 @@ def test_extrema_alternate_and_small_swings_do_not_count():
         signs = [sign for _, sign in found]
         assert signs == [signs[0] * (-1) ** at for at in range(len(signs))] if signs else True
         steps = np.abs(np.diff([values[at] for at, _ in found]))
-        assert np.all(steps >= stride_detection.HYSTERESIS)
+        assert np.all(steps >= found_clips.HYSTERESIS)
         assert [at for at, _ in found] == sorted(at for at, _ in found)
 
 

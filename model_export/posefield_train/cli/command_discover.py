@@ -136,6 +136,7 @@ def _write_recipes(
     folder: Path, output: Path, stated: StatementOptions, wanted: FamilyOptions, json: bool
 ) -> None:
     from posefield.console.progress import ProgressBar
+    from posefield_train.discover.recordings import FileStatements
     from posefield_train.families import contact_sheet, found_families, recipe_folder
     from posefield_train.source.motion_readers import MotionFiles
 
@@ -145,7 +146,7 @@ def _write_recipes(
     files = MotionFiles(KEPT_POSES)
     read = _read(folder, stated, files)
     names = [recording.file for recording in read.recordings]
-    statements = found_families.FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
+    statements = FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
     with ProgressBar("bodies", len(names)) as bar:
         kinds = found_families.find_kinds(folder, names, statements, bar.update, read.figures)
     with ProgressBar("candidates", wanted.candidates) as bar:
@@ -228,7 +229,7 @@ def _read(
     from posefield_train.source import motion_readers
 
     with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
-        known = recordings.Stated(stated.up, _roles(stated), stated.rate)
+        known = recordings.FileStatements(None, stated.up, _roles(stated), stated.rate)
         read = recordings.read_recordings(folder, known, bar.update, files)
     output_files.tell_files("left out", list(read.refused.items()))
     output_files.tell_files(

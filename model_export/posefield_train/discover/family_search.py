@@ -13,7 +13,15 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield_train.discover import motion_features
-from posefield_train.discover.motion_features import RATE, Corpus, Ends, JoinedFeatures, Match, Span
+from posefield_train.discover.motion_features import (
+    RATE,
+    Corpus,
+    Ends,
+    JoinedFeatures,
+    Match,
+    Span,
+    align,
+)
 from posefield_train.discover.recordings import Recording
 
 LARGEST_OVERLAP = 0.2
@@ -41,7 +49,7 @@ def find_like(
         if len(found) == most or not np.isfinite(ends.costs[end]):
             break
         span = joined.span(int(ends.starts[end]), end)
-        if not corpus.is_whole(span.recording, span.start, span.end):
+        if not corpus.is_whole(span):
             continue
         if any(span.overlap(other) > REJECTED_OVERLAP for other in rejected):
             continue
@@ -124,7 +132,7 @@ def find_families(
     for searched, span in enumerate(picked, 1):
         # Left out after they were picked, so that a leap of one recording changes no other's
         # candidates.
-        if corpus.is_whole(span.recording, span.start, span.end):
+        if corpus.is_whole(span):
             found.append(_matches(joined, span))
         report(searched)
     return _cover(joined, found)
@@ -213,3 +221,64 @@ def _gain(own: _Matches, free: Floats) -> tuple[float, list[int]]:
     kept = np.flatnonzero(within > FREE * (own.lasts + 1 - own.firsts))
     gains = (1.0 - own.costs[kept] / LARGEST_COST) * within[kept]
     return float(gains.sum()), kept.tolist()
+
+
+MOST_WITHIN = 0.2
+"""Variance between the clips of a family as a share of that of all recordings, from which on they
+are too different."""
+LEAST_SHARED = 0.5
+"""Share of the variance of a family that its mean motion has, below which there is no motion that
+the clips have in common."""
+
+
+@dataclass(frozen=True)
+class FamilyQuality:
+    """Likeness of the clips of a family, and their common motion.
+
+    within: mean variance between the clips at the same part of the motion. motion: variance of
+    their mean over time; both as shares of the variance of all recordings. seconds: median
+    duration.
+    """
+
+    within: float
+    motion: float
+    seconds: float
+
+    @property
+    def shared(self) -> float:
+        """Return the share of the variance that the mean motion has."""
+        return self.motion / (self.motion + self.within)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Return why the family is not offered; empty if it is."""
+        found = []
+        if self.seconds < SHORTEST:
+            found.append(f"{self.seconds:.1f} s long, expected {SHORTEST:g} s or more")
+        if self.within > MOST_WITHIN:
+            found.append(
+                f"clips differ by {self.within:.0%} of all motion, expected at most "
+                f"{MOST_WITHIN:.0%}"
+            )
+        if self.shared < LEAST_SHARED:
+            found.append(
+                f"{self.shared:.0%} of its motion is common to the clips, expected "
+                f"{LEAST_SHARED:.0%} or more"
+            )
+        return tuple(found)
+
+
+def assess(joined: JoinedFeatures, family: Family) -> FamilyQuality:
+    """Return the quality of a family, whose clips are aligned to its example."""
+    query = joined.clip(family.example)
+    members = []
+    for member in family.members:
+        clip = joined.clip(member.span)
+        apart = np.linalg.norm(query[:, None] - clip, axis=-1)
+        members.append(clip[align(apart)])
+    aligned = np.stack(members)
+    mean = aligned.mean(axis=0)
+    within = float(np.square(aligned - mean).sum(axis=-1).mean())
+    motion = float(np.square(mean - mean.mean(axis=0)).sum(axis=-1).mean())
+    whole = joined.variance
+    return FamilyQuality(within / whole, motion / whole, family.seconds)

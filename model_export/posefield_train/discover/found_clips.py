@@ -1,7 +1,5 @@
-"""Tables of found clips, and the example and the roles that a search is given."""
+"""Tables of found clips: strides, and motions like an example, and roles that a search is given."""
 
-import csv
-import io
 import re
 import tomllib
 from collections.abc import Sequence
@@ -12,12 +10,100 @@ from typing import Literal
 import numpy as np
 
 from posefield.common.errors import FileError, InvalidField, RecipeError
+from posefield.common.units import Floats
 from posefield.motion.joint_roles import ROLES
-from posefield_train.discover import family_search, motion_features, stride_detection
-from posefield_train.discover.family_search import SHORTEST, Family
-from posefield_train.discover.motion_features import JoinedFeatures, Span, StillRecordings
+from posefield_train.discover import family_search, motion_features
+from posefield_train.discover.motion_features import Span, StillRecordings
 from posefield_train.discover.recordings import Recording
 from posefield_train.source import clip_table, data_folder
+
+SMOOTHING = 0.1
+"""Duration of the moving mean, s."""
+HYSTERESIS, LEAST = 0.25, 0.08
+"""Least swing between two extrema, and least distance of the feet at one, leg lengths."""
+SHORTEST, LONGEST = 0.5, 2.6
+"""Durations of a stride, s."""
+EARLIEST, LATEST = 0.25, 0.75
+"""Share of a stride within which the right foot is most forward."""
+LEAST_TRAVEL = 0.4
+"""Least way of the hips as a share of the swing of the feet."""
+WAY_STEP = 0.1
+"""Time between two places of which the way of the hips is measured, s."""
+
+
+@dataclass(frozen=True)
+class Stride:
+    """Frames of a stride; both show the left foot most forward.
+
+    travel: way of the hips as a share of the swing of the feet, half of it where feet that stand
+    carry the body.
+    """
+
+    first: int
+    last: int
+    travel: float
+
+    @property
+    def travels(self) -> bool:
+        """Return whether the body goes on; a kick or a step in place swings the feet too."""
+        return self.travel >= LEAST_TRAVEL
+
+
+def find_strides(recording: Recording) -> list[Stride]:
+    """Return the strides of a recording, in order, those in place too; two in a row share a frame.
+
+    Within them no joint leaps.
+    """
+    # Distance (F,) by which the left foot is before the right, leg lengths, smooth.
+    angles, across = recording.headings(), recording.across("Foot")
+    ahead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
+    signal = moving_mean(ahead, round(SMOOTHING * recording.rate))
+    extrema = alternating_extrema(signal)
+    found = []
+    for (first, kind), (middle, _), (last, _) in zip(
+        extrema, extrema[1:], extrema[2:], strict=False
+    ):
+        share = (middle - first) / (last - first)
+        is_far = min(signal[first], -signal[middle], signal[last]) > LEAST
+        lasts = SHORTEST <= (last - first) / recording.rate <= LONGEST
+        is_one = lasts and EARLIEST <= share <= LATEST and recording.is_whole(first, last)
+        if kind > 0 and is_far and is_one:
+            swing = signal[first] + signal[last] - 2.0 * signal[middle]
+            # Horizontal way of the hips, leg lengths.
+            step = max(1, round(WAY_STEP * recording.rate))
+            hips = recording.places["hips"][first : last + 1 : step, [0, 2]]
+            way = float(np.linalg.norm(np.diff(hips, axis=0), axis=1).sum())
+            found.append(Stride(first, last, way / swing))
+    return found
+
+
+def moving_mean(values: Floats, frames: int) -> Floats:
+    """Return the mean (F,) of a window of an odd number of frames; the ends are held."""
+    half = max(frames, 1) // 2
+    padded = np.concatenate([[0.0], np.cumsum(np.pad(values, half, mode="edge"))])
+    return np.asarray((padded[2 * half + 1 :] - padded[: -2 * half - 1]) / (2 * half + 1))
+
+
+def alternating_extrema(values: Floats) -> list[tuple[int, int]]:
+    """Return the extrema of a signal (F,): index and sign, 1 of a maximum, -1 of a minimum.
+
+    An extremum counts once the signal left it by HYSTERESIS; then the search for the opposite one
+    begins. The first and the last frame are no extrema.
+    """
+    found: list[tuple[int, int]] = []
+    low = high = 0
+    sign = 0
+    for at, value in enumerate(values):
+        high = at if value > values[high] else high
+        low = at if value < values[low] else low
+        if sign >= 0 and value < values[high] - HYSTERESIS:
+            found += [(high, 1)] if high > 0 else []
+            sign, low = -1, at
+        elif sign <= 0 and value > values[low] + HYSTERESIS:
+            found += [(low, -1)] if low > 0 else []
+            sign, high = 1, at
+    return found
+
 
 EXAMPLE = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
 SHORTEST_EXAMPLE, SHORTEST_ROW = 0.6, 0.2
@@ -29,12 +115,8 @@ MOST_ROLES_BYTES = 128_000
 Verdict = Literal["true", "false", "rejected"]
 
 
-@dataclass(frozen=True)
-class Examples:
-    """Parts of recordings that a person accepted, one or more, and rejected."""
-
-    accepted: tuple[Span, ...]
-    rejected: tuple[Span, ...] = ()
+Examples = tuple[Sequence[Span], Sequence[Span]]
+"""Parts of recordings that a person accepted, one or more, and that were rejected."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +143,7 @@ COLUMNS = ("file", "name", "recording", "first_frame", "last_frame", "seconds", 
 
 def strides(recordings: Sequence[Recording]) -> tuple[list[FoundClip], int]:
     """Return the strides of all recordings, in their order, and how many more do not travel."""
-    every = [
-        (recording, one)
-        for recording in recordings
-        for one in stride_detection.find_strides(recording)
-    ]
+    every = [(recording, one) for recording in recordings for one in find_strides(recording)]
     found = [
         _clip(recording, "stride", one.first, one.last) for recording, one in every if one.travels
     ]
@@ -73,42 +151,38 @@ def strides(recordings: Sequence[Recording]) -> tuple[list[FoundClip], int]:
 
 
 def like(
-    recordings: Sequence[Recording], examples: "Examples", name: str, most: int
+    recordings: Sequence[Recording], examples: Examples, name: str, most: int
 ) -> list[FoundClip]:
     """Return the examples, the clips that are like them, the best first, and the rejected ones.
 
     Raises InvalidField for recordings in which nothing moves.
     """
+    accepted, rejected = examples
     try:
         corpus = motion_features.build_corpus(recordings)
     except StillRecordings as fault:
         raise InvalidField("like", str(fault)) from fault
-    matches = family_search.find_like(corpus, examples.accepted, most, examples.rejected)
+    matches = family_search.find_like(corpus, accepted, most, rejected)
     rows: list[tuple[Span, float | None, Verdict]] = [
-        *((span, 0.0, "true") for span in examples.accepted),
+        *((span, 0.0, "true") for span in accepted),
         *((match.span, match.cost, "false") for match in matches),
-        *((span, None, "rejected") for span in examples.rejected),
+        *((span, None, "rejected") for span in rejected),
     ]
     found = []
-    for span, cost, accepted in rows:
-        first, last = (
-            corpus.frame(span.recording, span.start),
-            corpus.frame(span.recording, span.end),
-        )
-        found.append(_clip(recordings[span.recording], name, first, last, cost, accepted))
+    for span, cost, verdict in rows:
+        first, last = corpus.frames(span)
+        found.append(_clip(recordings[span.recording], name, first, last, cost, verdict))
     return found
 
 
 def table(clips: Sequence[FoundClip]) -> bytes:
     """Return the table as CSV."""
-    lines = io.StringIO(newline="")
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for one in clips:
-        cost = "" if one.cost is None else f"{one.cost:.4f}"
-        frames = (one.first_frame, one.last_frame, f"{one.seconds:.3f}")
-        writer.writerow([one.file, one.name, one.recording, *frames, cost, one.accepted])
-    return lines.getvalue().encode()
+    rows: list[Sequence[object]] = [COLUMNS]
+    for clip in clips:
+        cost = "" if clip.cost is None else f"{clip.cost:.4f}"
+        frames = (clip.first_frame, clip.last_frame, f"{clip.seconds:.3f}")
+        rows.append((clip.file, clip.name, clip.recording, *frames, cost, clip.accepted))
+    return clip_table.csv_text(rows).encode()
 
 
 def _clip(
@@ -136,9 +210,8 @@ def parse_examples(recordings: Sequence[Recording], text: str) -> Examples:
     parts = EXAMPLE.fullmatch(text)
     if parts is None:
         raise InvalidField("like", f"{text!r}, expected FILE:START-END in seconds, or TABLE.csv")
-    return Examples(
-        (_span(recordings, parts[1], (float(parts[2]), float(parts[3])), SHORTEST_EXAMPLE),)
-    )
+    seconds = float(parts[2]), float(parts[3])
+    return [_span(recordings, parts[1], seconds, SHORTEST_EXAMPLE)], []
 
 
 def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
@@ -163,7 +236,7 @@ def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
         )
     if not spans["true"]:
         raise InvalidField("like", f"{path}: no row is accepted, expected one or more")
-    return Examples(tuple(spans["true"]), tuple(spans["rejected"]))
+    return spans["true"], spans["rejected"]
 
 
 def _span(
@@ -206,64 +279,3 @@ def read_roles(path: Path) -> dict[str, str]:
     if len(set(roles.values())) < len(roles):
         raise FileError(path, "a joint with two roles, expected one each")
     return roles
-
-
-MOST_WITHIN = 0.2
-"""Variance between the clips of a family as a share of that of all recordings, from which on they
-are too different."""
-LEAST_SHARED = 0.5
-"""Share of the variance of a family that its mean motion has, below which there is no motion that
-the clips have in common."""
-
-
-@dataclass(frozen=True)
-class FamilyQuality:
-    """Likeness of the clips of a family, and their common motion.
-
-    within: mean variance between the clips at the same part of the motion. motion: variance of
-    their mean over time; both as shares of the variance of all recordings. seconds: median
-    duration.
-    """
-
-    within: float
-    motion: float
-    seconds: float
-
-    @property
-    def shared(self) -> float:
-        """Return the share of the variance that the mean motion has."""
-        return self.motion / (self.motion + self.within)
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """Return why the family is not offered; empty if it is."""
-        found = []
-        if self.seconds < SHORTEST:
-            found.append(f"{self.seconds:.1f} s long, expected {SHORTEST:g} s or more")
-        if self.within > MOST_WITHIN:
-            found.append(
-                f"clips differ by {self.within:.0%} of all motion, expected at most "
-                f"{MOST_WITHIN:.0%}"
-            )
-        if self.shared < LEAST_SHARED:
-            found.append(
-                f"{self.shared:.0%} of its motion is common to the clips, expected "
-                f"{LEAST_SHARED:.0%} or more"
-            )
-        return tuple(found)
-
-
-def assess(joined: JoinedFeatures, family: Family) -> FamilyQuality:
-    """Return the quality of a family, whose clips are aligned to its example."""
-    query = joined.clip(family.example)
-    members = []
-    for member in family.members:
-        clip = joined.clip(member.span)
-        apart = np.linalg.norm(query[:, None] - clip, axis=-1)
-        members.append(clip[motion_features.align(apart)])
-    aligned = np.stack(members)
-    mean = aligned.mean(axis=0)
-    within = float(np.square(aligned - mean).sum(axis=-1).mean())
-    motion = float(np.square(mean - mean.mean(axis=0)).sum(axis=-1).mean())
-    whole = joined.variance
-    return FamilyQuality(within / whole, motion / whole, family.seconds)

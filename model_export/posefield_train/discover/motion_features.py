@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from posefield.common.units import Booleans, Floats, Indices
+from posefield.common.units import Floats, Indices
 from posefield_train.discover.recordings import Recording
 
 STEPS = ((1, 1), (1, 2), (2, 1))
@@ -23,31 +23,6 @@ class Ends:
 
     costs: Floats
     starts: Indices
-
-
-@dataclass(frozen=True)
-class SearchedFrames:
-    """Features of a corpus as every search needs them.
-
-    values (F, k): zero where frames stand between two recordings. squares (F,): of their lengths.
-    between (F,): whether a frame stands between two recordings.
-    """
-
-    values: Floats
-    squares: Floats
-    between: Booleans
-
-
-def distances(query: Floats, corpus: SearchedFrames) -> Floats:
-    """Return the distances (L, F) of features (L, k) of a query from those of a corpus.
-
-    The distance of a frame between two recordings is inf.
-    """
-    found = np.sum(np.square(query), axis=1)[:, None] + corpus.squares
-    found -= 2.0 * query @ corpus.values.T
-    np.sqrt(np.maximum(found, 0.0, out=found), out=found)
-    found[:, corpus.between] = np.inf
-    return found
 
 
 def match_ends(apart: Floats) -> Ends:
@@ -156,6 +131,27 @@ class StillRecordings(ValueError):
 
 
 @dataclass(frozen=True)
+class Span:
+    """Part of a recording. recording: index. start, end: s."""
+
+    recording: int
+    start: float
+    end: float
+
+    @property
+    def seconds(self) -> float:
+        """Return the duration, s."""
+        return self.end - self.start
+
+    def overlap(self, other: "Span") -> float:
+        """Return the common time as a share of the shorter one."""
+        if self.recording != other.recording:
+            return 0.0
+        common = min(self.end, other.end) - max(self.start, other.start)
+        return max(common, 0.0) / min(self.seconds, other.seconds)
+
+
+@dataclass(frozen=True)
 class Corpus:
     """Features of recordings in one basis.
 
@@ -166,16 +162,18 @@ class Corpus:
     roles: tuple[str, ...]
     features: tuple[Floats, ...]
 
-    def frame(self, recording: int, at: float) -> int:
-        """Return the recorded frame of a recording at a time, s."""
-        own = self.recordings[recording]
-        return max(min(round(at * own.rate), len(own) - 1), own.first)
-
-    def is_whole(self, recording: int, start: float, end: float) -> bool:
-        """Return whether no joint leaps between two times of a recording, s."""
-        return self.recordings[recording].is_whole(
-            self.frame(recording, start), self.frame(recording, end)
+    def frames(self, span: Span) -> tuple[int, int]:
+        """Return the first and the last recorded frame of a part of a recording."""
+        recording = self.recordings[span.recording]
+        first, last = (
+            max(min(round(time * recording.rate), len(recording) - 1), recording.first)
+            for time in (span.start, span.end)
         )
+        return first, last
+
+    def is_whole(self, span: Span) -> bool:
+        """Return whether no joint leaps within a part of a recording."""
+        return self.recordings[span.recording].is_whole(*self.frames(span))
 
 
 def build_corpus(recordings: Sequence[Recording]) -> Corpus:
@@ -251,27 +249,6 @@ GAP = 2
 
 
 @dataclass(frozen=True)
-class Span:
-    """Part of a recording. recording: index. start, end: s."""
-
-    recording: int
-    start: float
-    end: float
-
-    @property
-    def seconds(self) -> float:
-        """Return the duration, s."""
-        return self.end - self.start
-
-    def overlap(self, other: "Span") -> float:
-        """Return the common time as a share of the shorter one."""
-        if self.recording != other.recording:
-            return 0.0
-        common = min(self.end, other.end) - max(self.start, other.start)
-        return max(common, 0.0) / min(self.seconds, other.seconds)
-
-
-@dataclass(frozen=True)
 class Match:
     """A clip that is like another one. cost: distance as a share of that of any clip."""
 
@@ -297,11 +274,11 @@ class JoinedFeatures:
         return float(self.values[self.owners >= 0].var(axis=0).sum())
 
     @cached_property
-    def _searched(self) -> SearchedFrames:
-        # NaN stands between two recordings.
-        known = np.nan_to_num(self.values)
-        missing = np.isnan(self.values[:, 0])
-        return SearchedFrames(known, np.sum(np.square(known), axis=1), missing)
+    def _searched(self) -> tuple[Floats, Floats]:
+        """Features (F, k) with zero in gaps, and squares (F,) of their lengths, inf in gaps."""
+        values = np.nan_to_num(self.values)
+        squares = np.sum(np.square(values), axis=1)
+        return values, np.where(self.owners < 0, np.inf, squares)
 
     def frames(self, span: Span) -> slice:
         """Return the frames of a part of a recording; its end may lie beyond the last one."""
@@ -329,8 +306,11 @@ class JoinedFeatures:
 
         Costs are shares of the median over all places where a clip may end.
         """
-        apart = distances(self.clip(span), self._searched)
-        found = match_ends(apart)
+        query, (values, squares) = self.clip(span), self._searched
+        distances = np.sum(np.square(query), axis=1)[:, None] + squares
+        distances -= 2.0 * query @ values.T
+        np.sqrt(np.maximum(distances, 0.0, out=distances), out=distances)
+        found = match_ends(distances)
         usual = float(np.median(found.costs[np.isfinite(found.costs)]))
         return Ends(found.costs / usual, found.starts)
 

@@ -36,18 +36,10 @@ COMPARED = (
 """Roles whose places are compared, as far as all recordings have them."""
 
 
-@dataclass(frozen=True)
-class RecordingCopy:
-    """A copy of another recording. original: its file. note: why."""
-
-    original: str
-    note: str
-
-
 def find_copies(
     files: Sequence[str], places: Sequence[Mapping[str, Floats]]
-) -> dict[str, RecordingCopy]:
-    """Return the recordings that are copies, by file.
+) -> dict[str, tuple[str, str]]:
+    """Return the original of each recording that is a copy, and why it is one, by file.
 
     files: of the recordings. places: positions (F, 3) by role of each, leg lengths, Y up.
     """
@@ -68,7 +60,7 @@ def find_copies(
             if files[at] != originals[at]:
                 notes.setdefault(files[at], f"{said}: both are one recording")
     copies = dict(zip(files, originals, strict=True))
-    return {file: RecordingCopy(copies[file], note) for file, note in notes.items()}
+    return {file: (copies[file], note) for file, note in notes.items()}
 
 
 def _motion(places: Mapping[str, Floats], roles: Sequence[str]) -> Positions:
@@ -162,13 +154,14 @@ class ReadRecordings:
 
 
 @dataclass(frozen=True)
-class Stated:
-    """Statements about all files.
+class FileStatements:
+    """Statements about all files, which count more than what is proposed.
 
-    up: axis; None for that which each file or body tells. roles: joints by role, which count more
-    than those that are recognised. rate: frames a second of files that state none.
+    metres_per_unit, up: None for what the files or bodies tell. roles: joints by role, which count
+    more than those that are recognised. rate: frames a second of files that state none.
     """
 
+    metres_per_unit: float | None = None
     up: UpAxis | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
     rate: float | None = None
@@ -176,7 +169,7 @@ class Stated:
 
 def read_recordings(
     folder: Path,
-    stated: Stated | None = None,
+    stated: FileStatements | None = None,
     report: Callable[[int], None] = lambda _: None,
     files: MotionFiles | None = None,
 ) -> ReadRecordings:
@@ -190,7 +183,7 @@ def read_recordings(
     found = motion_readers.find_refused(folder)
     refused = {path.relative_to(folder).as_posix(): said for path, said in found.items()}
     bodies, frames = list[Body](), 0
-    known = stated or Stated()
+    known = stated or FileStatements()
     read = motion_readers.read if files is None else files.read
     measured: Counter[tuple[str, ...]] = Counter()
     for count, path in enumerate(motion_readers.find_files(folder), 1):
@@ -246,7 +239,7 @@ class Body:
         return replace(self, figure=self.figure.with_few_frames())
 
 
-def _body(name: str, file: MotionFile, stated: Stated) -> Body:
+def _body(name: str, file: MotionFile, stated: FileStatements) -> Body:
     if len(file) < FEWEST_FRAMES:
         raise UnusableRecording(f"found {len(file)} frame, expected a motion")
     if file.rate is None:
@@ -324,12 +317,12 @@ def _with_originals(
     for recording in recordings:
         joints = list(recording.places)
         said = frame_faults.describe(recording.faults, joints, recording.rate, left_out=True)
-        if recording.file in copies:
-            said += [copies[recording.file].note]
+        original, note = copies.get(recording.file, (None, ""))
+        if note:
+            said += [note]
         if said:
             notes[recording.file] = said
-        first = copies[recording.file].original if recording.file in copies else None
-        found.append(replace(recording, copy_of=first))
+        found.append(replace(recording, copy_of=original))
     return found, notes
 
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -106,29 +107,6 @@ HEADINGS = {
 """Headings of these clips by the kind of the family."""
 
 
-@dataclass(frozen=True)
-class ShownClip:
-    """A clip of the page. key: as posefield review --drop names it. place: file and time, s."""
-
-    key: str
-    place: str
-    cost: float | None
-    strip: StickStrip
-
-
-@dataclass(frozen=True)
-class ShownFamily:
-    """A row of the page. headings: of best and worst clips. facts: names and values in text."""
-
-    number: int
-    title: str
-    example: StickStrip
-    best: tuple[ShownClip, ...]
-    worst: tuple[ShownClip, ...]
-    headings: tuple[str, str]
-    facts: tuple[tuple[str, str], ...]
-
-
 def render(
     found: FoundFamilies, recordings: Sequence[Recording], folder: str, refused: Mapping[str, str]
 ) -> bytes:
@@ -159,30 +137,32 @@ def render(
     return page.encode()
 
 
-def _shown(one: OfferedFamily, recordings: Mapping[str, Recording]) -> ShownFamily:
+def _shown(one: OfferedFamily, recordings: Mapping[str, Recording]) -> dict[str, Any]:
+    """Return a family as the page names its facts. headings: of best and worst clips."""
     rows = one.family.rows
     best, worst = rows[:BEST], rows[max(BEST, len(rows) - WORST) :]
     example = one.family.example or rows[0]
-    return ShownFamily(
-        one.number,
-        f"{len(rows)} {one.family.kind}",
-        draw(recordings[example.file], example.first_frame, example.last_frame),
-        tuple(_clip(one.number, row, recordings) for row in best),
-        tuple(_clip(one.number, row, recordings) for row in worst),
-        HEADINGS[one.family.kind],
-        _facts(one),
-    )
+    return {
+        "number": one.number,
+        "title": f"{len(rows)} {one.family.kind}",
+        "example": draw(recordings[example.file], example.first_frame, example.last_frame),
+        "best": [_clip(one.number, row, recordings) for row in best],
+        "worst": [_clip(one.number, row, recordings) for row in worst],
+        "headings": HEADINGS[one.family.kind],
+        "facts": _facts(one),
+    }
 
 
-def _clip(number: int, row: FamilyRow, recordings: Mapping[str, Recording]) -> ShownClip:
+def _clip(number: int, row: FamilyRow, recordings: Mapping[str, Recording]) -> dict[str, Any]:
+    """Return a clip of the page. key: as posefield review --drop names it."""
     recording = recordings[row.file]
     start, end = row.first_frame / recording.rate, row.last_frame / recording.rate
-    return ShownClip(
-        f"{number}:{row.file}@{0.5 * (start + end):.2f}",
-        f"{row.file}, {start:.1f} to {end:.1f}{NO_BREAK}s",
-        row.cost,
-        draw(recording, row.first_frame, row.last_frame),
-    )
+    return {
+        "key": f"{number}:{row.file}@{0.5 * (start + end):.2f}",
+        "place": f"{row.file}, {start:.1f} to {end:.1f}{NO_BREAK}s",
+        "cost": row.cost,
+        "strip": draw(recording, row.first_frame, row.last_frame),
+    }
 
 
 def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:

@@ -1,7 +1,5 @@
 """Families of a folder's recordings: similar motions and strides, as rows of tables."""
 
-import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -11,14 +9,13 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from posefield.common.errors import InvalidField, RecipeError
-from posefield.common.units import Floats, UpAxis
+from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton
 from posefield.roles.joint_recognition import RoleGuess
-from posefield_train.discover import family_search, found_clips, motion_features, stride_detection
-from posefield_train.discover.family_search import FEWEST
-from posefield_train.discover.found_clips import FamilyQuality
+from posefield_train.discover import family_search, found_clips, motion_features
+from posefield_train.discover.family_search import FEWEST, FamilyQuality
 from posefield_train.discover.motion_features import Corpus
-from posefield_train.discover.recordings import Recording
+from posefield_train.discover.recordings import FileStatements, Recording
 from posefield_train.probe import probe_report, proposals, recipe_draft
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Figure, Proposal
@@ -29,20 +26,6 @@ from posefield_train.source.motion_file import ReadOptions
 SAME_BONE = 0.0005
 """Largest difference of a bone's length between files of one performer, m."""
 STATED = ("stated by an option of posefield discover",)
-
-
-@dataclass(frozen=True)
-class FileStatements:
-    """Statements about all files, which count more than what is proposed.
-
-    metres_per_unit, up: None for what the files or bodies tell. roles: joints by role. rate: frames
-    a second of files that state none.
-    """
-
-    metres_per_unit: float | None
-    up: UpAxis | None
-    roles: Mapping[str, str]
-    rate: float | None = None
 
 
 @dataclass(frozen=True)
@@ -254,14 +237,12 @@ class FamilyRow:
 
 def table(rows: Sequence[FamilyRow]) -> bytes:
     """Return the table as CSV."""
-    lines = io.StringIO(newline="")
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    lines: list[Sequence[object]] = [COLUMNS]
     for row in rows:
         cost = "" if row.cost is None else f"{row.cost:.4f}"
-        told = (row.performer, row.recording, cost, str(row.accepted).lower())
-        writer.writerow([*row.frames, *told])
-    return lines.getvalue().encode()
+        accepted = str(row.accepted).lower()
+        lines.append((*row.frames, row.performer, row.recording, cost, accepted))
+    return clip_table.csv_text(lines).encode()
 
 
 def read(path: Path) -> list[FamilyRow]:
@@ -322,7 +303,7 @@ def find_families(
     joined = motion_features.join_features(corpus)
     found = []
     for family in family_search.find_families(corpus, count, report):
-        quality = found_clips.assess(joined, family)
+        quality = family_search.assess(joined, family)
         rows = [_row(corpus, member.span, member.cost, kinds) for member in family.members]
         example = _row(corpus, family.example, 0.0, kinds)
         own = FoundFamily(
@@ -336,8 +317,7 @@ def find_families(
 def _row(
     corpus: Corpus, span: motion_features.Span, cost: float, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
-    first, last = corpus.frame(span.recording, span.start), corpus.frame(span.recording, span.end)
-    return _clip(corpus.recordings[span.recording], first, last, cost, kinds)
+    return _clip(corpus.recordings[span.recording], *corpus.frames(span), cost, kinds)
 
 
 def _clip(
@@ -354,7 +334,7 @@ def _strides(recordings: Sequence[Recording], kinds: Sequence[BodyKind]) -> Foun
     found = [
         (recording, one)
         for recording in recordings
-        for one in stride_detection.find_strides(recording)
+        for one in found_clips.find_strides(recording)
         if one.travels
     ]
     if len(found) < STRIDE_CLIPS:

@@ -11,7 +11,7 @@ from typing import Any
 import posefield
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, MotionError
-from posefield_train.discover import control_proposals, family_search, found_clips
+from posefield_train.discover import control_proposals, family_search
 from posefield_train.discover.control_proposals import ControlProposal, FamilyClips, ProposedControl
 from posefield_train.discover.recordings import ReadRecordings
 from posefield_train.families import found_families
@@ -317,8 +317,8 @@ def summary(
             "candidates": count,
             "largest_cost": family_search.LARGEST_COST,
             "fewest_clips": family_search.FEWEST,
-            "most_within": found_clips.MOST_WITHIN,
-            "least_shared": found_clips.LEAST_SHARED,
+            "most_within": family_search.MOST_WITHIN,
+            "least_shared": family_search.LEAST_SHARED,
         },
         "recordings": {
             recording.file: {

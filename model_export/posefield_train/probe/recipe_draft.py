@@ -1,7 +1,5 @@
 """Draft of a recipe and its table, with what is proposed and places for what is not known."""
 
-import csv
-import io
 import json
 import re
 import textwrap
@@ -17,7 +15,6 @@ from posefield_train.source.facing import LARGEST_ANGLE
 TABLE, RECIPE = "clips.csv", "recipe.toml"
 FRAME_NAME = re.compile(r"frame(?!s\b)|_frame$|^frame_")
 """Names of columns that tell a frame rather than a number of frames."""
-OWN_COLUMNS = ("file", "first_frame", "last_frame")
 FILE_COLUMNS = ("file", "path", "bvh", "filename")
 PERFORMER_COLUMNS = ("performer", "subject", "actor", "who")
 RECORDING_COLUMNS = ("recording", "recording", "session")
@@ -25,13 +22,10 @@ RECORDING_COLUMNS = ("recording", "recording", "session")
 
 def table_text(report: ProbeReport, folder: Path) -> str:
     """Return a table with one row for each whole file."""
-    lines = io.StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow(OWN_COLUMNS)
-    for one in report.files:
-        name = Path(one.file).relative_to(folder).as_posix()
-        writer.writerow([name, 0, one.frames - 1])
-    return lines.getvalue()
+    rows: list[Sequence[object]] = [("file", "first_frame", "last_frame")]
+    for file in report.files:
+        rows.append((Path(file.file).relative_to(folder).as_posix(), 0, file.frames - 1))
+    return clip_table.csv_text(rows)
 
 
 def recipe_text(

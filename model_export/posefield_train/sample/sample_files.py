@@ -1,9 +1,7 @@
 """Samples of the family with noise, and their files: motions, table and recipe."""
 
-import csv
-import io
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -18,6 +16,7 @@ from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.sample import noise_free, sample_body, sample_controls
 from posefield_train.sample.sample_controls import RANGES, STATURES, SampleControls, TimingWarp
+from posefield_train.source import clip_table
 
 COUNT = 92
 RATE = 120.0
@@ -230,7 +229,10 @@ def _files(chosen: Iterable[SampleTrial]) -> dict[str, bytes]:
         path = f"bvh/reach_{number:03}.bvh"
         files[path] = bvh_text(sample.clip).encode()
         rows.append(_row(path, sample))
-    return files | {"clips.csv": csv_text(rows).encode(), "recipe.toml": _recipe().encode()}
+    return files | {
+        "clips.csv": clip_table.csv_text(rows).encode(),
+        "recipe.toml": _recipe().encode(),
+    }
 
 
 def write_family(output: Path, chosen: Iterable[SampleTrial] | None = None) -> Path:
@@ -289,13 +291,6 @@ def _recipe() -> str:
 def _row(path: str, sample: SampleTrial) -> list[str]:
     point = [f"{value:.4f}" for value in astuple(sample.controls)]
     return [path, sample.performer, *point, str(len(sample.clip) - 1)]
-
-
-def csv_text(rows: Iterable[Sequence[str]]) -> str:
-    """Return rows as CSV with Unix line ends."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
 
 
 def bvh_text(clip: Clip) -> str:

@@ -1,14 +1,13 @@
 """Files of curves: CSV with a column `frame` and one for each curve, or files of motions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import PurePosixPath
 
 import numpy as np
 
 from posefield.common.errors import RecipeError, did_you_mean
-from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, CurveValues
@@ -24,59 +23,45 @@ RESTING_JOINT = "Root"
 """Name of the only joint of clips without a skeleton."""
 
 
-@dataclass(frozen=True)
-class CurveReader:
-    """Reader of the curve files of one recipe: all have the curves of the first one.
-
-    rate: of the recipe, frames a second.
-    """
-
-    keys: Curves
-    curves: tuple[Curve, ...]
-    rate: float | None
-
-    def read(self, row: ClipRow) -> CurveValues:
-        """Return the curves of a row.
-
-        Raises RecipeError for a missing column or frame, and for a cell that is not a number within
-        the curve's range.
-        """
-        table = _open(row, self.rate)
-        _expect_frames(table)
-        _expect_columns(table, [curve.name for curve in self.curves], self.keys)
-        return _values(table, self.curves)
-
-
 def _open(row: ClipRow, rate: float | None) -> ClipTable:
     """Return the table of a row's curves; of a file of motions the weights of blend shapes."""
     place = row.curve_file
-    form = motion_readers.SUFFIXES.get(PurePosixPath(place.name).suffix.lower())
-    if form is None:
-        return clip_table.open_table(place)
+    if PurePosixPath(place.name).suffix.lower() not in motion_readers.SUFFIXES:
+        return _expect_frames(clip_table.open_table(place))
     curves = motion_readers.read(place, ReadOptions(rate, row.animation)).curves
     columns = {name: map(repr, values.tolist()) for name, values in curves.items()}
     cells = zip(*columns.values(), strict=True)
     numbered = ((str(frame), *values) for frame, values in enumerate(cells))
     records = [dict(zip((FRAME, *columns), values, strict=True)) for values in numbered]
-    return ClipTable(str(place), list(enumerate(records)))
+    return _expect_frames(ClipTable(str(place), list(enumerate(records))))
 
 
-def reader(keys: Curves, rows: Sequence[ClipRow], rate: float | None) -> CurveReader:
-    """Return the reader of the files of rows. rate: of the recipe, frames a second.
+def find_curves(keys: Curves, rows: Sequence[ClipRow], rate: float | None) -> tuple[Curve, ...]:
+    """Return the curves of the files of rows, which are those of the first one.
 
-    Raises RecipeError for keys of an unknown curve, and for a file without curves.
+    rate: of the recipe, frames a second. Raises RecipeError for keys of an unknown curve, and for a
+    file without curves.
     """
     first = _open(rows[0], rate)
-    _expect_frames(first)
-    found = [name for name in first.columns if name != FRAME]
-    names = keys.names or found
+    names = keys.names or [name for name in first.columns if name != FRAME]
     if not names:
         raise RecipeError(first.name, f"found no column beside {FRAME!r}, expected curves", 1)
     for name in keys.of:
         if name not in names:
             text = f"curves.of.{name}{did_you_mean(name, names)}, expected one of {names}"
             raise RecipeError(first.name, text, 1)
-    return CurveReader(keys, tuple(map(keys.curve, names)), rate)
+    return tuple(map(keys.curve, names))
+
+
+def read(row: ClipRow, keys: Curves, curves: tuple[Curve, ...], rate: float | None) -> CurveValues:
+    """Return the curves of a row.
+
+    Raises RecipeError for a missing column or frame, and for a cell that is not a number within the
+    curve's range.
+    """
+    table = _open(row, rate)
+    _expect_columns(table, [curve.name for curve in curves], keys)
+    return _values(table, curves)
 
 
 def read_known(place: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveValues, list[str]]:
@@ -85,8 +70,7 @@ def read_known(place: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveVal
     Raises RecipeError for a missing column or frame, and for a cell that is not a number within the
     curve's range.
     """
-    table, names = clip_table.open_table(place), [curve.name for curve in curves]
-    _expect_frames(table)
+    table, names = _expect_frames(clip_table.open_table(place)), [curve.name for curve in curves]
     missing = [name for name in names if name not in table.columns]
     if missing:
         hint = did_you_mean(missing[0], table.columns)
@@ -116,14 +100,15 @@ def resting_clip(own: CurveValues, rate: float) -> Clip:
     return Clip(joints, rotations, np.zeros((frames, 1, 3)), rate, own)
 
 
-def _expect_frames(table: ClipTable) -> None:
-    """Raise RecipeError unless the column of frames counts 0, 1, 2, …"""
+def _expect_frames(table: ClipTable) -> ClipTable:
+    """Return a table of curves; RecipeError unless its column of frames counts 0, 1, 2, …"""
     table.require({FRAME: "number of the frame, from 0"})
-    found = [(line, table.frame(line, record, FRAME)) for line, record in table.records]
-    for (_, before), (line, frame) in pairwise([(0, -1), *found]):
+    numbers = [(line, table.frame(line, record, FRAME)) for line, record in table.records]
+    for (_, before), (line, frame) in pairwise([(0, -1), *numbers]):
         if frame != before + 1:
             at = f"after {before}" if before >= 0 else "first"
             raise RecipeError(table.name, f"frame {frame} {at}, expected {before + 1}", line)
+    return table
 
 
 def _expect_columns(table: ClipTable, names: Sequence[str], keys: Curves) -> None:
@@ -139,18 +124,16 @@ def _expect_columns(table: ClipTable, names: Sequence[str], keys: Curves) -> Non
 
 
 def _values(table: ClipTable, curves: tuple[Curve, ...]) -> CurveValues:
-    return CurveValues(curves, np.stack([_column(table, curve) for curve in curves], axis=-1))
-
-
-def _column(table: ClipTable, curve: Curve) -> Floats:
-    """Return the values (F,) of a curve."""
-    values = [(line, table.number(line, record, curve.name)) for line, record in table.records]
-    for line, value in values:
-        if not curve.minimum <= value <= curve.maximum:
-            raise RecipeError(
-                table.name,
-                f"column {curve.name!r}: {value:g}, expected {curve.minimum:g} to "
-                f"{curve.maximum:g} (curves.range)",
-                line,
-            )
-    return np.array([value for _, value in values])
+    columns = []
+    for curve in curves:
+        values = [(line, table.number(line, record, curve.name)) for line, record in table.records]
+        for line, value in values:
+            if not curve.minimum <= value <= curve.maximum:
+                raise RecipeError(
+                    table.name,
+                    f"column {curve.name!r}: {value:g}, expected {curve.minimum:g} to "
+                    f"{curve.maximum:g} (curves.range)",
+                    line,
+                )
+        columns.append([value for _, value in values])
+    return CurveValues(curves, np.stack(columns, axis=-1))

@@ -76,27 +76,21 @@ def find_faults(positions: Positions, rate: float, rest: Floats) -> FrameFaults:
 
 def find_leaps(steps: Floats, rate: float) -> list[Leap]:
     """Return the leaps between frames whose joints are steps (F - 1, J), m, apart."""
-    leaping = leaping_steps(steps, rate)
-    joints = steps.shape[1]
-    found = []
-    for frame in np.unique(leaping.frames).tolist():
-        own = leaping.joints[leaping.frames == frame]
-        joint = int(own[np.argmax(steps[frame, own])])
-        found.append(Leap(frame, joint, float(steps[frame, joint]), len(own) > 0.5 * joints))
-    return found
+    frames, joints, _ = leaping_steps(steps, rate)
+    leaps = []
+    for frame in np.unique(frames).tolist():
+        leaping = joints[frames == frame]
+        joint = int(leaping[np.argmax(steps[frame, leaping])])
+        is_whole = len(leaping) > 0.5 * steps.shape[1]
+        leaps.append(Leap(frame, joint, float(steps[frame, joint]), is_whole))
+    return leaps
 
 
-@dataclass(frozen=True)
-class LeapingSteps:
-    """Steps of joints that are leaps. frames, joints (N,): of each. paces (N,): usual steps, m."""
+def leaping_steps(steps: Floats, rate: float) -> tuple[Indices, Indices, Floats]:
+    """Return the leaps among steps (F - 1, J), m, in the order of their frames.
 
-    frames: Indices
-    joints: Indices
-    paces: Floats
-
-
-def leaping_steps(steps: Floats, rate: float) -> LeapingSteps:
-    """Return which steps (F - 1, J), m, are leaps, in the order of their frames."""
+    Frames, joints and usual steps, m, of each (N,).
+    """
     reach = max(2, round(MEDIAN_SPAN * rate))
     # Few steps are long enough, so that the median is taken around these alone.
     frames, joints = np.nonzero(steps > FARTHER)
@@ -105,7 +99,7 @@ def leaping_steps(steps: Floats, rate: float) -> LeapingSteps:
     paces = np.maximum(usual, FARTHER / LEAP_FACTOR / 4)
     own = steps[frames, joints]
     kept = (own - paces > FARTHER) & (own > LEAP_FACTOR * paces)
-    return LeapingSteps(frames[kept], joints[kept], paces[kept])
+    return frames[kept], joints[kept], paces[kept]
 
 
 def _way_from_rest(positions: Positions, rest: Floats) -> float:

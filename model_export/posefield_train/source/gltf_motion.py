@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
@@ -52,9 +52,16 @@ class Track:
         if self.interpolation == "STEP":
             return first
         if self.tangents_in is not None and self.tangents_out is not None:
-            leaving, arriving = self.tangents_out[last], self.tangents_in[following]
-            ends = (first, span[:, None] * leaving, second, span[:, None] * arriving)
-            return _hermite(ends, share)
+            leaving = span[:, None] * self.tangents_out[last]
+            arriving = span[:, None] * self.tangents_in[following]
+            s = share[:, None]
+            # Hermite's cubic; those of SciPy have one tangent for both sides of a key.
+            return np.asarray(
+                (2 * s**3 - 3 * s**2 + 1) * first
+                + (s**3 - 2 * s**2 + s) * leaving
+                + (3 * s**2 - 2 * s**3) * second
+                + (s**3 - s**2) * arriving
+            )
         if self.is_rotation:
             return quat.slerp(quat.normalize(first), quat.normalize(second), share)
         return first + share[:, None] * (second - first)
@@ -62,18 +69,6 @@ class Track:
 
 Tracks = Mapping[tuple[int, str], Track]
 """Curves by node and part."""
-
-
-def _hermite(ends: Sequence[Floats], share: Floats) -> Annotated[Floats, "frames parts"]:
-    """Return the cubic (F, k) through two values with two tangents, at shares (F,) of its way."""
-    first, leaving, second, arriving = ends
-    s = share[:, None]
-    return np.asarray(
-        (2 * s**3 - 3 * s**2 + 1) * first
-        + (s**3 - 2 * s**2 + s) * leaving
-        + (3 * s**2 - 2 * s**3) * second
-        + (s**3 - s**2) * arriving
-    )
 
 
 def _read_tracks(document: GltfDocument, animation: Any) -> Tracks:
@@ -152,24 +147,24 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
         keys = np.unique(np.concatenate([track.times for track in tracks.values()]))
         # Keys of one frame count once.
         keys = keys[np.concatenate([[True], np.diff(keys) > SAME_TIME])]
-        found = motion_file.sample_times(keys, options.rate)
+        times, rate, evidence = motion_file.sample_times(keys, options.rate)
     except UnevenKeys as fault:
         raise document.error(f"animation {name!r}: {fault}") from fault
-    if len(found.times) * len(joints.nodes) > MAX_POSES:
+    if len(times) * len(joints.nodes) > MAX_POSES:
         raise document.error(
-            f"found {len(found.times)} frames of {len(joints.nodes)} joints, expected at most "
+            f"found {len(times)} frames of {len(joints.nodes)} joints, expected at most "
             f"{MAX_POSES} poses of a joint"
         )
-    skeleton, rotations, translations, said = _plain(document, joints, tracks, found.times)
-    weights = _weights(document, curves, found.times)
+    skeleton, rotations, translations, said = _plain(document, joints, tracks, times)
+    weights = _weights(document, curves, times)
     return MotionFile(
         source,
         "glTF",
         skeleton,
         rotations,
         translations,
-        found.rate,
-        found.evidence,
+        rate,
+        evidence,
         metres_per_unit=1.0,
         up="y",
         notes=(*notes, *joints.notes, *said, *motion_file.curve_notes(weights)),

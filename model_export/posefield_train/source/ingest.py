@@ -25,7 +25,6 @@ from posefield_train.source import (
 from posefield_train.source.canonical import Finding
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.common_topology import TopologyError
-from posefield_train.source.curve_files import CurveReader
 from posefield_train.source.measured_controls import Spans
 from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
@@ -83,23 +82,29 @@ def ingest(
     rows = clip_table.read(recipe, folder, notes)
     alone = recipe.curves is not None and recipe.curves.alone
     files = {} if alone else read_files(rows, recipe.source, known)
-    curves = curve_files.reader(recipe.curves, rows, recipe.source.rate) if recipe.curves else None
+    rate = recipe.source.rate
+    curves = curve_files.find_curves(recipe.curves, rows, rate) if recipe.curves else ()
     notes += reader_notes(files)
     if recipe.source.root_offset is None:
         notes += offset_notes(files)
     # Converted once for all rows: a long file may have hundreds. Of thousands of clips each stage
     # takes hundreds of megabytes, so that the stage before is released.
     wholes = {motion: clip_of_file(files.pop(motion), recipe.source) for motion in list(files)}
-    cuts = [cut_frames(_whole_clip(recipe, wholes, curves, row), row) for row in rows]
+    cuts = []
+    for row in rows:
+        values = curve_files.read(row, recipe.curves, curves, rate) if recipe.curves else None
+        if values and recipe.curves and recipe.curves.rate:
+            whole = curve_files.resting_clip(values, recipe.curves.rate)
+        else:
+            whole = wholes[row.motion]
+            whole = curve_files.with_curves(whole, values, row) if values else whole
+        cuts.append(cut_frames(whole, row))
     wholes.clear()
     clips, lasts = [clip for clip, _ in cuts], [last for _, last in cuts]
     cuts.clear()
     shared: Sequence[Clip] = clips
+    files_of_rows, stretches = [row.place.name for row in rows], recipe.motion.bones == "stretch"
     if recipe.skeleton.is_unified:
-        files_of_rows, stretches = (
-            [row.place.name for row in rows],
-            recipe.motion.bones == "stretch",
-        )
         try:
             shared, unified_notes = unified_clips.unify_recipe(
                 clips, files_of_rows, recipe.skeleton.stated, stretches
@@ -119,9 +124,9 @@ def ingest(
         clips, facing, rig_notes = skeleton_checks.normalize(
             clips,
             [row.performer for row in rows],
-            [row.place.name for row in rows],
+            files_of_rows,
             facing=motion.facing,
-            stretches=motion.bones == "stretch",
+            stretches=stretches,
             cyclic=motion.cyclic,
             directed=any(control.auto.quantity in directions for control in recipe.measured),
             roles={str(role): joint for role, joint in joints.items() if joint},
@@ -132,22 +137,22 @@ def ingest(
         raise row.error(f"{row.place}: {fault}") from fault
     clips.reverse()
     canonical.return_freed_memory()
-    found = [
-        _example(recipe, row, clips.pop(), last, facing)
-        for row, last in zip(rows, lasts, strict=True)
-    ]
-    examples = [own.example for own in found]
-    measured_controls.expect_same_order(
-        recipe.landmark_names, rows, [own.landmarks for own in examples]
-    )
-    notes += [*rig_notes, *stretch_notes(rows, [own.stretch for own in found])]
+    examples, changes, positions = list[Example](), list[float](), list[Positions]()
+    for row, last in zip(rows, lasts, strict=True):
+        captured = clips.pop()
+        examples.append(_example(recipe, row, captured, last, facing))
+        changes.append(canonical.largest_stretch(captured))
+        positions.append(captured.positions())
+    landmarks = [example.landmarks for example in examples]
+    measured_controls.expect_same_order(recipe.landmark_names, rows, landmarks)
+    notes += [*rig_notes, *stretch_notes(rows, changes)]
     canonical.return_freed_memory()
     recordings, recording_notes = clip_table.stated_recordings(rows), list[str]()
     if recordings is None:
         recordings, recording_notes = recording_groups.find_recordings(
             [row.motion for row in rows],
             [row.named for row in rows],
-            [own.positions for own in found],
+            positions,
             examples[0].clip.skeleton.names,
         )
     examples = [
@@ -202,34 +207,9 @@ def _bone_length(file: MotionFile) -> float:
     return float(np.linalg.norm(file.skeleton.offsets[1:], axis=-1).sum())
 
 
-@dataclass(frozen=True)
-class _FoundExample:
-    """An example before its recording is known.
-
-    stretch: largest change of a bone's length in it, m. positions: of its joints as captured
-    (F, J, 3), m.
-    """
-
-    example: Example
-    stretch: float
-    positions: Positions
-
-
-def _whole_clip(
-    recipe: Recipe, wholes: Mapping[str, Clip], curves: CurveReader | None, row: ClipRow
-) -> Clip:
-    """Return the clip of all frames of a row's file, with its curves. wholes: clips by motion."""
-    values = curves.read(row) if curves else None
-    if values and recipe.curves and recipe.curves.rate:
-        return curve_files.resting_clip(values, recipe.curves.rate)
-    clip = wholes[row.motion]
-    return curve_files.with_curves(clip, values, row) if values else clip
-
-
 def _example(
     recipe: Recipe, row: ClipRow, captured: Clip, last: int, facing: float | None
-) -> _FoundExample:
-    """Return the example of a row."""
+) -> Example:
     motion, has_facing = recipe.motion, facing is not None
     in_place = motion.root == "in_place"
     opened, jumps = canonical.without_jumps(captured, motion.cyclic, has_facing)
@@ -243,10 +223,7 @@ def _example(
         marks += (measured_controls.event_landmark(row, event.joint, event.at, share),)
     values = measured_controls.control_values(recipe, row, clip, marks)
     spans = measured_controls.contact_spans(row, last, recipe.contacts.columns)
-    example = Example(
-        row, clip, values, marks, jumps, facing=facing, captured=before, contacts=spans
-    )
-    return _FoundExample(example, canonical.largest_stretch(captured), captured.positions())
+    return Example(row, clip, values, marks, jumps, facing=facing, captured=before, contacts=spans)
 
 
 def clip_of_file(file: MotionFile, source: Source) -> Clip:

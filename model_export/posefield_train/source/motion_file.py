@@ -171,21 +171,12 @@ DROPPED = 0.1
 WAY_OUT = "expected one in each frame, or a rate (source.rate, --rate) to sample the curves at"
 
 
-@dataclass(frozen=True)
-class SampleTimes:
-    """Times at which an animation is sampled. times: (F,), s. rate: frames a second."""
-
-    times: Floats
-    rate: float
-    evidence: str
-
-
 class UnevenKeys(ValueError):
     """Keys of an animation that are no frames of a constant rate."""
 
 
-def sample_times(keys: Floats, rate: float | None) -> SampleTimes:
-    """Return the times of the frames between the first key and the last.
+def sample_times(keys: Floats, rate: float | None) -> tuple[Floats, float, str]:
+    """Return the times (F,), s, of the frames between first and last key, rate and evidence.
 
     keys: (K,) times of all keys, s, increasing. rate: of source.rate; None takes the keys as
     frames. Raises UnevenKeys for fewer than two keys, and without a rate for keys that are uneven,
@@ -196,12 +187,12 @@ def sample_times(keys: Floats, rate: float | None) -> SampleTimes:
     if rate is not None:
         count = int(np.floor((keys[-1] - keys[0]) * rate + EVEN)) + 1
         times = np.minimum(keys[0] + np.arange(count) / rate, keys[-1])
-        return SampleTimes(times, rate, "curves sampled at source.rate")
+        return times, rate, "curves sampled at source.rate"
     _refuse_uneven(keys)
-    found = snapped_rate((keys[-1] - keys[0]) / (len(keys) - 1))
-    if found < LEAST_RATE:
-        raise UnevenKeys(f"found {len(keys)} keys at {found:g} a second, {WAY_OUT}")
-    return SampleTimes(keys, found, f"keys every {1.0 / found:g} s")
+    rate = snapped_rate((keys[-1] - keys[0]) / (len(keys) - 1))
+    if rate < LEAST_RATE:
+        raise UnevenKeys(f"found {len(keys)} keys at {rate:g} a second, {WAY_OUT}")
+    return keys, rate, f"keys every {1.0 / rate:g} s"
 
 
 def _refuse_uneven(keys: Floats) -> None:

@@ -166,43 +166,23 @@ def is_degenerate(offsets: Floats) -> bool:
     return len(offsets) > 1 and float(np.linalg.norm(offsets[1:], axis=-1).sum()) < SMALLEST
 
 
-@dataclass(frozen=True)
-class TwoBodies:
-    """Clips of one performer with two different bodies.
-
-    first, second: indices of a clip of each. counts: number of clips of each. apart: root mean
-    square difference of their bone offsets, m.
-    """
-
-    performer: str
-    first: int
-    second: int
-    counts: tuple[int, int]
-    apart: float
-
-    def sentence(self, names: Sequence[str]) -> str:
-        """Return the finding in words, for an error. names: of the clips' files."""
-        several, few = self.counts
-        return (
-            f"two performers under the name {self.performer!r}: the bones of {few} clips, such as "
-            f"{names[self.second]}, differ by {100 * self.apart:.1f} cm from those of {several}, "
-            f"such as {names[self.first]}; expected one body for each name"
-        )
-
-
-def find_two_bodies(offsets: Floats, performers: Sequence[str]) -> TwoBodies | None:
-    """Return the first performer with two bodies; None if each has one.
+def _refuse_two_bodies(offsets: Floats, performers: Sequence[str], files: Sequence[str]) -> None:
+    """Raise RigError for a performer with two bodies.
 
     offsets: of the bones (N, J, 3), m. performers: names (N,), "" for none. A single clip that
     differs from the others is no second body: the detection of outliers tells of it.
     """
     for performer in sorted(set(performers) - {""}):
-        own = np.flatnonzero(np.array(performers) == performer)
-        found = _split(offsets[own])
-        if found:
-            first, second, counts, apart = found
-            return TwoBodies(performer, int(own[first]), int(own[second]), counts, apart)
-    return None
+        clips = np.flatnonzero(np.array(performers) == performer)
+        bodies = _split(offsets[clips])
+        if bodies:
+            first, second, (several, few), distance = bodies
+            raise RigError(
+                f"two performers under the name {performer!r}: the bones of {few} clips, such as "
+                f"{files[clips[second]]}, differ by {100 * distance:.1f} cm from those of "
+                f"{several}, such as {files[clips[first]]}; expected one body for each name",
+                int(clips[second]),
+            )
 
 
 def _split(offsets: Floats) -> tuple[int, int, tuple[int, int], float] | None:
@@ -322,9 +302,7 @@ def normalize(
     stretch = None if stretches else find_stretch(clips)
     if stretch:
         raise RigError(stretch.sentence(clips[0].skeleton), stretch.clip)
-    bodies = find_two_bodies(offsets, performers)
-    if bodies:
-        raise RigError(bodies.sentence(files), bodies.second)
+    _refuse_two_bodies(offsets, performers, files)
     try:
         degrees, facing_notes = find_facing(clips, facing, roles, cyclic)
     except FacingError as fault:

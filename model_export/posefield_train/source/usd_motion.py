@@ -131,17 +131,17 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     if not len(codes):
         raise opened.error(f"{motion.path} moves no joints over time, expected an animation")
     try:
-        found = motion_file.sample_times(codes / pace, options.rate)
+        times, rate, evidence = motion_file.sample_times(codes / pace, options.rate)
     except UnevenKeys as fault:
         raise opened.error(f"{motion.path}: {fault}") from fault
     joints = len(motion.query.GetJointOrder())
-    if joints > MAX_JOINTS or len(found.times) * joints > MAX_POSES:
+    if joints > MAX_JOINTS or len(times) * joints > MAX_POSES:
         raise opened.error(
-            f"found {len(found.times)} frames of {joints} joints, expected at most {MAX_JOINTS} "
+            f"found {len(times)} frames of {joints} joints, expected at most {MAX_JOINTS} "
             f"joints and {MAX_POSES} poses of a joint"
         )
     # The samples themselves, where the rate is theirs.
-    exact = (codes if options.rate is None else found.times * pace).tolist()
+    exact = (codes if options.rate is None else times * pace).tolist()
     tree, rest, moved, said = motion.posed_joints(exact)
     motion_file.expect_skeleton(source, tree, options)
     skeleton, rotations, places, more = rest_joints.plain_motion(source, tree, rest, moved)
@@ -160,8 +160,8 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
         skeleton,
         rotations,
         places,
-        found.rate,
-        found.evidence,
+        rate,
+        evidence,
         metres_per_unit=float(UsdGeom.GetStageMetersPerUnit(stage)) if has_unit else None,
         up=("z" if is_z_up else "y") if stage.HasAuthoredMetadata("upAxis") else None,
         notes=(*notes, *said, *more, *motion_file.curve_notes(curves)),
