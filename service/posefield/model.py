@@ -191,8 +191,8 @@ def decode(form: type[Question], fields: Mapping[str, Any] | Question) -> Questi
     Keywords that are no field of a question with controls are controls. Raises FormError.
     """
     if isinstance(fields, Mapping) and "controls" in form.__struct_fields__:
-        known = {name: fields[name] for name in fields if name in form.__struct_fields__}
-        named = {name: fields[name] for name in fields if name not in known}
-        fields = {**known, "controls": {**known.get("controls", {}), **named}}
+        values = {name: fields[name] for name in fields if name in form.__struct_fields__}
+        controls = {name: fields[name] for name in fields if name not in values}
+        fields = {**values, "controls": {**values.get("controls", {}), **controls}}
     content = msgspec.json.encode(fields, enc_hook=lambda value: value.tolist())
     return json_decoding.decode_question(form, content)

@@ -74,8 +74,10 @@ def first_damaged_file(target: ExportTarget, facts: dict[str, Any], verify: bool
     verify: compare checksums, not only sizes.
     """
     try:
-        found = (file.file for file in _files(target, facts) if not is_intact(target, file, verify))
-        return next(found, None)
+        damaged = (
+            file.file for file in _files(target, facts) if not is_intact(target, file, verify)
+        )
+        return next(damaged, None)
     except (ValueError, LookupError, TypeError):
         return MANIFEST
 
@@ -109,14 +111,14 @@ def reopen(target: ExportTarget, job: ExportJob) -> None:
 def _check_job(work: WorkerInput, content: bytes | None) -> dict[str, Any]:
     """Return the facts of a job or an export; FileError unless they are this job's."""
     try:
-        found = orjson.loads(content or b"")
-        if found["job"] == work.job.digest:
-            return dict(found)
+        facts = orjson.loads(content or b"")
+        if facts["job"] == work.job.digest:
+            return dict(facts)
     except (ValueError, LookupError, TypeError) as fault:
         raise FileError(
             work.target, f"holds an export whose facts cannot be read: {fault}"
         ) from fault
-    other = [name for name, fact in work.job.facts().items() if found.get(name) != fact]
+    other = [name for name, fact in work.job.facts().items() if facts.get(name) != fact]
     raise FileError(
         work.target,
         f"holds another export, whose {', '.join(other)} differ; expected an empty folder or the "
@@ -125,10 +127,10 @@ def _check_job(work: WorkerInput, content: bytes | None) -> dict[str, Any]:
 
 
 def record_chunk(
-    target: ExportTarget, number: int, part: ChunkResult, entries: Iterable[dict[str, Any]]
+    target: ExportTarget, number: int, result: ChunkResult, entries: Iterable[dict[str, Any]]
 ) -> None:
     """Write the part of a finished chunk, with its entries of the manifest."""
-    content = b"".join(map(manifest_line, [asdict(part), *entries]))
+    content = b"".join(map(manifest_line, [asdict(result), *entries]))
     target.write([(f"{PARTS}/{_name(number)}", content)])
 
 
@@ -143,11 +145,11 @@ def finished_chunk(
         return None
     head, _, entries = (target.read(f"{PARTS}/{_name(number)}") or b"").partition(b"\n")
     try:
-        part = _part(head)
-        files = part.archives or [_clip(orjson.loads(line)) for line in entries.splitlines()]
+        result = _part(head)
+        files = result.archives or [_clip(orjson.loads(line)) for line in entries.splitlines()]
     except (ValueError, LookupError, TypeError):
         return None
-    return part if all(is_intact(target, file, verify) for file in files) else None
+    return result if all(is_intact(target, file, verify) for file in files) else None
 
 
 def names(target: ExportTarget) -> set[str]:
@@ -165,17 +167,17 @@ def finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, An
             return _finish(target, work, chunks)
     except FileError:
         # Another process may have completed it and removed the parts.
-        if (found := completed_facts(target, work)) is None:
+        if (facts := completed_facts(target, work)) is None:
             raise
-        return found
+        return facts
     return completed_facts(target, work)
 
 
 def _finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, Any]:
-    parts, job = [part for part, _ in _parts(target, chunks)], work.job
-    skipped = [fault for part in parts for fault in part.skipped]
-    clips = sum(part.clips for part in parts)
-    files = [archive for part in parts for archive in part.archives]
+    results, job = [result for result, _ in _parts(target, chunks)], work.job
+    skipped = [fault for result in results for fault in result.skipped]
+    clips = sum(result.clips for result in results)
+    files = [archive for result in results for archive in result.archives]
     files.append(put_file(target, MANIFEST, (entries for _, entries in _parts(target, chunks))))
     if skipped:
         files.append(put_file(target, SKIPPED, map(manifest_line, map(asdict, skipped))))
@@ -187,8 +189,8 @@ def _finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, A
         "job": job.digest,
         **job.facts(),
         "clips": clips,
-        "bytes": sum(part.bytes for part in parts),
-        "warned": sum(part.warned for part in parts),
+        "bytes": sum(result.bytes for result in results),
+        "warned": sum(result.warned for result in results),
         "skipped": len(skipped),
         "files": list(map(asdict, files)),
     }

@@ -140,12 +140,12 @@ def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> tuple[Skeleton
             level_count = max(level_count, len(level_errors(script)))
             first = first or (row, skeleton)
             _check_equal(row, skeleton, *first)
-            for field, value, usual in (
+            for field, value, expected in (
                 ("unit", row.question.unit, "m"),
                 ("up", row.question.up, "y"),
             ):
-                if value not in (None, usual):
-                    raise InvalidField(field, f"{value!r}, expected {usual!r} for a crowd")
+                if value not in (None, expected):
+                    raise InvalidField(field, f"{value!r}, expected {expected!r} for a crowd")
             if (body := row.question.body) is not None:
                 raise InvalidField("body", f"{body!r}, expected none: --body is that of a crowd")
         except QueryError as error:
@@ -268,7 +268,7 @@ def perform_at_level(
     question: PerformanceQuestion,
     find: Callable[[str], Synthesizer],
     view: LevelCriteria | None,
-    most: int,
+    frames: int,
 ) -> tuple[PerformanceAnswer, int]:
     """Return a performance and its level: the coarsest that the view allows.
 
@@ -278,15 +278,15 @@ def perform_at_level(
     """
     script = resolve_script(question, find)
     if view is None:
-        return composition.perform(script, most), question.level
+        return composition.perform(script, frames), question.level
     if question.level:
         raise InvalidField("level", f"{question.level}, expected none: the camera chooses it")
     level = allowed_level(script, composition.compose(script).performed.roots, view)
-    answer = composition.perform(_at_level(script, level), most)
+    answer = composition.perform(_at_level(script, level), frames)
     # At another level the character may come nearer.
     while (needed := allowed_level(script, answer.clip.root_path, view)) < level:
         level = needed
-        answer = composition.perform(_at_level(script, level), most)
+        answer = composition.perform(_at_level(script, level), frames)
     return answer, level
 
 

@@ -119,8 +119,8 @@ def _run_in_pool(
     pending: set[Future[Result]] = set()
     try:
         while not stopped():
-            ahead = islice(tasks, 2 * workers - len(pending))
-            pending |= {_submit(pool, function, task) for task in ahead}
+            upcoming = islice(tasks, 2 * workers - len(pending))
+            pending |= {_submit(pool, function, task) for task in upcoming}
             if not pending:
                 return
             done, pending = wait(pending, POLL_INTERVAL, FIRST_COMPLETED)

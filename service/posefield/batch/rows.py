@@ -7,6 +7,9 @@ and is read anew at each pass, a few rows at a time.
 
     source = open_source(model, "usdc", path=path)
     for row in source.rows(): ...
+
+Equal seeds of a sampling give equal points on every machine: only sums, products, sorts and NumPy's
+guaranteed random streams are used.
 """
 
 import hashlib
@@ -21,12 +24,14 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import orjson
 from msgspec import structs, to_builtins
+from numpy.typing import NDArray
 
-from posefield.batch import sampling, tables
+from posefield.batch import tables
 from posefield.batch.tables import TABLES, Column, Columns, RawRow, RawRows, shortened_text
 from posefield.common.errors import InvalidField, QueryError, UnknownFormat, did_you_mean
 from posefield.common.units import Floats
 from posefield.encode.formats import CLIP_ENCODERS
+from posefield.model_file.model_card import ModelCard
 from posefield.question import json_decoding, text_decoding
 from posefield.question.motion_question import LEGAL_NAME, ClipQuestion
 from posefield.synthesis import clips
@@ -35,7 +40,7 @@ from posefield.synthesis.synthesizer import Synthesizer
 Question = TypeVar("Question", covariant=True)
 
 MAX_POINTS = 10**9
-"""Points of the largest grid; a greater number is considered a typing error."""
+"""Points of the largest grid or sampling; a greater number is considered a typing error."""
 MAX_STEPS = 10**6
 """Values of one axis of a grid, which are held in memory."""
 METHOD, SEED = "latin", 0
@@ -74,14 +79,14 @@ CheckedRow = Row[ClipQuestion] | RowFault
 class RowReader:
     """Rows of a source for one model: the same rows in the same order at each pass.
 
-    raw: begins a pass. text: whether cells are text. named: whether rows may give names; generated
-    ones are unique. format, question: defaults of missing values; the controls are not used.
-    digest: SHA-256 of all parameters and data that determine the rows, except the model.
+    raw: begins a pass. text: whether cells are text. has_names: whether rows may give names;
+    generated ones are unique. format, question: defaults of missing values; the controls are not
+    used. digest: SHA-256 of all parameters and data that determine the rows, except the model.
     """
 
     raw: RawRows
     text: bool
-    named: bool
+    has_names: bool
     model: Synthesizer
     format: str
     question: ClipQuestion
@@ -93,17 +98,17 @@ class RowReader:
         Raises FileError if the rest cannot be read or has changed.
         """
         names: set[str] = set()
-        for index, (place, cells) in enumerate(self.raw()):
+        for index, (location, cells) in enumerate(self.raw()):
             try:
                 if isinstance(cells, QueryError):
                     raise cells
-                row = self._decode(place, index, cells)
-                if self.named and row.name.lower() in names:
+                row = self._decode(location, index, cells)
+                if self.has_names and row.name.lower() in names:
                     raise InvalidField("name", f"{row.name!r}, {REPEATED_NAME}")
             except QueryError as error:
-                yield RowFault(place, str(error))
+                yield RowFault(location, str(error))
                 continue
-            if self.named:
+            if self.has_names:
                 names.add(row.name.lower())
             yield row
 
@@ -112,7 +117,7 @@ class RowReader:
         clips.check(self.model, row.question)
 
     def _decode(
-        self, place: str, index: int, cells: Iterable[tuple[Column, Any]]
+        self, location: str, index: int, cells: Iterable[tuple[Column, Any]]
     ) -> Row[ClipQuestion]:
         name, extension = generated_name(index), self.format
         texts: list[tuple[str, str]] = []
@@ -137,7 +142,7 @@ class RowReader:
         if values:
             decoded = json_decoding.convert_question(ClipQuestion, {"controls": {}} | values)
             question = _merged(question, decoded, values)
-        return Row(name, extension, question, place)
+        return Row(name, extension, question, location)
 
 
 def _merged(defaults: ClipQuestion, row: ClipQuestion, fields: Iterable[str]) -> ClipQuestion:
@@ -172,11 +177,11 @@ def generated_name(index: int) -> str:
 
 def repeated_names(names: Iterable[str]) -> Iterator[int]:
     """Yield the indices of names that an earlier one equals but for capitals."""
-    seen: set[str] = set()
+    earlier: set[str] = set()
     for index, name in enumerate(names):
-        if name.lower() in seen:
+        if name.lower() in earlier:
             yield index
-        seen.add(name.lower())
+        earlier.add(name.lower())
 
 
 def open_source(
@@ -200,8 +205,8 @@ def open_source(
     options = {"a file": path, "--grid": grid or None, "--sample": sample}
     sources = [name for name, option in options.items() if option is not None]
     if len(sources) != 1:
-        found = " and ".join(sources) or "none"
-        raise InvalidField("queries", f"{found}, expected one of {', '.join(options)}")
+        sources_given = " and ".join(sources) or "none"
+        raise InvalidField("queries", f"{sources_given}, expected one of {', '.join(options)}")
     for name, option in (("method", method), ("seed", seed)):
         if option is not None and sample is None:
             raise InvalidField(name, "without --sample, expected with it")
@@ -217,22 +222,22 @@ def open_source(
         if extension not in TABLES:
             raise UnknownFormat("queries", f"{path.name!r} ends in none of {', '.join(TABLES)}")
         table = tables.open_table(path, columns)
-        raw, text, named = table.rows, extension == ".csv", True
+        raw, text, has_names = table.rows, extension == ".csv", True
         spec = {"file": extension, "sha256": table.digest}
     elif grid:
         axes = parse_grid(grid, columns)
-        raw, text, named = partial(_grid_rows, axes), True, False
+        raw, text, has_names = partial(_grid_rows, axes), True, False
         spec = {"grid": [[column.field, column.name, texts] for column, texts in axes]}
     else:
         method, seed, count = method or METHOD, SEED if seed is None else seed, sample or 0
-        sampling.check_sampling(method, count, seed)
+        check_sampling(method, count, seed)
         sampled = tuple(columns[f"controls/{control.name}"] for control in card.controls)
-        raw = partial(_sampled_rows, sampled, partial(sampling.METHODS[method], card, count, seed))
-        text, named, spec = False, False, {"method": method, "count": count, "seed": seed}
+        raw = partial(_sampled_rows, sampled, partial(METHODS[method], card, count, seed))
+        text, has_names, spec = False, False, {"method": method, "count": count, "seed": seed}
     spec |= {"format": format, "usual": to_builtins(question)}
     content = orjson.dumps(spec, option=orjson.OPT_SORT_KEYS)
     digest = hashlib.sha256(content).hexdigest()
-    return RowReader(raw, text, named, model, format, question, digest)
+    return RowReader(raw, text, has_names, model, format, question, digest)
 
 
 def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
@@ -310,3 +315,107 @@ def _sampled_rows(
     """Yield the points of a sampling, drawn in blocks (n, d)."""
     for number, point in enumerate(chain.from_iterable(map(np.ndarray.tolist, draw())), start=1):
         yield f"sample {number}", zip(columns, point, strict=True)
+
+
+BLOCK_SIZE = 4096
+"""Points of a block; larger blocks are no faster."""
+ROUNDS = 8
+"""Rounds of the Feistel network. Four suffice for large numbers (Luby and Rackoff 1988)."""
+
+Integers = NDArray[np.uint64]
+
+
+def check_sampling(method: str, count: int, seed: int) -> None:
+    """Raise InvalidField for an unknown method, a count out of range or a negative seed."""
+    if method not in METHODS:
+        hint = did_you_mean(method, METHODS)
+        raise InvalidField("method", f"{method!r}{hint}, expected one of {', '.join(METHODS)}")
+    if not 1 <= count <= MAX_POINTS:
+        raise InvalidField("sample", f"{count}, expected 1 to {MAX_POINTS}")
+    if seed < 0:
+        raise InvalidField("seed", f"{seed}, expected 0 or more")
+
+
+def latin_hypercube(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
+    """Yield a Latin hypercube over the sampled ranges, in blocks (n, d).
+
+    Each of `count` equal parts of each control's range contains one point (McKay et al. 1979). A
+    discrete control takes its sampled values in equal shares.
+    """
+    generators = [np.random.default_rng((seed, axis)) for axis in range(len(card.controls))]
+    for first, size in _blocks(count):
+        points = np.empty((size, len(card.controls)))
+        for axis, control in enumerate(card.controls):
+            rows = np.arange(first, first + size, dtype=np.uint64)
+            intervals = permute(rows, count, (seed, axis, 1))
+            jitter = generators[axis].random(size)
+            if control.values:
+                chosen = intervals.astype(np.int64) * len(control.values) // count
+                points[:, axis] = np.array(control.values)[chosen]
+            else:
+                share = (intervals + jitter) / count
+                points[:, axis] = control.minimum + share * (control.maximum - control.minimum)
+        yield points
+
+
+def permute(indices: Integers, count: int, seed: tuple[int, ...]) -> Integers:
+    """Return the images (n,) of indices (n,) under a random permutation of 0 to count - 1.
+
+    Each seed has its own permutation, computed index by index. A Feistel network permutes the
+    numbers of an even number of bits; images beyond `count` are permuted again until they are below
+    it (Black and Rogaway 2002), fewer than four times on average.
+    """
+    keys: Integers = np.array(np.random.SeedSequence(seed).generate_state(ROUNDS, np.uint64))
+    half = np.uint64(max(1, ((count - 1).bit_length() + 1) // 2))
+    images = _feistel_network(indices.astype(np.uint64), keys, half)
+    beyond = np.flatnonzero(images >= count)
+    while len(beyond):
+        images[beyond] = _feistel_network(images[beyond], keys, half)
+        beyond = beyond[images[beyond] >= count]
+    return images
+
+
+def _feistel_network(numbers: Integers, keys: Integers, half: np.uint64) -> Integers:
+    mask = (np.uint64(1) << half) - np.uint64(1)
+    left, right = numbers >> half, numbers & mask
+    for key in keys:
+        left, right = right, left ^ (_scramble(right + key) & mask)
+    return (left << half) | right
+
+
+def _scramble(numbers: Integers) -> Integers:
+    """Return numbers scrambled by the finaliser of SplitMix64 (Steele et al. 2014)."""
+    numbers = (numbers ^ (numbers >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    numbers = (numbers ^ (numbers >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return numbers ^ (numbers >> np.uint64(31))
+
+
+def hull_points(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
+    """Yield points in the convex hull of the captured clips' controls, in blocks (n, d).
+
+    Each point is uniform in the simplex of d + 1 random clips, so points are denser where clips
+    are. Discrete controls are mixed like continuous ones.
+    """
+    examples = np.array(card.examples)
+    corners = examples.shape[1] + 1
+    rng = np.random.default_rng(seed)
+    for _, size in _blocks(count):
+        numbers = rng.random((size, 2 * corners - 1))
+        clips = (numbers[:, :corners] * len(examples)).astype(np.int64)
+        # Gaps between sorted uniform numbers are uniform in the simplex (Devroye 1986, V.2).
+        cuts = np.sort(numbers[:, corners:], axis=1)
+        weights = np.diff(cuts, axis=1, prepend=0.0, append=1.0)
+        # A sum in a fixed order, unlike a matrix product's.
+        yield sum(weights[:, k, None] * examples[clips[:, k]] for k in range(corners))
+
+
+METHODS: dict[str, Callable[[ModelCard, int, int], Iterator[Floats]]] = {
+    "latin": latin_hypercube,
+    "hull": hull_points,
+}
+
+
+def _blocks(count: int) -> Iterator[tuple[int, int]]:
+    """Yield first row and size of each block."""
+    for first in range(0, count, BLOCK_SIZE):
+        yield first, min(BLOCK_SIZE, count - first)

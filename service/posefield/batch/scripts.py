@@ -76,18 +76,18 @@ def read_scripts(path: Path) -> tuple[ScriptRow, ...]:
     """
     rows: dict[str, ScriptRow] = {}
     faults: list[str] = []
-    for place, name, content in _contents(path):
+    for location, name, content in _contents(path):
         try:
             if len(content) > MAX_LINE_BYTES:
                 raise InvalidField("", f"{len(content)} bytes, expected at most {MAX_LINE_BYTES}")
             script = json_decoding.decode_question(NamedScript, content)
-            row = Row(script.name or name, "", script, place)
+            row = Row(script.name or name, "", script, location)
             if row.name in rows:
                 other = rows[row.name].place
                 raise InvalidField("name", f"{row.name!r} is that of {other}, expected another")
             rows[row.name] = row
         except QueryError as error:
-            faults.append(f"{place}: {error}")
+            faults.append(f"{location}: {error}")
     if faults:
         raise faulty_scripts(faults)
     if not rows:
@@ -97,10 +97,10 @@ def read_scripts(path: Path) -> tuple[ScriptRow, ...]:
 
 def faulty_scripts(faults: list[str]) -> InvalidField:
     """Return the error for invalid scripts, with the first of their faults."""
-    shown = "".join(f"\n  {fault}" for fault in faults[:MAX_SHOWN_FAULTS])
+    listed = "".join(f"\n  {fault}" for fault in faults[:MAX_SHOWN_FAULTS])
     more = len(faults) - MAX_SHOWN_FAULTS
     rest = f"\n  and {more} more" if more > 0 else ""
-    return InvalidField("scripts", f"{len(faults)} that cannot be performed:{shown}{rest}")
+    return InvalidField("scripts", f"{len(faults)} that cannot be performed:{listed}{rest}")
 
 
 def _contents(path: Path) -> Iterator[tuple[str, str, bytes]]:
@@ -129,28 +129,28 @@ class PerformanceFormat:
     layout: PerformanceLayout = "whole"
     character: UserCharacter | None = None
 
-    def file(self, script: Script, most: int) -> tuple[PerformanceAnswer, bytes]:
+    def file(self, script: Script, frames: int) -> tuple[PerformanceAnswer, bytes]:
         """Return the performance of a script of at most so many frames, and its file."""
         question = script.question
         if self.character is None:
             encode = formats.performance_encoder(self.encoder, self.layout)
             convention = self.encoder.convention(question.unit, question.up, question.body)
-            answer = composition.perform(script, most)
+            answer = composition.perform(script, frames)
             return answer, encode(answer, convention)
         order = delivery.deliver(self.character, self.encoder, question)
-        answer = composition.perform(script, most)
+        answer = composition.perform(script, frames)
         answer = order.performance(answer, script.character.roles)
         return answer, order.encode(answer)
 
     def check(self, script: Script) -> None:
         """Raise InvalidField for a script whose performance a file of the format cannot hold."""
-        question, whom = script.question, script.character
+        question, character = script.question, script.character
         if self.character is None:
             self.encoder.convention(question.unit, question.up, question.body)
         else:
             order = delivery.deliver(self.character, self.encoder, question)
             order.check_layout(self.layout)
-            order.check(question, whom.skeleton, whom.roles)
+            order.check(question, character.skeleton, character.roles)
 
 
 @dataclass(frozen=True)
@@ -201,24 +201,24 @@ MARK = f"{STATE_FOLDER}/performances.json"
 class PerformanceBatch:
     """Many performances of one format.
 
-    models: files and folders of models besides the shipped ones. place: folder or URL. form:
-    extension of the files. layout: of USD files; InvalidField for a form without layouts.
+    models: files and folders of models besides the shipped ones. target: folder or URL. extension:
+    of the files. layout: of USD files; InvalidField for a format without layouts.
     character: that moves instead of those of the scripts.
     """
 
     models: tuple[Path, ...]
-    place: str
-    form: str
+    target: str
+    extension: str
     layout: PerformanceLayout = "whole"
     character: UserCharacter | None = None
 
     def __post_init__(self) -> None:
-        formats.performance_encoder(CLIP_ENCODERS[self.form], self.layout)
+        formats.performance_encoder(CLIP_ENCODERS[self.extension], self.layout)
 
     @property
     def format(self) -> PerformanceFormat:
         """Format of the files."""
-        return PerformanceFormat(CLIP_ENCODERS[self.form], self.layout, self.character)
+        return PerformanceFormat(CLIP_ENCODERS[self.extension], self.layout, self.character)
 
 
 @dataclass(frozen=True)
@@ -228,10 +228,10 @@ class BatchOutcome:
     entries: tuple[Entry, ...]
     before: int
 
-    def facts(self, place: str) -> dict[str, Any]:
+    def facts(self, target: str) -> dict[str, Any]:
         """Return the totals as plain values."""
         return {
-            "target": place,
+            "target": target,
             "performances": len(self.entries),
             "bytes": sum(entry["bytes"] for entry in self.entries),
             "warned": sum(bool(entry["warnings"]) for entry in self.entries),
@@ -261,7 +261,7 @@ def run(
     FileError if the target cannot be used; WorkerDied. Finished files are kept.
     """
     digests = _checked(batch, rows)
-    target = open_target(batch.place)
+    target = open_target(batch.target)
     entries = _finished(target, batch, rows, digests)
     target.prepare()
     target.create(MARK, b"{}\n")
@@ -298,7 +298,7 @@ def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) ->
     """Return a digest of all that determines the bytes of a performance."""
     choice, character = script.question.character, batch.character
     facts = [
-        batch.form,
+        batch.extension,
         batch.layout,
         __version__,
         *(version(name) for name in VERSIONED_PACKAGES),
@@ -329,12 +329,12 @@ def _finished(
         }
     except (ValueError, LookupError, TypeError) as error:
         raise FileError(
-            batch.place, f"holds another export, expected performances or nothing ({error!r})"
+            batch.target, f"holds another export, expected performances or nothing ({error!r})"
         ) from error
     if target.read(checkpoint.JOB) is not None:
-        raise FileError(batch.place, "holds an export of clips, expected performances or nothing")
+        raise FileError(batch.target, "holds an export of clips, expected performances or nothing")
     if not recorded and target.read(MARK) is None and not target.empty(but=STATE_FOLDER):
-        raise FileError(batch.place, "is not empty and has no manifest of performances")
+        raise FileError(batch.target, "is not empty and has no manifest of performances")
     return entries
 
 
@@ -357,8 +357,8 @@ def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
         answer, content = batch.format.file(script, MAX_FRAMES)
     except QueryError as error:
         raise faulty_scripts([f"{row.place}: {error}"]) from error
-    path = f"{FOLDER}/{row.name}.{batch.form}"
-    target = open_target(batch.place)
+    path = f"{FOLDER}/{row.name}.{batch.extension}"
+    target = open_target(batch.target)
     put_file(target, path, [content])
     entry = {**exported_file(row.name, path, answer, content).entry, "made_of": digest}
     target.write([(f"{PARTS}/{row.name}.json", manifest_line(entry))])

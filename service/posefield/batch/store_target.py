@@ -91,8 +91,8 @@ class StoreTarget:
 
     def empty(self, but: str) -> bool:
         with _store_errors(self.url):
-            found = obstore.list_with_delimiter(self._store)
-        return not found["objects"] and set(found["common_prefixes"]) <= {but}
+            listing = obstore.list_with_delimiter(self._store)
+        return not listing["objects"] and set(listing["common_prefixes"]) <= {but}
 
     def drop(self, path: str) -> None:
         with _store_errors(self._url(path)):

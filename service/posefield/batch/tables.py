@@ -69,18 +69,18 @@ class Column:
             return [("label", f"{self.name}={cell}")]
         word, kind = self.parameter.word, self.parameter.kind
         if self.parameter.repeated:
-            return [(word, part.strip()) for part in cell.split(";")]
+            return [(word, item.strip()) for item in cell.split(";")]
         return [(word, cell.lower() if kind is bool else cell)]
 
     def _number(self, cell: str) -> str:
         """Return a number as in a URL; columns of whole numbers with gaps have floats."""
-        whole = self.parameter is not None and self.parameter.kind is int
-        if not whole and text_decoding.NUMBER.fullmatch(cell):
+        is_integer = self.parameter is not None and self.parameter.kind is int
+        if not is_integer and text_decoding.NUMBER.fullmatch(cell):
             return cell
         if not TABLE_NUMBER.fullmatch(cell.strip()):
             return cell
         number = float(cell)
-        return str(int(number)) if whole and number.is_integer() else repr(number)
+        return str(int(number)) if is_integer and number.is_integer() else repr(number)
 
 
 Columns = Mapping[str, Column]
@@ -105,10 +105,12 @@ OPTION_COLUMNS: Columns = {
 def table_columns(card: ModelCard) -> Columns:
     """Return the columns of tables for a model: its controls and label sets, and the options."""
     controls = [Column(control.name, "controls", control.unit) for control in card.controls]
-    labels = [Column(each.name, "labels") for each in card.labels if each.name != PERFORMER]
+    labels = [
+        Column(label_set.name, "labels") for label_set in card.labels if label_set.name != PERFORMER
+    ]
     grouped = (*controls, *labels)
-    whole = {f"{column.group}/{column.name}": column for column in grouped}
-    return {**{column.name: column for column in grouped}, **OPTION_COLUMNS, **whole}
+    prefixed = {f"{column.group}/{column.name}": column for column in grouped}
+    return {**{column.name: column for column in grouped}, **OPTION_COLUMNS, **prefixed}
 
 
 def read_heading(columns: Columns, titles: Sequence[str]) -> tuple[Column, ...]:
@@ -127,9 +129,9 @@ def find_column(columns: Columns, title: str) -> Column:
     stated = WITH_UNIT.fullmatch(title)
     column = columns.get(stated["name"]) if stated else None
     if not stated or not column:
-        known = [name for name in columns if "/" not in name]
-        near = similar_name(title, known)
-        hint = f"did you mean {near!r}?" if near else f"expected one of {', '.join(known)}"
+        titles = [name for name in columns if "/" not in name]
+        near = similar_name(title, titles)
+        hint = f"did you mean {near!r}?" if near else f"expected one of {', '.join(titles)}"
         raise ValueError(f"unknown column {shortened_text(title)}, {hint}")
     unit = stated["square"] or stated["round"] or ""
     if unit.strip() != column.unit:
@@ -140,8 +142,8 @@ def find_column(columns: Columns, title: str) -> Column:
 
 def shortened_text(value: object) -> str:
     """Return a value as text for messages, of MAX_TEXT_LENGTH characters at most."""
-    whole = repr(value)
-    return whole if len(whole) <= MAX_TEXT_LENGTH else f"{whole[:MAX_TEXT_LENGTH]}..."
+    text = repr(value)
+    return text if len(text) <= MAX_TEXT_LENGTH else f"{text[:MAX_TEXT_LENGTH]}..."
 
 
 @dataclass(frozen=True)
@@ -186,18 +188,18 @@ def open_table(path: Path, columns: Columns) -> TableFile:
 
 def _stamp(path: Path) -> tuple[int, int]:
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError as fault:
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
-    return found.st_size, found.st_mtime_ns
+    return status.st_size, status.st_mtime_ns
 
 
 def read_rows(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
     """Yield the lines of an open file; FileError for a line that is too long."""
     for number, line in enumerate(iter(partial(readline, MAX_LINE_LENGTH), readline(0)), start=1):
         if len(line) == MAX_LINE_LENGTH:
-            found = f"a line of {MAX_LINE_LENGTH} characters or more"
-            raise FileError(path, f"{found}, expected one row a line", number)
+            problem = f"a line of {MAX_LINE_LENGTH} characters or more"
+            raise FileError(path, f"{problem}, expected one row a line", number)
         yield line
 
 
@@ -226,8 +228,8 @@ def _csv_rows(path: Path, heading: Sequence[Column]) -> Iterator[RawRow]:
             if isinstance(cells, QueryError):
                 yield f"{path}:{line}", cells
             elif len(cells) != len(heading):
-                found = f"{len(cells)} cells, expected {len(heading)} as in the heading"
-                yield f"{path}:{line}", FormError("", found)
+                problem = f"{len(cells)} cells, expected {len(heading)} as in the heading"
+                yield f"{path}:{line}", FormError("", problem)
             else:
                 yield (
                     f"{path}:{line}",
@@ -270,13 +272,13 @@ def _json_lines(path: Path, columns: Columns) -> RawRows:
                 text = line.removeprefix(BOM) if number == 1 else line
                 if not text.strip():
                     continue
-                place = f"{path}:{number}"
+                location = f"{path}:{number}"
                 try:
                     row = _json_object(text)
                     pairs = zip(heading(tuple(row)), row.values(), strict=True)
-                    yield place, [pair for pair in pairs if pair[1] is not None]
+                    yield location, [pair for pair in pairs if pair[1] is not None]
                 except ValueError as fault:
-                    yield place, FormError("", str(fault))
+                    yield location, FormError("", str(fault))
 
     return rows
 
@@ -301,12 +303,12 @@ def _json_object(line: bytes) -> dict[str, Any]:
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    row = dict(pairs)
+    if len(row) < len(pairs):
         keys = [key for key, _ in pairs]
         twin = next(key for index, key in enumerate(keys) if key in keys[:index])
         raise ValueError(f"{twin!r} twice, expected once")
-    return found
+    return row
 
 
 def _parquet_table(path: Path, columns: Columns) -> RawRows:

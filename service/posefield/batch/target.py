@@ -92,44 +92,44 @@ def put_file(target: ExportTarget, path: str, pieces: Iterable[bytes]) -> Writte
     return WrittenFile(path, size, digest.hexdigest())
 
 
-def is_intact(target: ExportTarget, written: WrittenFile, verify: bool) -> bool:
+def is_intact(target: ExportTarget, file: WrittenFile, verify: bool) -> bool:
     """Return whether a file is unchanged, by its size or, with `verify`, its SHA-256."""
     if not verify:
-        return target.holds(written.file, written.bytes)
+        return target.holds(file.file, file.bytes)
     digest = hashlib.sha256()
-    for piece in target.pieces(written.file):
+    for piece in target.pieces(file.file):
         digest.update(piece)
-    return digest.hexdigest() == written.sha256
+    return digest.hexdigest() == file.sha256
 
 
 def read_lines(target: ExportTarget, path: str) -> Iterator[bytes]:
     """Yield the lines of a file, without holding the whole file in memory."""
     rest = b""
     for piece in target.pieces(path):
-        *whole, rest = (rest + piece).split(b"\n")
-        yield from whole
+        *lines, rest = (rest + piece).split(b"\n")
+        yield from lines
     if rest:
         yield rest
 
 
-def open_target(place: str) -> ExportTarget:
+def open_target(location: str) -> ExportTarget:
     """Return the target of a path, of a file:/// URL or, through obstore, of an object store's URL.
 
     Raises InvalidField for any other text, and FileError for a store that cannot be used.
     """
-    if not place:
+    if not location:
         raise InvalidField("output", "empty, expected a folder or an object store's URL")
-    if not URL.match(place):
-        return FolderTarget(place.rstrip("/") or "/", TEMPORARY_FILE)
-    url = urlsplit(place)
+    if not URL.match(location):
+        return FolderTarget(location.rstrip("/") or "/", TEMPORARY_FILE)
+    url = urlsplit(location)
     if url.scheme == "file":
         if url.netloc not in ("", "localhost"):
-            raise InvalidField("output", f"{place!r}, expected file:///FOLDER without a host")
+            raise InvalidField("output", f"{location!r}, expected file:///FOLDER without a host")
         return open_target(unquote(url.path))
     # Imported here because obstore is an optional extra.
     from posefield.batch.store_target import StoreTarget
 
-    return StoreTarget(place)
+    return StoreTarget(location)
 
 
 TRIES, PAUSE = 40, 0.05
@@ -147,9 +147,9 @@ class FolderTarget:
     Paths are strings: creating a Path costs a tenth of a small write.
     """
 
-    def __init__(self, root: str, aside: str) -> None:
+    def __init__(self, root: str, temporary: str) -> None:
         self.root = root
-        self._temporary_path = f"{root}/{aside}/{uuid.uuid4().hex}"
+        self._temporary_path = f"{root}/{temporary}/{uuid.uuid4().hex}"
         self._made_folders: set[str] = set()
 
     def prepare(self) -> None:
@@ -163,15 +163,15 @@ class FolderTarget:
             self.stream(path, (content,))
 
     def stream(self, path: str, pieces: Iterable[bytes]) -> None:
-        whole = self._path(path)
-        with self._write_temporary(whole, pieces):
-            os.rename(self._temporary_path, whole)
+        full_path = self._path(path)
+        with self._write_temporary(full_path, pieces):
+            os.rename(self._temporary_path, full_path)
 
     def create(self, path: str, content: bytes) -> bool:
-        whole = self._path(path)
-        with self._write_temporary(whole, (content,)):
+        full_path = self._path(path)
+        with self._write_temporary(full_path, (content,)):
             try:
-                return _move_if_absent(self._temporary_path, whole)
+                return _move_if_absent(self._temporary_path, full_path)
             finally:
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(self._temporary_path)
@@ -224,10 +224,10 @@ class FolderTarget:
         return f"{self.root}/{path}" if path else self.root
 
     @contextmanager
-    def _write_temporary(self, whole: str, pieces: Iterable[bytes]) -> Iterator[None]:
+    def _write_temporary(self, full_path: str, pieces: Iterable[bytes]) -> Iterator[None]:
         """Write the pieces to the temporary file, which the caller renames."""
-        with _file_errors(whole):
-            self._ensure_folder(whole.rpartition("/")[0])
+        with _file_errors(full_path):
+            self._ensure_folder(full_path.rpartition("/")[0])
             try:
                 with open(self._temporary_path, "wb") as file:
                     file.writelines(pieces)
@@ -243,10 +243,10 @@ class FolderTarget:
             self._made_folders.add(folder)
 
 
-def _move_if_absent(aside: str, whole: str) -> bool:
+def _move_if_absent(temporary: str, full_path: str) -> bool:
     """Move a file to a path if none exists there; return whether it was moved."""
     try:
-        os.link(aside, whole)
+        os.link(temporary, full_path)
     except FileExistsError:
         return False
     except OSError as fault:
@@ -254,9 +254,9 @@ def _move_if_absent(aside: str, whole: str) -> bool:
             raise
         # Not atomic: two processes that begin at once may both find no file; the later one's
         # remains.
-        if os.path.exists(whole):
+        if os.path.exists(full_path):
             return False
-        os.rename(aside, whole)
+        os.rename(temporary, full_path)
     return True
 
 

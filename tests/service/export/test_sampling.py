@@ -12,9 +12,8 @@ from rowing import Usual, rows
 from scipy.optimize import linprog
 from scipy.stats import chisquare
 
-from posefield.batch import sampling
-from posefield.batch.rows import RowFault
-from posefield.batch.sampling import BLOCK_SIZE
+from posefield.batch import rows as sampling
+from posefield.batch.rows import BLOCK_SIZE, RowFault
 from posefield.question.motion_question import ClipQuestion
 from posefield.registry import model_registry
 
