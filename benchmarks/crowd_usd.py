@@ -15,8 +15,7 @@ from rows import Row, table
 from timing import in_turn
 
 from posefield.common.units import Indices
-from posefield.encode.character import character
-from posefield.encode.usd_crowd import crowd_writer
+from posefield.encode import character, crowd_writer
 from posefield.motion import quat
 from posefield.motion.clip import CrowdClip, Motions, Placement
 from posefield.motion.skeleton import Skeleton

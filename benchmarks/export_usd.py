@@ -20,12 +20,10 @@ from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, record, table
 from timing import in_turn
 
-from posefield.encode.character import character
-from posefield.encode.character.character import CharacterRig
+from posefield.encode import character, crate_template, layers, usd_clip, usd_library
+from posefield.encode.character import CharacterRig
+from posefield.encode.crate_template import LayerBuilder, LayerContent
 from posefield.encode.formats import METRES
-from posefield.encode.usd import usd_clip, usd_library
-from posefield.encode.usd_layers import crate_template, layers
-from posefield.encode.usd_layers.crate_template import LayerBuilder, LayerContent
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from posefield.encode.body.skinned_mesh import FULL_WEIGHT, triangles, vertex_normals
-from posefield.encode.character import character
+from posefield.encode import character
+from posefield.encode.skinned_mesh import FULL_WEIGHT, triangles, vertex_normals
 from posefield.inference import session
 from posefield.motion import quat
 from posefield.motion.skeleton import forward_kinematics

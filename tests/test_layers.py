@@ -128,7 +128,7 @@ def test_the_start_imports_nothing_that_only_some_requests_need():
 
 
 def test_an_import_at_the_start_would_be_noticed():
-    said = python("import sys, posefield.encode.usd.usd_clip; print('pxr' in sys.modules)")
+    said = python("import sys, posefield.encode.usd_clip; print('pxr' in sys.modules)")
     assert said.stdout == "True\n", said.stderr
 
 

@@ -20,8 +20,8 @@ from posefield.common import atomic_files
 from posefield.common.errors import FileError, ModelError, UnknownFormat
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import formats
+from posefield.encode.crowd_size import FILES
 from posefield.encode.formats import encoder_for
-from posefield.encode.usd_crowd import FILES
 from posefield.locomotion import walking_crowd
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
@@ -109,8 +109,7 @@ class Crowd:
         and FileError if the file cannot be written.
         """
         # usd-core takes 0.12 CPU seconds to import.
-        from posefield.encode.tables import motion_tables
-        from posefield.encode.usd_crowd import crowd_writer
+        from posefield.encode import crowd_writer, motion_tables
 
         path, question, extensions = Path(path), self.question, (*FILES, "npz")
         if path.suffix.removeprefix(".") not in extensions:

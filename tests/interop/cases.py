@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import trained
 
-from posefield.encode.character import character
+from posefield.encode import character
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton

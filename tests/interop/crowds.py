@@ -8,8 +8,7 @@ from pathlib import Path
 import cases
 import numpy as np
 
-from posefield.encode import usd_crowd
-from posefield.encode.usd_crowd import crowd_writer
+from posefield.encode import crowd_size, crowd_writer
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import CrowdClip, Motions, Placement
@@ -19,7 +18,7 @@ FRAMES = 20
 CONTROL = "crowd_turned"
 """Name of the crowd whose characters all face ahead."""
 FILES = [
-    *((f"crowd_{instancing}", "usdc", instancing) for instancing in usd_crowd.INSTANCING),
+    *((f"crowd_{instancing}", "usdc", instancing) for instancing in crowd_size.INSTANCING),
     ("crowd_folder", "usd", "references"),
     ("crowd_archive", "usdz", "references"),
     ("crowd_flatten", "usda", "flatten"),

@@ -19,8 +19,8 @@ from posefield.batch.job import (
 from posefield.batch.rows import Row
 from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField, did_you_mean
+from posefield.encode import extent
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
-from posefield.encode.character import extent
 from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles
@@ -119,7 +119,7 @@ def _library_misfit(job: ExportJob, row: Row[ClipQuestion]) -> str | None:
 
 def _animation_layers(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, without a character."""
-    from posefield.encode.usd import usd_clip  # usd-core, which other layouts do not need.
+    from posefield.encode import usd_clip
 
     return usd_clip.animation_usdc(answers, convention)
 
@@ -135,7 +135,7 @@ def _library_stage(
     work: WorkerInput, entries: Iterable[ManifestEntry]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the stage of a library, at the rate of its first clip."""
-    from posefield.encode.usd import usd_library
+    from posefield.encode import usd_library
 
     job, card = work.job, open_model_of(work).session.card
     keys = ("name", "file", "frames", "fps", "low", "high")

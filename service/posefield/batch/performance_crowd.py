@@ -23,7 +23,7 @@ from posefield.batch import process_pool, scripts
 from posefield.batch.scripts import ScriptRow, open_models
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import UP, Floats, RootPath, Singles
-from posefield.encode.usd_crowd import FILES
+from posefield.encode.crowd_size import FILES
 from posefield.inference import level_selection
 from posefield.inference.level_selection import LevelCriteria
 from posefield.locomotion import floor_plane, walking_crowd
@@ -93,7 +93,7 @@ def write(
     all scripts at fault before one is performed or names one whose performance failed; FileError if
     the file cannot be written; WorkerDied.
     """
-    from posefield.encode.usd_crowd import crowd_writer  # usd-core: 0.12 CPU seconds of the start
+    from posefield.encode import crowd_writer
 
     if crowd.path.suffix.removeprefix(".") not in FILES:
         name = crowd.path.name

@@ -24,7 +24,7 @@ from posefield.rigs import rest_joints
 from posefield.rigs.rig import Rig, read_rig
 
 if TYPE_CHECKING:
-    from posefield.encode.usd.rig_layer import RigStage
+    from posefield.encode.rig_layer import RigStage
 
 MOST_ROLES_BYTES = 128_000
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz", ".glb")
@@ -172,8 +172,7 @@ class UserCharacter:
             answer = SampledClip(clip, answer.trust)
         if form.extension in LAYERS:
             # usd-core takes 0.12 CPU seconds to import.
-            from posefield.encode.usd import usd_clip
-            from posefield.encode.usd_layers import layers
+            from posefield.encode import layers, usd_clip
 
             layer = self._layer(answer)
             if form.extension == "usda":
@@ -186,7 +185,7 @@ class UserCharacter:
         return form.encode(answer, replace(convention, body="none"))
 
     def _layer(self, answer: SampledClip) -> Any:
-        from posefield.encode.usd import rig_layer
+        from posefield.encode import rig_layer
 
         if self.stage is None:
             return rig_layer.skeleton_layer(answer, self.rig.rest)
@@ -211,7 +210,7 @@ def open_character(
     stage = None
     if rig.format == "USD":
         # usd-core takes 0.12 CPU seconds to import.
-        from posefield.encode.usd import rig_layer
+        from posefield.encode import rig_layer
 
         with rest_joints.naming_faults(str(path), RuntimeError, ValueError, TypeError, LookupError):
             stage = rig_layer.read_stage(path, rig.skeleton_path, rig.joint_paths)

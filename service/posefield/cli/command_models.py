@@ -11,7 +11,7 @@ from posefield.batch import rows
 from posefield.common.errors import ModelError
 from posefield.console.options import Json, ModelPath, open_model, with_question_options
 from posefield.console.output import LateProgress, as_json, print_warnings
-from posefield.encode.tables import model_tables
+from posefield.encode import model_tables
 from posefield.inference import level_selection, session
 from posefield.model_file import checked_file
 from posefield.model_file import model_card as cards

@@ -12,9 +12,7 @@ import orjson
 from posefield.common.errors import FileError, InvalidField
 from posefield.common.units import Floats
 from posefield.console.progress import ProgressBar
-from posefield.encode import usd_crowd
-from posefield.encode.tables import motion_tables
-from posefield.encode.usd_crowd import crowd_writer
+from posefield.encode import crowd_size, crowd_writer, motion_tables
 from posefield.locomotion import gait, walking_crowd
 from posefield.locomotion import paths as given
 from posefield.locomotion.gait import Gait
@@ -26,7 +24,7 @@ from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
-EXTENSIONS = (*usd_crowd.FILES, "npz")
+EXTENSIONS = (*crowd_size.FILES, "npz")
 
 
 def write_crowd(

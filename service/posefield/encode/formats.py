@@ -14,7 +14,8 @@ from msgspec import structs
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField, UnknownFormat, did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode import conventions, glb
+from posefield.encode import conventions, glb, model_tables, motion_tables
+from posefield.encode import table as tables
 from posefield.encode.conventions import (
     ARROW,
     CENTIMETRES,
@@ -27,10 +28,8 @@ from posefield.encode.conventions import (
     Format,
     by_extension,
 )
-from posefield.encode.tables import model_tables, motion_tables
-from posefield.encode.tables import table as tables
-from posefield.encode.tables.table import Table, arrow_stream, npz_table
-from posefield.encode.usd_crowd import STREAMS
+from posefield.encode.crowd_size import STREAMS
+from posefield.encode.table import Table, arrow_stream, npz_table
 from posefield.motion import bvh_writer, root_bone
 from posefield.motion.clip import CrowdClip, CrowdPoses
 from posefield.question.motion_question import BodyKind
@@ -175,7 +174,7 @@ def _lazy_usd_writer(name: str) -> Callable[[Sequence[SampledClip], Convention],
     """
 
     def write(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
-        from posefield.encode.usd import usd_clip
+        from posefield.encode import usd_clip
 
         writers = {"usda": usd_clip.usda, "usdc": usd_clip.usdc, "usdz": usd_clip.usdz}
         return writers[name](answers, convention)
@@ -287,9 +286,7 @@ class CrowdWriter(Format):
 
         Raises InvalidField as `crowd_writer.stream` does.
         """
-        from posefield.encode.usd_crowd import (
-            crowd_writer,  # usd-core: 0.12 CPU seconds of the start
-        )
+        from posefield.encode import crowd_writer
 
         return crowd_writer.stream(crowd, self.extension, instancing, body)
 
@@ -321,7 +318,7 @@ def performance_encoder(form: ClipEncoder, layout: PerformanceLayout) -> Perform
 
     def encode(answer: PerformanceAnswer, convention: Convention) -> bytes:
         # usd-core takes 0.12 CPU seconds to import.
-        from posefield.encode.usd import performance_layer
+        from posefield.encode import performance_layer
 
         writers = {
             "usda": performance_layer.usda,

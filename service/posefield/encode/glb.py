@@ -22,11 +22,10 @@ import numpy.typing as npt
 import orjson
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.body import skinned_mesh
-from posefield.encode.body.skinned_mesh import SkinnedMesh
-from posefield.encode.character import character
-from posefield.encode.character.character import CharacterRig, RestPose
+from posefield.encode import character, skinned_mesh
+from posefield.encode.character import CharacterRig, RestPose
 from posefield.encode.conventions import Convention
+from posefield.encode.skinned_mesh import SkinnedMesh
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import CurveValues

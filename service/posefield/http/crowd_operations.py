@@ -14,14 +14,13 @@ from starlette.responses import Response
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.common.units import Floats, Indices
-from posefield.encode.character import character
+from posefield.encode import character, crowd_size
+from posefield.encode.crowd_size import CrowdCounts
 from posefield.encode.formats import (
     CROWD_ENCODERS,
     CROWD_WRITERS,
     max_poses,
 )
-from posefield.encode.usd_crowd import crowd_size
-from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.http import responses
 from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
 from posefield.http.api.settings import Settings

@@ -6,7 +6,7 @@ from functools import partial
 from starlette.responses import Response
 
 from posefield.common.errors import InvalidField
-from posefield.encode import glb
+from posefield.encode import glb, model_tables
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.conventions import Format
 from posefield.encode.formats import (
@@ -15,7 +15,6 @@ from posefield.encode.formats import (
     GRID_ENCODERS,
     POSE_ENCODERS,
 )
-from posefield.encode.tables import model_tables
 from posefield.http import metrics, responses
 from posefield.http.archive_operations import answer_clips, answer_performances
 from posefield.http.crowd_operations import WALK_FORMATS, answer_crowd, answer_walk

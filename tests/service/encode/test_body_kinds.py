@@ -10,8 +10,8 @@ import pytest
 from pxr import Usd, UsdShade, UsdSkel
 
 from posefield.common.errors import InvalidField
+from posefield.encode import crowd_writer
 from posefield.encode.formats import CLIP_ENCODERS, CROWD_WRITERS
-from posefield.encode.usd_crowd import crowd_writer
 
 BODILESS = [name for name, each in CLIP_ENCODERS.items() if not each.has_body]
 KINDS = ("none", "mannequin", "bones")

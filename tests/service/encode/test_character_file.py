@@ -7,8 +7,7 @@ import conftest
 import numpy as np
 import pytest
 
-from posefield.encode import glb
-from posefield.encode.character import character
+from posefield.encode import character, glb
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 
 KINDS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pxr import Sdf, Vt
 
-from posefield.encode.usd_layers import crate_sections, crate_template, layers
-from posefield.encode.usd_layers.crate_template import LayerContent
-from posefield.encode.usd_layers.layers import ValueTypes
+from posefield.encode import crate_sections, crate_template, layers
+from posefield.encode.crate_template import LayerContent
+from posefield.encode.layers import ValueTypes
 
 UNIT, MIX = 0.01, 1.0 / 3.0
 

@@ -11,7 +11,7 @@ import pytest
 from test_crate import Plain, built, content
 from test_facts import GIVEN
 
-from posefield.encode.usd_layers import crate_template, layers
+from posefield.encode import crate_template, layers
 
 
 class Word(StrEnum):

@@ -7,8 +7,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 from usd_checks import defects
 
-from posefield.encode.character import character
-from posefield.encode.usd_crowd import crowd_writer
+from posefield.encode import character, crowd_writer
 
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
 FRAMES = 12

@@ -19,11 +19,7 @@ import pytest
 from pxr import Sdf, UsdUtils
 
 from posefield.common.errors import FileError, InvalidField
-from posefield.encode import usd_crowd
-from posefield.encode.character import character
-from posefield.encode.usd import character_prims
-from posefield.encode.usd_crowd import crowd_writer
-from posefield.encode.usd_layers import layers
+from posefield.encode import character, character_prims, crowd_size, crowd_writer, layers
 
 FOLDER = Path(__file__).parent
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
@@ -81,7 +77,7 @@ def test_a_single_layer_needs_no_other(ending, instancing, clip, tmp_path):
     assert (len(opened), assets, missing) == (1, [], [])
 
 
-@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
+@pytest.mark.parametrize("instancing", crowd_size.INSTANCING)
 def test_an_archive_is_stored_aligned_and_begins_with_what_is_opened(instancing, clip, tmp_path):
     path = tmp_path / "crowd.usdz"
     crowd_writer.write(clip, path, instancing)
@@ -171,8 +167,8 @@ FIELDS = (
 def print_digests():
     person = conftest.person()
     made = crowds.motions(person, 5, 12)
-    for ending in usd_crowd.STREAMS:
-        for instancing in usd_crowd.INSTANCING:
+    for ending in crowd_size.STREAMS:
+        for instancing in crowd_size.INSTANCING:
             sent = b"".join(
                 crowd_writer.stream(crowds.crowd(person, made, MOTION), ending, instancing)
             )

@@ -4,9 +4,8 @@ import conftest
 import crowds
 import pytest
 
-from posefield.encode.character import character
-from posefield.encode.usd_crowd import crowd_size, crowd_writer
-from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+from posefield.encode import character, crowd_size, crowd_writer
+from posefield.encode.crowd_size import CrowdCounts
 
 # Characters, motions, frames.
 SHAPES = [(1, 1, 2), (1, 1, 200), (40, 2, 2), (12, 12, 30)]

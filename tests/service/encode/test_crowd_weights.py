@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
 
-from posefield.encode.tables import motion_tables
-from posefield.encode.usd_crowd import crowd_writer
+from posefield.encode import crowd_writer, motion_tables
 
 MOTION, FRAMES = [0, 1, 2, 0], 7
 FLOAT32 = 1e-7

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
 
-from posefield.encode.character import character
+from posefield.encode import character, layers, usd_clip
 from posefield.encode.conventions import METRES
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd import usd_clip
-from posefield.encode.usd_layers import layers
 from posefield.motion.curves import Curve, CurveValues
 from posefield.question.results import ClipAnswer
 

@@ -12,8 +12,9 @@ from serving import children
 
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
-from posefield.encode.usd_crowd import STREAMS, crowd_writer
-from posefield.encode.usd_crowd.crowd_writer import EncoderDied
+from posefield.encode import crowd_writer
+from posefield.encode.crowd_size import STREAMS
+from posefield.encode.crowd_writer import EncoderDied
 
 pytestmark = pytest.mark.system
 

@@ -6,9 +6,8 @@ import crowds
 import numpy as np
 import pytest
 
-from posefield.encode.character import character, extent
-from posefield.encode.character import extent as exact
-from posefield.encode.usd_crowd import crowd_scene
+from posefield.encode import character, crowd_scene, extent
+from posefield.encode import extent as exact
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Placement

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from posefield.encode.usd_layers import layers
+from posefield.encode import layers
 
 GIVEN = {
     "model": "walk@1",

@@ -1,6 +1,6 @@
 from itertools import product
 
-from posefield.encode.character import character
+from posefield.encode import character
 
 
 def test_illegal_characters_become_underscores():

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
-from posefield.encode.character import extent
+from posefield.encode import extent, layers, usd_clip, usd_library
 from posefield.encode.conventions import Convention
 from posefield.encode.formats import CENTIMETRES, METRES
-from posefield.encode.usd import usd_clip, usd_library
-from posefield.encode.usd_layers import layers
 from posefield.question.results import ClipAnswer
 
 INCHES = Convention(0.0254, "z")

@@ -6,9 +6,9 @@ import conftest
 import numpy as np
 import pytest
 
-from posefield.encode.body import skinned_mesh
-from posefield.encode.body.mannequin import mannequin
-from posefield.encode.body.skinned_mesh import bones_body
+from posefield.encode import skinned_mesh
+from posefield.encode.mannequin import mannequin
+from posefield.encode.skinned_mesh import bones_body
 from posefield.inference import session
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton, forward_kinematics

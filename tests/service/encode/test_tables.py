@@ -11,9 +11,9 @@ import orjson
 import pyarrow as pa
 import pytest
 
+from posefield.encode import table as tables
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
-from posefield.encode.tables import table as tables
-from posefield.encode.tables.table import npz_archive
+from posefield.encode.table import npz_archive
 from posefield.question.results import PoseAnswer
 
 ROWS = ("times", "rotations", "root_position")

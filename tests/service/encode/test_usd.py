@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
-from posefield.encode.character import character
+from posefield.encode import character
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import quat
 from posefield.motion.clip import Clip

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from posefield.encode import crate_template, layers, usd_clip
 from posefield.encode.conventions import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
-from posefield.encode.usd import usd_clip
-from posefield.encode.usd_layers import crate_template, layers
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton

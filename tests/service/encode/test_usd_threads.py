@@ -27,7 +27,7 @@ for thread in threads:
 """
 
 
-MODULES = ("usd.usd_clip", "usd.usd_library", "usd_crowd.crowd_scene")
+MODULES = ("usd_clip", "usd_library", "crowd_scene")
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -13,7 +13,7 @@ from pxr import Sdf, Usd, UsdSkel, UsdValidation
 
 from posefield.encode import formats
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd.performance_layer import segment_frames
+from posefield.encode.performance_layer import segment_frames
 from posefield.inference import session
 from posefield.performance import composition
 from posefield.performance.script import resolve_script

@@ -8,8 +8,8 @@ import pytest
 from posefield.batch.job import archive_members
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
+from posefield.encode import crowd_writer
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd_crowd import crowd_writer
 from posefield.http import archive_operations, crowd_operations
 from posefield.http.api.settings import Settings
 from posefield.locomotion import gait, walking_crowd

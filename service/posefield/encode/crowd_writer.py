@@ -22,15 +22,12 @@ from posefield.common import atomic_files
 from posefield.common import cancellation as cancel
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.common.errors import FileError, InvalidField, did_you_mean
-from posefield.encode import archives
-from posefield.encode.character import character
-from posefield.encode.usd_crowd import FILES, INSTANCING, STREAMS, crowd_scene, crowd_size
-from posefield.encode.usd_crowd.crowd_size import CrowdCounts
-from posefield.encode.usd_layers import layers
+from posefield.encode import archives, character, crowd_scene, crowd_size, layers
+from posefield.encode.crowd_size import FILES, INSTANCING, STREAMS, CrowdCounts
 from posefield.motion.clip import CrowdClip
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
 
-CHILD_MODULE = "posefield.encode.usd_crowd.encoding_child"
+CHILD_MODULE = "posefield.encode.encoding_child"
 POLL_INTERVAL = 0.1
 """Seconds between two checks of the cancellation."""
 

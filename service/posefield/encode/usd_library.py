@@ -19,12 +19,9 @@ import numpy as np
 from pxr import Sdf
 
 from posefield.common.units import Floats
-from posefield.encode import conventions
-from posefield.encode.character import character
-from posefield.encode.character.character import CharacterRig
+from posefield.encode import character, character_prims, conventions, layers
+from posefield.encode.character import CharacterRig
 from posefield.encode.conventions import Convention
-from posefield.encode.usd import character_prims
-from posefield.encode.usd_layers import layers
 from posefield.motion.skeleton import Skeleton
 
 ROOT = Sdf.Path("/Character")

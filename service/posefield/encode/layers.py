@@ -11,8 +11,8 @@ from pxr import Sdf, Tf, Vt
 
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, Singles
+from posefield.encode import crate_sections
 from posefield.encode.conventions import METRES, Convention
-from posefield.encode.usd_layers import crate_sections
 
 Samples = Mapping[str, Singles]
 """Samples (F, ...) of attributes at the time codes 0 to F - 1, by name."""

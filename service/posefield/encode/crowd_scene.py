@@ -30,18 +30,22 @@ from pxr import Sdf, Vt
 
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, Singles
-from posefield.encode import archives
+from posefield.encode import (
+    archives,
+    character,
+    character_prims,
+    crate_template,
+    crowd_size,
+    extent,
+    layers,
+)
 from posefield.encode.archives import ZipMember
-from posefield.encode.character import character, extent
-from posefield.encode.character.character import CharacterRig
-from posefield.encode.character.extent import AnimationSamples
+from posefield.encode.character import CharacterRig
 from posefield.encode.conventions import METRES
-from posefield.encode.usd import character_prims
-from posefield.encode.usd.usd_clip import AnimationLayerBuilder
-from posefield.encode.usd_crowd import crowd_size
-from posefield.encode.usd_layers import crate_template, layers
-from posefield.encode.usd_layers.crate_template import LayerContent
-from posefield.encode.usd_layers.layers import WEIGHTS, Samples, ValueTypes
+from posefield.encode.crate_template import LayerContent
+from posefield.encode.extent import AnimationSamples
+from posefield.encode.layers import WEIGHTS, Samples, ValueTypes
+from posefield.encode.usd_clip import AnimationLayerBuilder
 from posefield.motion import quat
 from posefield.motion.clip import CrowdClip, Motions, Placement
 from posefield.question.motion_question import BodyKind

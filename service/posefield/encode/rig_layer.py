@@ -18,11 +18,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from posefield.common.errors import UsdError
 from posefield.common.units import Floats, JointWeights, Positions, Rotations, Singles
-from posefield.encode.character import character
+from posefield.encode import character, character_prims, layers
 from posefield.encode.conventions import METRES, Convention
-from posefield.encode.usd import character_prims
-from posefield.encode.usd_layers import layers
-from posefield.encode.usd_layers.layers import ValueTypes
+from posefield.encode.layers import ValueTypes
 from posefield.motion import joint_roles, quat
 from posefield.question.results import SampledClip
 from posefield.rigs import usd_rig

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from posefield.encode.tables import table as tables
-from posefield.encode.tables.table import Table
+from posefield.encode import table as tables
+from posefield.encode.table import Table
 from posefield.question.results import (
     CapturedClip,
     Explanation,

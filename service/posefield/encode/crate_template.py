@@ -15,16 +15,16 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from posefield.encode import crate_sections, layers
 from posefield.encode.conventions import Convention
-from posefield.encode.usd_layers import crate_sections, layers
-from posefield.encode.usd_layers.crate_sections import (
+from posefield.encode.crate_sections import (
     DOUBLE,
     MARK,
     CrateSection,
     FactPlace,
     SamplesPlace,
 )
-from posefield.encode.usd_layers.layers import Samples
+from posefield.encode.layers import Samples
 
 Array = npt.NDArray[Any]
 

@@ -15,13 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
-from posefield.encode import conventions
-from posefield.encode.body import skinned_mesh
-from posefield.encode.body.mannequin import mannequin
-from posefield.encode.body.skinned_mesh import BodyBounds, SkinnedMesh, bones_body
-from posefield.encode.character import extent
-from posefield.encode.character.extent import PointTree
+from posefield.encode import conventions, extent, skinned_mesh
 from posefield.encode.conventions import METRES, Convention
+from posefield.encode.extent import PointTree
+from posefield.encode.mannequin import mannequin
+from posefield.encode.skinned_mesh import BodyBounds, SkinnedMesh, bones_body
 from posefield.motion import joint_roles, root_bone
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton

@@ -18,15 +18,20 @@ from pxr import Sdf
 
 from posefield.common import cancellation
 from posefield.common.units import Singles
-from posefield.encode import archives, conventions
-from posefield.encode.character import character, extent
-from posefield.encode.character.character import CharacterRig
-from posefield.encode.character.extent import AnimationSamples
+from posefield.encode import (
+    archives,
+    character,
+    character_prims,
+    conventions,
+    crate_template,
+    extent,
+    layers,
+)
+from posefield.encode.character import CharacterRig
 from posefield.encode.conventions import Convention
-from posefield.encode.usd import character_prims
-from posefield.encode.usd_layers import crate_template, layers
-from posefield.encode.usd_layers.crate_template import Array, LayerBuilder, LayerContent
-from posefield.encode.usd_layers.layers import WEIGHTS, Samples
+from posefield.encode.crate_template import Array, LayerBuilder, LayerContent
+from posefield.encode.extent import AnimationSamples
+from posefield.encode.layers import WEIGHTS, Samples
 from posefield.motion.clip import Clip
 from posefield.question.results import SampledClip
 

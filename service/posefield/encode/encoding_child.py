@@ -1,6 +1,6 @@
 """Process that encodes one crowd.
 
-`python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING BODY` reads pickles from
+`python -m posefield.encode.encoding_child PATH INSTANCING BODY` reads pickles from
 standard input: the crowd without motions, batches of them, and None. It writes the file PATH.
 `crowd_writer.stream_from_child` starts it.
 """
@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, cast
 
-from posefield.encode.usd_crowd import crowd_writer
+from posefield.encode import crowd_writer
 from posefield.motion.clip import Motions
 from posefield.question.motion_question import BodyKind
 

@@ -19,12 +19,11 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from posefield.common.units import Booleans
+from posefield.encode import character_prims, layers, usd_clip
 from posefield.encode.conventions import Convention
-from posefield.encode.usd import character_prims, usd_clip
-from posefield.encode.usd.usd_clip import ClipLayerBuilder
-from posefield.encode.usd_layers import layers
-from posefield.encode.usd_layers.crate_template import LayerContent
-from posefield.encode.usd_layers.layers import ValueTypes
+from posefield.encode.crate_template import LayerContent
+from posefield.encode.layers import ValueTypes
+from posefield.encode.usd_clip import ClipLayerBuilder
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
 PERFORMANCE = Sdf.Path("/Performance")

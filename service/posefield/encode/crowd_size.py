@@ -1,4 +1,4 @@
-"""Size of a crowd before it is encoded: of its file and of its largest layer.
+"""Forms of crowds in USD, and sizes before one is encoded: of its file and of its largest layer.
 
 usd-core holds a layer in memory until it has been exported. The constants of characters are sizes
 in memory, which are many times those in binary files (decision 0029).
@@ -9,6 +9,17 @@ from dataclasses import dataclass
 from posefield.common.errors import InvalidField
 from posefield.encode import archives
 from posefield.motion.clip import CrowdClip
+
+INSTANCING = ("references", "scenegraph", "flatten")
+"""Ways in which the characters of a crowd share data, for different readers.
+
+references: every character refers to one prototype; the only form of sharing that is animated both
+by Blender's default import and by pxr. scenegraph: the same, instanceable: fastest to draw and to
+open; Blender's default import shows it as one character frozen in its rest pose. flatten: all data
+are copied into one layer, for readers without composition.
+"""
+FILES, STREAMS = ("usd", "usda", "usdc", "usdz"), ("usda", "usdc", "usdz")
+"""Extensions of crowds on disk, and of those that are a single file and can be streamed."""
 
 # Bytes of a character that refers to the prototype, of one with its own skeleton and body, and of a
 # motion without its frames.

@@ -9,9 +9,9 @@ import numpy as np
 from posefield.common import atomic_files
 from posefield.common.units import Floats
 from posefield.encode import conventions
+from posefield.encode import table as tables
 from posefield.encode.conventions import Convention
-from posefield.encode.tables import table as tables
-from posefield.encode.tables.table import Column, Table, as_float32
+from posefield.encode.table import Column, Table, as_float32
 from posefield.motion import quat
 from posefield.motion.clip import Clip, CrowdClip, CrowdPoses
 from posefield.question.results import PoseAnswer, SampledClip

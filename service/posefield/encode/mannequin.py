@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Indices
-from posefield.encode.body import skinned_mesh
-from posefield.encode.body.skinned_mesh import FULL_WEIGHT, Bytes, Integers, SkinnedMesh
+from posefield.encode import skinned_mesh
+from posefield.encode.skinned_mesh import FULL_WEIGHT, Bytes, Integers, SkinnedMesh
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 from posefield.roles import joint_recognition
@@ -51,7 +51,7 @@ shorter bone, and at least, m."""
 @cache
 def stored_mesh() -> Mapping[str, npt.NDArray[Any]]:
     """Return the arrays of the stored skin."""
-    with files("posefield.encode.body").joinpath("mannequin.npz").open("rb") as file:
+    with files("posefield.encode").joinpath("mannequin.npz").open("rb") as file:
         return dict(np.load(file))
 
 

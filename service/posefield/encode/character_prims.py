@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Vt
 
-from posefield.encode import conventions
-from posefield.encode.body import skinned_mesh
-from posefield.encode.body.skinned_mesh import FULL_WEIGHT
-from posefield.encode.character import character
-from posefield.encode.character.character import CharacterArrays, CharacterRig
+from posefield.encode import character, conventions, layers, skinned_mesh
+from posefield.encode.character import CharacterArrays, CharacterRig
 from posefield.encode.conventions import METRES, Convention
-from posefield.encode.usd_layers import layers
-from posefield.encode.usd_layers.layers import WEIGHTS, ValueTypes
+from posefield.encode.layers import WEIGHTS, ValueTypes
+from posefield.encode.skinned_mesh import FULL_WEIGHT
 
 BINDING_SCHEMAS = ("SkelBindingAPI",)
 PRIMVAR_READER = "UsdPrimvarReader_float3"

@@ -1,1 +1,0 @@
-"""Results as tables: JSON, MessagePack, npz and Arrow."""

@@ -1,1 +1,0 @@
-"""USD clips: characters, animations, performances and libraries."""

@@ -1,1 +1,0 @@
-"""USD layers: metadata, prims, facts, and templates that are filled in."""
