@@ -88,7 +88,7 @@ def _errors(
     """Return the relative mean and the absolute root mean square of each held-out clip, m."""
     trained = train_examples(told, rest)
     asked = Queries(np.stack([one.controls for one in held]), [{}] * len(held))
-    made = predictions.predict_posefield(told, trained, asked)
+    made = predictions.predict_posefield(trained, asked)
     found = []
     for one, answer in zip(held, made, strict=True):
         captured = motion_errors.motion_of_clip(one.captured or one.clip, None)

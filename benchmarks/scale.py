@@ -127,7 +127,7 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
 
 
 def _answers(own: recipe.Recipe, trained: TrainedModel, points: Floats) -> list[ComparedMotion]:
-    return predictions.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
+    return predictions.predict_posefield(trained, Queries(points, [{}] * len(points)))
 
 
 def _distance(found: Sequence[ComparedMotion], points: Floats) -> float:

@@ -71,7 +71,7 @@ def predict(recipe: Recipe, trained: TrainedModel, queries: Queries) -> Predicti
     values, offsets = peer_values(samples, trained.values, points)
     naive = _naive(trained, samples, points, offsets if samples.labels else {})
     listed = {name: predictions.with_pose_vectors(trained, own) for name, own in values.items()}
-    return predictions.with_sigma(recipe, trained, queries, naive | listed)
+    return predictions.with_sigma(trained, queries, naive | listed)
 
 
 def check_lines(examples: list[Example], names: tuple[str, ...]) -> None:

@@ -45,8 +45,8 @@ def predict_unnamed(
     plain = recipe.model_copy(update={"kriging": kriging})
     untold = train_examples(plain, shown)
     return {
-        NO_PERFORMER: predictions.predict_posefield(plain, untold, unnamed),
-        ASKED_OPEN: predictions.predict_posefield(recipe, trained, unnamed),
+        NO_PERFORMER: predictions.predict_posefield(untold, unnamed),
+        ASKED_OPEN: predictions.predict_posefield(trained, unnamed),
     }
 
 
@@ -61,7 +61,7 @@ def predict_adapted(
         return {}
     if len(np.unique(sample_points.recording_numbers(held))) <= MIN_OTHER_TAKES:
         return {name: [None] * len(held) for name in ADAPTATION_COUNTS}
-    known = canonical_clips.adaptable(recipe, trained)
+    known = canonical_clips.adaptable(trained)
     return {
         name: _motions(recipe, trained, known, held, count)
         for name, count in ADAPTATION_COUNTS.items()
@@ -83,7 +83,7 @@ def _motions(
             own = adaptation.adapt(known, [held[i] for i in shown], example.row.performer)
             models[shown] = replace(trained, model=own.model)
         asked = Queries(example.controls[None], [example.row.labels])
-        found += predictions.predict_posefield(recipe, models[shown], asked)
+        found += predictions.predict_posefield(models[shown], asked)
     return found
 
 

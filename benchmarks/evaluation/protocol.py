@@ -109,7 +109,7 @@ def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str)
         )
     else:
         more = new_performers.predict_adapted(recipe, trained.trained, held)
-    events = [predictions.captured_event(recipe, trained.trained, e.landmarks) for e in held]
+    events = [predictions.captured_event(trained.trained, e.landmarks) for e in held]
     targets = [
         corrections.event_target(motion, event)
         for motion, event in zip(trained.captured, events, strict=True)
@@ -167,7 +167,7 @@ def run_against_truth(
 def _run_truth_batch(
     recipe: Recipe, trained: TrainedModel, file: bytes, points: Floats, start: int
 ) -> Part:
-    event = predictions.captured_event(recipe, trained, ())
+    event = predictions.captured_event(trained, ())
     captured = ground_truth.truth_motions(points, event)
     queries = Queries(points, [{}] * len(points))
     targets = [corrections.event_target(motion, event) for motion in captured] if event else []

@@ -34,7 +34,7 @@ def trained(recipe, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def known(recipe, trained):
-    return canonical_clips.adaptable(recipe, trained)
+    return canonical_clips.adaptable(trained)
 
 
 def examples(trained, who, controls):
@@ -61,7 +61,7 @@ def misses(recipe, trained, model, name, whose="cy"):
     """Mean distance of a model's answers from a performer's own clips that it was not shown, m."""
     asked = examples(trained, whose, ASKED)
     said = Queries(np.stack([e.controls for e in asked]), [{"performer": name}] * len(asked))
-    made = predictions.predict_posefield(recipe, replace(trained, model=model), said)
+    made = predictions.predict_posefield(replace(trained, model=model), said)
     pairs = zip(made, asked, strict=True)
     return np.mean(
         [
@@ -182,8 +182,8 @@ def walkers(strides):
 
 
 def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
-    recipe, trained, shown = walkers
-    model = adaptation.adapt(canonical_clips.adaptable(recipe, trained), shown, "new").model
+    _, trained, shown = walkers
+    model = adaptation.adapt(canonical_clips.adaptable(trained), shown, "new").model
     who = np.eye(3)[[model.bank.labels["performer"].index("new")]]
     for example in shown:
         seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]

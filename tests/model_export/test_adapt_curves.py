@@ -136,7 +136,7 @@ def test_curves_alone_need_a_rate_and_a_head_needs_a_column(
 def test_a_cycle_is_adapted_with_its_curves(models_trained):
     """A stride that begins elsewhere is shifted with its curves, and extends the model's."""
     trained = models_trained.trained("treading")
-    known = canonical_clips.adaptable(models_trained.treading_recipe(), trained)
+    known = canonical_clips.adaptable(trained)
     examples = [
         replace(example, row=replace(example.row, performer="cy"))
         for example in models_trained.examples("treading")[2:11:4]

@@ -58,8 +58,8 @@ def test_new_clips_are_turned_and_collapsed_as_the_family_was(family, tmp_path):
         assert other.facing == -90.0 and other.clip.skeleton.names == one.clip.skeleton.names
         assert np.abs(one.clip.positions() - other.clip.positions()).max() < 1e-5
         assert one.controls == pytest.approx(other.controls, abs=1e-3)
-    making = replace(reopened.making, facing=0.0)
+    making = replace(reopened.card.making, facing=0.0)
     plain, _ = new_clips.examples_of_files(
-        replace(reopened, making=making), paths, own.source, WOLF
+        replace(reopened, card=replace(reopened.card, making=making)), paths, own.source, WOLF
     )
     assert np.abs(plain[0].clip.positions() - wanted[0].clip.positions()).max() > 0.1

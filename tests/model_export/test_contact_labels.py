@@ -14,7 +14,7 @@ from posefield.inference.onnx_runtime import CONTACTS
 from posefield.motion import bvh_writer
 from posefield_train import training
 from posefield_train.contacts import contact_labels, contact_model
-from posefield_train.contacts.contact_model import FRAMES, SHARES, HeldOutClips
+from posefield_train.contacts.contact_model import FRAMES, SHARES
 from posefield_train.evaluate import protocol, summary
 from posefield_train.jobs import ProcessJobs
 from posefield_train.source import ingest
@@ -132,17 +132,17 @@ def test_adapting_adds_the_contacts_of_the_new_clips(posefield, walk_path, tmp_p
 
 @pytest.fixture(scope="module")
 def clips(strides):
-    return HeldOutClips(strides[3:], strides[:3])
+    return strides[3:], strides[:3]
 
 
 @pytest.fixture(scope="module")
 def labels(clips):
-    asked = contact_labels.settings(sample_walk.recipe(), clips.held_out[0].clip.skeleton.names)
-    return np.stack([contact_labels.clip_contacts(e, asked).at(SHARES) for e in clips.held_out])
+    asked = contact_labels.settings(sample_walk.recipe(), clips[1][0].clip.skeleton.names)
+    return np.stack([contact_labels.clip_contacts(e, asked).at(SHARES) for e in clips[1]])
 
 
 def accuracies(clips, predicted):
-    asked = sample_walk.recipe(), clips, (3, 6)
+    asked = sample_walk.recipe(), *clips, (3, 6)
     return contact_model.held_out_accuracies(*asked, lambda _: predicted)
 
 

@@ -114,7 +114,7 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
 
     def errors(examples):
         trained = train_examples(recipe, examples)
-        motions = predictions.predict(recipe, trained, queries).motions
+        motions = predictions.predict(trained, queries).motions
         return {
             name: motion_errors.compare_motions(made, captured, (joint,)).relative.mean
             for name, (made,) in motions.items()

@@ -71,7 +71,7 @@ def test_the_graph_and_the_service_read_the_same_blend(blended, small_recipe, ex
     core, times = blended.model.decoder.blended
     assert np.abs(held.core - core.transpose(1, 0, 2)).max() < 1e-6 * np.abs(core).max()
     assert np.abs(held.time - times).max() < 1e-6
-    again = model_reconstruction.reconstruct(made.content, "small.onnx").known.model
+    again = model_reconstruction.reconstruct(made.content, "small.onnx").adaptable.model
     controls = np.array([example.controls for example in blended.examples[:6]]) + 0.01
     labels = np.zeros((6, 0))
     expected, found = (model.fields(controls, labels, 0)[POSE] for model in (blended.model, again))

@@ -44,7 +44,7 @@ def farthest(one, other, parents):
 
 
 def test_a_reopened_model_answers_as_the_trained_one(labelled_exported, reopened):
-    trained, own = labelled_exported.model, reopened.known
+    trained, own = labelled_exported.model, reopened.adaptable
     parents = own.skeleton.parents
     assert farthest(trained, own.model, parents) < SAME
     question = asked(trained)
@@ -62,14 +62,14 @@ def test_a_reopened_model_answers_as_the_trained_one(labelled_exported, reopened
 
 def test_what_the_fields_were_laid_through_comes_back(labelled, reopened):
     """Dual weights alone do not tell: a wrong nugget answers alike everywhere but there."""
-    bank = reopened.known.model.bank
+    bank = reopened.adaptable.model.bank
     for name, field in bank.other_models.items():
         # Values of a quantity that the controls explain in part are shrunk to their mean.
         expected = labelled.model.bank.sample_values(name)
         scale = np.ptp(expected, axis=0).max()
         assert np.abs(bank.sample_values(name) - expected).max() < 1e-4 * scale
-        assert isinstance(field, ConstantModel) == (name not in reopened.making.fields)
-    fields = {n: (3.0 * v[0], *v[1:]) for n, v in reopened.making.fields.items()}
+        assert isinstance(field, ConstantModel) == (name not in reopened.card.making.fields)
+    fields = {n: (3.0 * v[0], *v[1:]) for n, v in reopened.card.making.fields.items()}
     wrong = wrong_nuggets(reopened, fields)
     known = labelled.model.bank
     gaps = [np.abs(wrong[name] - known.sample_values(name)).max() for name in fields]
@@ -78,7 +78,7 @@ def test_what_the_fields_were_laid_through_comes_back(labelled, reopened):
 
 def wrong_nuggets(reopened, fields):
     """Values at the samples that would come of other nuggets."""
-    bank = reopened.known.model.bank
+    bank = reopened.adaptable.model.bank
     found = {}
     for name in fields:
         field = bank.other_models[name]
@@ -88,7 +88,7 @@ def wrong_nuggets(reopened, fields):
 
 
 def test_what_is_known_is_what_training_knows(labelled_recipe, labelled, reopened):
-    expected, found = canonical_clips.adaptable(labelled_recipe, labelled), reopened.known
+    expected, found = canonical_clips.adaptable(labelled), reopened.adaptable
     assert np.array_equal(found.joint_weights, expected.joint_weights)
     assert np.array_equal(found.groups, expected.groups)
     assert found.truncation == pytest.approx(expected.truncation, rel=1e-3)

@@ -92,10 +92,10 @@ def extend(
     new = (coordinates @ longer @ longer.T).transpose(1, 2, 0)
     turned = hosvd.mode_dot(old, space.turn, 0)
     turned = np.pad(turned, ((0, len(new) - len(turned)), (0, 0), (0, 0)))
-    whole = _tensor(np.concatenate([turned, new], axis=2), space, directions, decoder, weight)
-    full = hosvd.decompose(whole.values)
+    tensor = _tensor(np.concatenate([turned, new], axis=2), space, directions, decoder, weight)
+    full = hosvd.decompose(tensor.values)
     samples = min(decoder.reduced.core.shape[2] + clips, full.core.shape[2])
-    return ExtendedTensor(whole, full, (len(new), longer.shape[1], samples))
+    return ExtendedTensor(tensor, full, (len(new), longer.shape[1], samples))
 
 
 def _reduced(decoder: Decoder) -> Floats:
@@ -112,9 +112,9 @@ def _pose_space(
     old: Floats,
 ) -> _PoseSpace:
     decoder, own_chart = model.decoder, model.decoder.chart
-    known = decoder.mean + old.transpose(2, 1, 0) @ decoder.directions
+    poses = decoder.mean + old.transpose(2, 1, 0) @ decoder.directions
     offsets = model.proportions.numpy(model.bank.sample_values("offsets"))
-    gram = motion_tensor.sampled_gram(known, own_chart, parents, offsets, joint_weights)
+    gram = motion_tensor.sampled_gram(poses, own_chart, parents, offsets, joint_weights)
     moves = np.ptp(numbers.reshape(-1, numbers.shape[-1]), axis=0) > CONSTANT_RANGE
     varies = moves | np.any(decoder.directions != 0.0, axis=0)
     root, inverse = motion_tensor.metric_roots(gram, decoder.curves, varies)
@@ -131,11 +131,11 @@ def _extra_directions(basis: Floats, rows: Floats, budget: float) -> Floats:
     flat = rows.reshape(-1, rows.shape[-1])
     left = flat - flat @ basis @ basis.T
     values, vectors = np.linalg.eigh(left.T @ left)
-    kept = np.count_nonzero(np.cumsum(np.maximum(values, 0.0)) > budget)
-    found = vectors[:, len(values) - kept :]
+    rank = np.count_nonzero(np.cumsum(np.maximum(values, 0.0)) > budget)
+    extra = vectors[:, len(values) - rank :]
     # Rounding leaves components along the old columns; remove them.
-    found, _ = np.linalg.qr(found - basis @ (basis.T @ found))
-    return np.hstack([basis, hosvd.fix_signs(found)])
+    extra, _ = np.linalg.qr(extra - basis @ (basis.T @ extra))
+    return np.hstack([basis, hosvd.fix_signs(extra)])
 
 
 def _tensor(
@@ -184,9 +184,9 @@ def extend_samples(
     new = np.stack([example.controls for example in examples])
     low, high = np.minimum(bank.low, new.min(axis=0)), np.maximum(bank.high, new.max(axis=0))
     added = [{**example.row.labels, PERFORMER: performer} for example in examples]
-    given = [*_labels(bank), *added]
-    names = {name: tuple(sorted({labels[name] for labels in given})) for name in bank.labels}
-    weights = sample_points.label_weights(given, names)
+    all_labels = [*_labels(bank), *added]
+    names = {name: tuple(sorted({labels[name] for labels in all_labels})) for name in bank.labels}
+    weights = sample_points.label_weights(all_labels, names)
     points = np.hstack([half_ranges(np.vstack([old, new]), low, high), weights])
     groups = np.concatenate(
         [old_groups, 1 + old_groups.max() + sample_points.recording_numbers(examples)]
@@ -202,15 +202,15 @@ def _labels(bank: KrigingBank) -> list[dict[str, str]]:
     columns = kriging_model.label_columns(len(bank.low), counts)
     return [
         {
-            name: names[int(np.argmax(point[own]))]
-            for (name, names), own in zip(bank.labels.items(), columns, strict=True)
+            name: names[int(np.argmax(point[indices]))]
+            for (name, names), indices in zip(bank.labels.items(), columns, strict=True)
         }
         for point in bank.pose.samples
     ]
 
 
 def solve_extended(
-    laid: ExtendedSamples, bank: KrigingBank, name: str, new: Floats
+    samples: ExtendedSamples, bank: KrigingBank, name: str, new: Floats
 ) -> CoefficientModel:
     """Return one of a bank's other models solved with its old values and new ones (k, m)."""
     field, old = bank.other_models[name], bank.sample_values(name)
@@ -218,24 +218,26 @@ def solve_extended(
         # The controls did not explain the old values, so the model stays constant.
         n, k = len(old), len(new)
         return ConstantModel((n * field.mean + new.sum(axis=0)) / (n + k))
-    hyper = laid.hyper(field.hyper)
-    return universal_kriging.solve(hyper, laid.samples.points, np.vstack([old, new]))
+    hyper = samples.hyper(field.hyper)
+    return universal_kriging.solve(hyper, samples.samples.points, np.vstack([old, new]))
 
 
 def solve_bones(
-    laid: ExtendedSamples, bank: KrigingBank, proportions: Proportions, offsets: Floats
+    samples: ExtendedSamples, bank: KrigingBank, proportions: Proportions, offsets: Floats
 ) -> tuple[CoefficientModel, Proportions]:
     """Return the model of bone offsets solved with new clips' (k, J, 3), m, and its directions."""
-    known = bank.sample_values("offsets")
-    old, new, longer = _extend_proportions(proportions, known, offsets)
+    coefficients = bank.sample_values("offsets")
+    old, new, longer = _extend_proportions(proportions, coefficients, offsets)
     both, field = np.vstack([old, new]), bank.other_models["offsets"]
     if not isinstance(field, ConstantModel):
-        return universal_kriging.solve(laid.hyper(field.hyper), laid.samples.points, both), longer
-    apart = longer.numpy(new) - longer.numpy(old[:1])
-    if np.abs(apart).max() <= SAME_BONE:
+        return universal_kriging.solve(
+            samples.hyper(field.hyper), samples.samples.points, both
+        ), longer
+    differences = longer.numpy(new) - longer.numpy(old[:1])
+    if np.abs(differences).max() <= SAME_BONE:
         return ConstantModel(old[0]), longer
     return universal_kriging.solve(
-        _performer_parameters(laid, bank), laid.samples.points, both
+        _performer_parameters(samples, bank), samples.samples.points, both
     ), longer
 
 
@@ -243,25 +245,25 @@ def solve_bones(
 SMALLEST_NUGGET, LARGEST_OFFSET = 1e-3, 30.0
 
 
-def _performer_parameters(laid: ExtendedSamples, bank: KrigingBank) -> Hyper:
+def _performer_parameters(samples: ExtendedSamples, bank: KrigingBank) -> Hyper:
     """Return parameters of a model that is nearly constant for each performer.
 
     The offset outweighs what remains of the stationary covariance.
     """
-    shared = laid.hyper(bank.pose.hyper).with_offsets(
+    shared = samples.hyper(bank.pose.hyper).with_offsets(
         *(LARGEST_OFFSET if name == PERFORMER else 0.0 for name in bank.labels)
     )
     return replace(shared, nugget=SMALLEST_NUGGET, trend=0.0)
 
 
 def _extend_proportions(
-    proportions: Proportions, known: Floats, offsets: Floats
+    proportions: Proportions, coefficients: Floats, offsets: Floats
 ) -> tuple[Floats, Floats, Proportions]:
     """Return coefficients of old (n, r) and new clips, with directions extended for the new."""
     flat = proportions.directions.reshape(len(proportions.directions), -1)
     centred = (offsets - proportions.mean).reshape(len(offsets), -1)
-    own = centred @ np.linalg.pinv(flat)
-    left, values, right = np.linalg.svd(centred - own @ flat, full_matrices=False)
+    projected = centred @ np.linalg.pinv(flat)
+    left, values, right = np.linalg.svd(centred - projected @ flat, full_matrices=False)
     rank = 0
     while rank < len(values) and _largest_residual(left, values, right, rank) > SAME_BONE:
         rank += 1
@@ -270,8 +272,8 @@ def _extend_proportions(
     directions[:, 0] = 0.0
     beyond = left[:, :rank] * values[:rank] * coefficient_models.row_signs(right[:rank])
     return (
-        np.pad(known, ((0, 0), (0, rank))),
-        np.hstack([own, beyond]),
+        np.pad(coefficients, ((0, 0), (0, rank))),
+        np.hstack([projected, beyond]),
         Proportions(proportions.mean, directions),
     )
 
@@ -308,45 +310,49 @@ class AdaptedModel:
     contacts: ExtendedContacts | None = None
 
 
-def adapt(known: AdaptableModel, examples: Sequence[Example], performer: str) -> AdaptedModel:
+def adapt(adaptable: AdaptableModel, examples: Sequence[Example], performer: str) -> AdaptedModel:
     """Return the model extended by a performer with an unused name and some examples."""
-    begun = canonical_clips.align_phase(known, examples)
-    return solve(known, canonical_clips.to_canonical(known, begun), performer)
+    shifted = canonical_clips.align_phase(adaptable, examples)
+    return solve(adaptable, canonical_clips.to_canonical(adaptable, shifted), performer)
 
 
 @single_threaded()
-def solve(known: AdaptableModel, moved: CanonicalClips, performer: str) -> AdaptedModel:
+def solve(adaptable: AdaptableModel, clips: CanonicalClips, performer: str) -> AdaptedModel:
     """Return the adapted model for examples that are already in the model's canonical time."""
-    model, law = known.model, known.model.bank.power_law
-    parents, weights = known.skeleton.parents, known.joint_weights
-    extended = extend(model, parents, weights, moved.numbers, known.truncation)
-    laid = extend_samples(model.bank, known.groups, moved.examples, performer)
+    model, law = adaptable.model, adaptable.model.bank.power_law
+    parents, weights = adaptable.skeleton.parents, adaptable.joint_weights
+    extended = extend(model, parents, weights, clips.numbers, adaptable.truncation)
+    samples = extend_samples(model.bank, adaptable.groups, clips.examples, performer)
     reduced = extended.full.truncated(extended.ranks)
     pose = universal_kriging.solve(
-        laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2]
+        samples.hyper(model.bank.pose.hyper), samples.samples.points, reduced.bases[2]
     )
-    bones, proportions = solve_bones(laid, model.bank, model.proportions, moved.offsets)
-    durations = np.log(moved.aligned.durations)[:, None]
+    bones, proportions = solve_bones(samples, model.bank, model.proportions, clips.offsets)
+    durations = np.log(clips.aligned.durations)[:, None]
     if law:
-        durations -= law.logarithms(np.stack([example.controls for example in moved.examples]))
-    new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
-    solved = {name: solve_extended(laid, model.bank, name, values) for name, values in new.items()}
+        durations -= law.logarithms(np.stack([example.controls for example in clips.examples]))
+    new = {**clips.travels, "duration": durations, "warp": clips.aligned.logs}
+    solved = {
+        name: solve_extended(samples, model.bank, name, values) for name, values in new.items()
+    }
     # Keep the model's order of quantities.
-    others = {name: solved.get(name, bones) for name in model.bank.other_models}
-    missed, sill = _left_out_errors(known, laid, moved, extended)
-    ends = laid.low, laid.high
-    event, blend = _event(laid, model, reduced)
-    contacts = _extend_contacts(known, moved, laid)
+    other_models = {name: solved.get(name, bones) for name in model.bank.other_models}
+    left_out_errors, sill = _left_out_errors(adaptable, samples, clips, extended)
+    ranges = samples.low, samples.high
+    event, blend = _event(samples, model, reduced)
+    contacts = _extend_contacts(adaptable, clips, samples)
     field, table = (contacts.kriging, contacts.table) if contacts else (None, None)
-    bank = KrigingBank(*ends, laid.labels, pose, others, sill, (), law, event, field)
-    own = extended.tensor
-    decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart, event=blend, curves=own.curves)
+    bank = KrigingBank(*ranges, samples.labels, pose, other_models, sill, (), law, event, field)
+    tensor = extended.tensor
+    decoder = Decoder(
+        reduced, tensor.mean, tensor.unwhiten, tensor.chart, event=blend, curves=tensor.curves
+    )
     adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel, table)
-    return AdaptedModel(adapted, moved, extended, missed, contacts)
+    return AdaptedModel(adapted, clips, extended, left_out_errors, contacts)
 
 
 def _event(
-    laid: ExtendedSamples, model: FloatModel, reduced: TuckerTensor
+    samples: ExtendedSamples, model: FloatModel, reduced: TuckerTensor
 ) -> tuple[UniversalKriging | None, EventBlend | None]:
     """Return the event's model and blend for the extended tensor, if the model has them."""
     old, blend = model.bank.event, model.decoder.event
@@ -354,70 +360,85 @@ def _event(
         return None, None
     count = min(blend.count, reduced.core.shape[2])
     values = reduced.bases[2][:, :count]
-    solved = universal_kriging.solve(laid.hyper(old.hyper), laid.samples.points, values)
+    solved = universal_kriging.solve(samples.hyper(old.hyper), samples.samples.points, values)
     first, second = reduced.core, reduced.bases[1]
     return solved, build_blend(count, blend.weights, first, second)
 
 
 def _left_out_errors(
-    known: AdaptableModel, laid: ExtendedSamples, moved: CanonicalClips, extended: ExtendedTensor
+    adaptable: AdaptableModel,
+    samples: ExtendedSamples,
+    clips: CanonicalClips,
+    extended: ExtendedTensor,
 ) -> tuple[Floats, float]:
     """Return leave-one-out errors of the new clips, and the sill updated with them.
 
     The errors are mean squared joint distances (k,), m², on canonical time; the sill is in m².
     """
-    old = known.model.bank
-    hyper, points, k = laid.hyper(old.pose.hyper), laid.samples.points, len(moved.examples)
-    left_out = universal_kriging.leave_out(hyper, points, laid.samples.groups)
+    old = adaptable.model.bank
+    hyper, points, k = samples.hyper(old.pose.hyper), samples.samples.points, len(clips.examples)
+    left_out = universal_kriging.leave_out(hyper, points, samples.samples.groups)
     variances = universal_kriging.left_out_variances(hyper, points, left_out)[-k:]
     residuals = left_out[-k:] @ extended.full.motions
     frames = extended.tensor.values.shape[1]
-    missed = np.sum(np.square(residuals), axis=1) / (extended.tensor.weight * frames)
-    for values in moved.travels.values():
-        missed += travels.mean_squared_distance(_travel_residuals(old, laid, values))
+    mean_squares = np.sum(np.square(residuals), axis=1) / (extended.tensor.weight * frames)
+    for values in clips.travels.values():
+        mean_squares += travels.mean_squared_distance(_travel_residuals(old, samples, values))
     n = len(points) - k
-    squares = np.sum(missed / variances) / known.canonical_excess
-    return missed, float((n * old.sill + squares) / (n + k))
+    ratio_sum = np.sum(mean_squares / variances) / adaptable.canonical_excess
+    return mean_squares, float((n * old.sill + ratio_sum) / (n + k))
 
 
-def _travel_residuals(old: KrigingBank, laid: ExtendedSamples, new: Floats) -> Floats:
+def _travel_residuals(old: KrigingBank, samples: ExtendedSamples, new: Floats) -> Floats:
     """Return leave-one-out residuals (k, 3) of the new clips' travel, m."""
-    field, both = old.other_models["travel"], np.vstack([old.sample_values("travel"), new])
+    field, values = old.other_models["travel"], np.vstack([old.sample_values("travel"), new])
     if isinstance(field, UniversalKriging):
-        hyper, groups = laid.hyper(field.hyper), laid.samples.groups
-        left_out = universal_kriging.leave_out(hyper, laid.samples.points, groups)
-        return left_out[-len(new) :] @ both
-    return laid.samples.from_mean(both)[-len(new) :]
+        hyper, groups = samples.hyper(field.hyper), samples.samples.groups
+        left_out = universal_kriging.leave_out(hyper, samples.samples.points, groups)
+        return left_out[-len(new) :] @ values
+    return samples.samples.from_mean(values)[-len(new) :]
 
 
 def _extend_contacts(
-    known: AdaptableModel, moved: CanonicalClips, laid: ExtendedSamples
+    adaptable: AdaptableModel, new_clips: CanonicalClips, samples: ExtendedSamples
 ) -> ExtendedContacts | None:
     """Return the contacts of a model's samples and of new clips; None without any.
 
     Joints whose contacts came from a table of clips are left out, for new clips have none.
     """
-    field, table, timing = known.model.bank.contacts, known.model.contacts, known.model.timing
-    kept = [place for place, own in enumerate(known.contacts) if own.joint in known.feet]
-    if field is None or table is None or not kept:
+    field, table, timing = (
+        adaptable.model.bank.contacts,
+        adaptable.model.contacts,
+        adaptable.model.timing,
+    )
+    columns = [
+        column
+        for column, contact in enumerate(adaptable.contacts)
+        if contact.joint in adaptable.feet
+    ]
+    if field is None or table is None or not columns:
         return None
-    statistics = tuple(known.contacts[place] for place in kept)
-    joints = tuple(own.joint for own in statistics)
-    asked = ContactSettings(joints, {}, known.model.travel is not None, known.in_place)
-    clips = [contact_labels.clip_contacts(example, asked) for example in moved.examples]
-    logs, frames = moved.aligned.logs, timing.frames
+    statistics = tuple(adaptable.contacts[column] for column in columns)
+    joints = tuple(contact.joint for contact in statistics)
+    settings = ContactSettings(joints, {}, adaptable.model.travel is not None, adaptable.in_place)
+    clips = [contact_labels.clip_contacts(example, settings) for example in new_clips.examples]
+    logs, frames = new_clips.aligned.logs, timing.frames
     new = contact_labels.canonical_labels(clips, logs, timing.basis, frames)
-    labels = np.concatenate([table.labels(field.values)[..., kept], new])
+    labels = np.concatenate([table.labels(field.values)[..., columns], new])
     longer, coefficients = contact_model.reduce_labels(labels)
-    hyper = laid.hyper(known.model.bank.pose.hyper)
-    solved = universal_kriging.solve(hyper, laid.samples.points, coefficients)
+    hyper = samples.hyper(adaptable.model.bank.pose.hyper)
+    solved = universal_kriging.solve(hyper, samples.samples.points, coefficients)
     return ExtendedContacts(longer, solved, statistics)
 
 
-def contact_notes(known: AdaptableModel, kept: ExtendedContacts | None) -> list[str]:
+def contact_notes(adaptable: AdaptableModel, contacts: ExtendedContacts | None) -> list[str]:
     """Return a note on joints whose contacts the adapted model lacks."""
-    there = kept.statistics if kept else ()
-    lost = [known.skeleton.names[own.joint] for own in known.contacts if own not in there]
+    there = contacts.statistics if contacts else ()
+    lost = [
+        adaptable.skeleton.names[contact.joint]
+        for contact in adaptable.contacts
+        if contact not in there
+    ]
     if not lost:
         return []
     return [

@@ -49,8 +49,8 @@ def check_name(card: ModelCard, performer: str) -> None:
             "performer", f"model {card.name} tells no performers apart, expected one that does"
         )
     if performer in card.performers:
-        known = ", ".join(card.performers)
-        raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
+        performers = ", ".join(card.performers)
+        raise InvalidField("performer", f"{performer!r} is known already, as are: {performers}")
     if not clip_table.is_label(performer):
         raise InvalidField("performer", f"{performer!r}, expected {clip_table.LABEL_FORM}")
 
@@ -60,14 +60,16 @@ def check_labels(card: ModelCard, labels: Mapping[str, str]) -> None:
 
     Names of further label sets have to be known: only the performer is new.
     """
-    known = {own.name: own.names for own in card.labels if own.name != PERFORMER}
+    names_by_set = {
+        label_set.name: label_set.names for label_set in card.labels if label_set.name != PERFORMER
+    }
     for name, label in labels.items():
-        if name not in known:
-            found = f"{name!r}{did_you_mean(name, known)}"
-            raise InvalidField("label", f"{found}, expected {_one_of(known)}")
-        if label not in known[name]:
-            found = f"{name}={label}{did_you_mean(label, known[name])}"
-            raise InvalidField("label", f"{found}, expected {_one_of(known[name])}")
+        if name not in names_by_set:
+            suggestion = f"{name!r}{did_you_mean(name, names_by_set)}"
+            raise InvalidField("label", f"{suggestion}, expected {_one_of(names_by_set)}")
+        if label not in names_by_set[name]:
+            suggestion = f"{name}={label}{did_you_mean(label, names_by_set[name])}"
+            raise InvalidField("label", f"{suggestion}, expected {_one_of(names_by_set[name])}")
 
 
 def _one_of(names: Collection[str]) -> str:
@@ -82,11 +84,11 @@ def export_adapted(reopened: ReconstructedModel, newcomer: NewPerformer) -> Expo
     """
     check_name(reopened.card, newcomer.performer)
     with single_threaded():
-        begun = canonical_clips.align_phase(reopened.known, newcomer.examples)
-        examples = new_clips.remeasure(reopened, newcomer.examples, begun)
-        moved = canonical_clips.to_canonical(reopened.known, examples)
-        canonical_clips.refuse_outliers(reopened.known, moved)
-        adapted = adaptation.solve(reopened.known, moved, newcomer.performer)
+        shifted = canonical_clips.align_phase(reopened.adaptable, newcomer.examples)
+        examples = new_clips.remeasure(reopened, newcomer.examples, shifted)
+        clips = canonical_clips.to_canonical(reopened.adaptable, examples)
+        canonical_clips.refuse_outliers(reopened.adaptable, clips)
+        adapted = adaptation.solve(reopened.adaptable, clips, newcomer.performer)
         model, model_levels = _build_levels(reopened, adapted)
         return onnx_export.check_and_export(
             model, lambda parity: _card(reopened, adapted, newcomer, model_levels, parity)
@@ -111,28 +113,28 @@ def _build_levels(
     return model, tuple(_add_parent_errors(level, finest) for level in built)
 
 
-def _add_parent_errors(found: Level, finest: Level) -> Level:
+def _add_parent_errors(level: Level, finest: Level) -> Level:
     """Add the errors of the parent's finest level in quadrature; the two are independent."""
 
     def both(name: str) -> float:
-        return rounded(np.hypot(getattr(found, name), getattr(finest, name)))
+        return rounded(np.hypot(getattr(level, name), getattr(finest, name)))
 
     return replace(
-        found,
+        level,
         rms=both("rms"),
         p99=both("p99"),
         max=both("max"),
         pose=both("pose"),
-        effector=None if found.effector is None else both("effector"),
+        effector=None if level.effector is None else both("effector"),
     )
 
 
 def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> LevelBuilder:
-    known, extended = reopened.known, adapted.extended
-    parents, moment = known.skeleton.parents, _event_frame(reopened.card)
+    adaptable, extended = reopened.adaptable, adapted.extended
+    parents, moment = adaptable.skeleton.parents, _event_frame(reopened.card)
     bank = thinning.sort_samples(adapted.model.bank)
     offsets = adapted.model.proportions.numpy(adapted.model.bank.sample_values("offsets"))
-    whole = truncation_error.positions(extended.tensor, extended.tensor.values, parents, offsets)
+    points = truncation_error.positions(extended.tensor, extended.tensor.values, parents, offsets)
     pose = adapted.model.bank.pose.samples
     labels = tuple(map(len, adapted.model.bank.labels.values()))
     samples = SamplePoints(pose, len(adapted.model.bank.low), np.arange(len(pose)), labels)
@@ -141,12 +143,12 @@ def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> Level
     def exam(questions: int) -> LevelTest:
         return levels.level_test_against(uncut, parents, moment, questions)
 
-    weights = np.append(known.joint_weights, np.ones(len(extended.tensor.curves)))
+    weights = np.append(adaptable.joint_weights, np.ones(len(extended.tensor.curves)))
     return LevelBuilder(
         extended.full,
         replace(adapted.model, bank=bank),
         {"rms": 1.0},
-        TruncationReference(extended.tensor, parents, offsets, weights, moment, whole),
+        TruncationReference(extended.tensor, parents, offsets, weights, moment, points),
         exam(TEST_INPUTS),
         exam(FINALS),
         thinning.thinning_data(bank),
@@ -172,29 +174,33 @@ def _card(
     accelerations stay those of the parent's clips.
     """
     old, bank, clips = reopened.card, adapted.model.bank, adapted.new_clips.examples
-    own = tuple(tuple(map(float, clip.controls)) for clip in clips)
+    new_controls = tuple(tuple(map(float, clip.controls)) for clip in clips)
     seconds = (*old.durations, *adapted.new_clips.aligned.durations.tolist())
     left_out = (*old.left_out, *map(rounded, np.sqrt(adapted.left_out_errors)))
     fields = bank.other_models.items()
-    made = {
+    fields_settings = {
         n: trained_card.kriging_settings(f.hyper)
         for n, f in fields
         if isinstance(f, UniversalKriging)
     }
     return replace(
         old,
-        controls=_controls(old.controls, np.array([*old.examples, *own])),
+        controls=_controls(old.controls, np.array([*old.examples, *new_controls])),
         samples=len(bank.pose.samples),
         levels=levels,
         durations=(min(seconds), max(seconds)),
-        examples=(*old.examples, *own),
+        examples=(*old.examples, *new_controls),
         labels=_labels(adapted),
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
         kriging=trained_card.plain_parameters(bank.pose.hyper),
         # The statistics of takes are in the parent's bases, which the new clips change.
         making=replace(
-            reopened.making, fields=made, takes=_recordings(old, clips), take_root=(), detail=b""
+            reopened.card.making,
+            fields=fields_settings,
+            takes=_recordings(old, clips),
+            take_root=(),
+            detail=b"",
         ),
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
@@ -204,8 +210,8 @@ def _card(
 
 def _labels(adapted: AdaptedModel) -> tuple[LabelSet, ...]:
     bank = adapted.model.bank
-    counts, every = tuple(map(len, bank.labels.values())), np.arange(len(bank.pose.samples))
-    samples = SamplePoints(bank.pose.samples, len(bank.low), every, counts)
+    counts, indices = tuple(map(len, bank.labels.values())), np.arange(len(bank.pose.samples))
+    samples = SamplePoints(bank.pose.samples, len(bank.low), indices, counts)
     return trained_card.card_labels(bank.labels, samples)
 
 
@@ -224,14 +230,14 @@ def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
     return tuple(
         replace(
             control,
-            minimum=float(own.min()),
-            maximum=float(own.max()),
+            minimum=float(column.min()),
+            maximum=float(column.max()),
             default=float(default),
-            values=tuple(np.unique(own).tolist())
-            if len(np.unique(own)) <= MAX_LISTED_VALUES
+            values=tuple(np.unique(column).tolist())
+            if len(np.unique(column)) <= MAX_LISTED_VALUES
             else (),
         )
-        for control, own, default in zip(old, values.T, typical, strict=True)
+        for control, column, default in zip(old, values.T, typical, strict=True)
     )
 
 
@@ -252,8 +258,8 @@ def _diagnostics(
         old.pop("contacts", None)
     freedoms, frames, samples = old["tensor"]
     shape = freedoms, frames, samples + len(newcomer.examples)
-    kept = model.decoder.reduced.core.shape
-    compression = asdict(truncation_cost.shape_compression(shape, kept, len(model.bank.low)))
+    ranks = model.decoder.reduced.core.shape
+    compression = asdict(truncation_cost.shape_compression(shape, ranks, len(model.bank.low)))
     # The statistics of takes are not carried over.
     kept_facts = {name: fact for name, fact in old.items() if name != "detail"}
     return {
@@ -270,16 +276,16 @@ def _diagnostics(
 def _notes(
     reopened: ReconstructedModel, adapted: AdaptedModel, newcomer: NewPerformer
 ) -> list[str]:
-    moved, names = adapted.new_clips, reopened.card.skeleton.names
-    listed = ", ".join(example.row.source for example in moved.examples)
+    clips, names = adapted.new_clips, reopened.card.skeleton.names
+    listed = ", ".join(example.row.source for example in clips.examples)
     parent = f"{reopened.card.name}@{reopened.digest[:16]}"
-    said = f"adapted from {parent} to {newcomer.performer!r} by {len(moved.examples)} clips"
-    adapting = f"{said}: {listed}"
+    summary = f"adapted from {parent} to {newcomer.performer!r} by {len(clips.examples)} clips"
+    adapting = f"{summary}: {listed}"
     return [
         adapting,
         *newcomer.notes,
-        *trained_card.finding_notes(moved.findings, moved.examples, names),
-        *adaptation.contact_notes(reopened.known, adapted.contacts),
+        *trained_card.finding_notes(clips.findings, clips.examples, names),
+        *adaptation.contact_notes(reopened.adaptable, adapted.contacts),
     ]
 
 

@@ -23,7 +23,6 @@ from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.source import canonical, clip_joints
 from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
-from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 
 # A clip farther from the prediction than this many times sigma of an unseen performer is taken for
@@ -73,11 +72,11 @@ class AdaptableModel:
         return CanonicalTime(timing.frames, timing.basis, self.landmarks, self.joint_weights)
 
 
-def adaptable(recipe: Recipe, trained: TrainedModel) -> AdaptableModel:
+def adaptable(trained: TrainedModel) -> AdaptableModel:
     """Return the data that adaptation needs of a model that has just been trained."""
-    own, marks = trained.model, [example.landmarks for example in trained.examples]
+    recipe, marks = trained.recipe, [example.landmarks for example in trained.examples]
     return AdaptableModel(
-        own,
+        trained.model,
         trained.skeleton,
         np.array(marks).reshape(len(marks), -1).mean(axis=0),
         truncation_error.joint_weights(recipe, trained.examples),
@@ -149,13 +148,13 @@ def _references(adaptable: AdaptableModel, examples: Sequence[Example]) -> Float
 def _predicted_trace(adaptable: AdaptableModel, example: Example) -> Floats:
     """Return the trace (FINE, features) of the model's prediction with the example's bones."""
     model = adaptable.model
-    place = np.linspace(0.0, model.timing.frames - 1.0, FINE)[None]
+    frames = np.linspace(0.0, model.timing.frames - 1.0, FINE)[None]
     labels = sample_points.label_weights([example.row.labels], model.bank.labels)
-    answer = model.outputs_at_frames(example.controls[None], place, labels, 0)
+    answer = model.outputs_at_frames(example.controls[None], frames, labels, 0)
     motion = answer.rotations[0], answer.root_position[0], example.offsets
     clip = assemble(adaptable.skeleton, *motion, (FINE - 1) / example.clip.duration)
-    own = model.decoder.curves
-    values = None if answer.curves is None else CurveValues(own, answer.curves[0])
+    curves = model.decoder.curves
+    values = None if answer.curves is None else CurveValues(curves, answer.curves[0])
     return time_alignment.trace(replace(clip, curves=values), np.sqrt(adaptable.joint_weights))
 
 
@@ -164,7 +163,7 @@ def _distances(
 ) -> Floats:
     """Return RMS distances (k,), m, of clips from their references (k, FINE, features)."""
     times, weights = np.linspace(0.0, 1.0, FINE), adaptable.joint_weights
-    found = []
+    distances = []
     for example, log, reference in zip(examples, logs, references, strict=True):
         trace = time_alignment.trace(example.clip, np.sqrt(weights))
         warped = time_alignment.interpolate(
@@ -172,19 +171,19 @@ def _distances(
         )
         weight = weights.sum() + len(adaptable.model.decoder.curves)
         squares = np.sum(np.square(warped - reference), axis=1) / weight
-        found.append(np.sqrt(squares.mean()))
-    return np.array(found)
+        distances.append(np.sqrt(squares.mean()))
+    return np.array(distances)
 
 
-def refuse_outliers(adaptable: AdaptableModel, moved: CanonicalClips) -> None:
+def refuse_outliers(adaptable: AdaptableModel, clips: CanonicalClips) -> None:
     """Raise TrainingError for the first clip that does not fit the family.
 
     Checked are the size of the bones, and the distance from the prediction, at most OUTLIER_SIGMAS
     times sigma on canonical time.
     """
-    _refuse_other_sizes(adaptable.model, moved.examples)
+    _refuse_other_sizes(adaptable.model, clips.examples)
     for example, distance, sigma in zip(
-        moved.examples, moved.distances, _sigmas(adaptable, moved.examples), strict=True
+        clips.examples, clips.distances, _sigmas(adaptable, clips.examples), strict=True
     ):
         if distance > OUTLIER_SIGMAS * sigma:
             raise TrainingError(
@@ -201,13 +200,13 @@ def _refuse_other_sizes(model: FloatModel, examples: Sequence[Example]) -> None:
 
     Controls measured from the motion can hide a wrong unit.
     """
-    own = model.proportions.numpy(model.bank.sample_values("offsets"))
-    usual = np.median(np.linalg.norm(own, axis=-1).sum(axis=-1))
-    if usual == 0.0:
+    offsets = model.proportions.numpy(model.bank.sample_values("offsets"))
+    median = np.median(np.linalg.norm(offsets, axis=-1).sum(axis=-1))
+    if median == 0.0:
         # A single joint has no bones, such as that of curves without a skeleton.
         return
     for example in examples:
-        size = np.linalg.norm(example.offsets, axis=-1).sum() / usual
+        size = np.linalg.norm(example.offsets, axis=-1).sum() / median
         if not 1.0 / clip_joints.SIZE_LIMIT <= size <= clip_joints.SIZE_LIMIT:
             raise TrainingError(
                 f"{example.row.named}: its bones are {size:.2g} times as long as is usual here, "
@@ -220,7 +219,7 @@ def _sigmas(adaptable: AdaptableModel, examples: Sequence[Example]) -> Floats:
 
     Controls are clipped to the sampled range because sigma grows without bound outside it.
     """
-    bank, asked = adaptable.model.bank, np.stack([example.controls for example in examples])
+    bank, controls = adaptable.model.bank, np.stack([example.controls for example in examples])
     labels = sample_points.label_weights([e.row.labels for e in examples], bank.labels)
-    points = bank.points(np.clip(asked, bank.low, bank.high), labels)
+    points = bank.points(np.clip(controls, bank.low, bank.high), labels)
     return np.sqrt(adaptable.canonical_excess) * bank.sigma(bank.numpy(points)[VARIANCE])

@@ -17,7 +17,7 @@ from posefield.common.units import Floats, Indices
 from posefield.inference import reduced_motion
 from posefield.kriging import kriging_model
 from posefield.model_file import checked_file, onnx_file
-from posefield.model_file.model_card import ModelCard, TrainingParameters
+from posefield.model_file.model_card import ModelCard
 from posefield_train.adapt.canonical_clips import AdaptableModel
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
@@ -51,9 +51,8 @@ SAMPLE_TOLERANCE = 1e-5
 class ReconstructedModel:
     """A reconstructed model. digest: SHA-256 of the file's content."""
 
-    known: AdaptableModel
+    adaptable: AdaptableModel
     card: ModelCard
-    making: TrainingParameters
     digest: str
 
 
@@ -63,7 +62,6 @@ class _ModelFile:
 
     numbers: Mapping[str, Floats]
     card: ModelCard
-    making: TrainingParameters
     source: str
 
     def __getitem__(self, name: str) -> Floats:
@@ -85,12 +83,10 @@ def reconstruct(content: bytes, source: str) -> ReconstructedModel:
 
     source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
     """
-    own_card = checked_file.load_card(content, source)
+    card = checked_file.load_card(content, source)
     numbers = {name: _as_float64(array) for name, array in onnx_file.initializers(content).items()}
-    file = _ModelFile(numbers, own_card, own_card.making, source)
-    return ReconstructedModel(
-        _adaptable(file), own_card, own_card.making, checked_file.sha256(content)
-    )
+    file = _ModelFile(numbers, card, source)
+    return ReconstructedModel(_adaptable(file), card, checked_file.sha256(content))
 
 
 def _as_float64(array: Any) -> Floats:
@@ -98,14 +94,14 @@ def _as_float64(array: Any) -> Floats:
 
 
 def _adaptable(file: _ModelFile) -> AdaptableModel:
-    card, making = file.card, file.making
+    card, making = file.card, file.card.making
     bank = _bank(file)
     model = FloatModel(
         bank,
-        _timing(file),
+        CanonicalTiming(WarpBasis(len(file["warp_still"])), card.frames),
         _decoder(file, bank),
         _proportions(file),
-        _travel(card),
+        Travel(card.frames, len(card.skeleton)) if card.cyclic else None,
         ContactTable(file["contact_table"]) if card.contacts else None,
     )
     names = card.skeleton.names
@@ -124,14 +120,6 @@ def _adaptable(file: _ModelFile) -> AdaptableModel:
     )
 
 
-def _travel(card: ModelCard) -> Travel | None:
-    return Travel(card.frames, len(card.skeleton)) if card.cyclic else None
-
-
-def _timing(file: _ModelFile) -> CanonicalTiming:
-    return CanonicalTiming(WarpBasis(len(file["warp_still"])), file.card.frames)
-
-
 def _proportions(file: _ModelFile) -> Proportions:
     directions = file["offset_directions"]
     mean = file["offset_mean"].reshape(-1, 3)
@@ -145,19 +133,19 @@ def _bank(file: _ModelFile) -> KrigingBank:
     points = kriging_model.half_ranges(np.array(card.examples), low, high)
     points = np.hstack([points, card.clip_labels])
     order = _order(file, points)
-    others = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}
+    other_models = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}
     pose = _solve_kriging(file, POSE, (card.kriging, points, order))
     sill, law, event = file["sill"].item(), _power_law(file), _event_model(file, pose)
-    names = {own.name: own.names for own in card.labels}
+    names = {label_set.name: label_set.names for label_set in card.labels}
     contacts = _contacts(file, (card.kriging, points, order)) if card.contacts else None
-    return KrigingBank(low, high, names, pose, others, sill, (), law, event, contacts)
+    return KrigingBank(low, high, names, pose, other_models, sill, (), law, event, contacts)
 
 
-def _contacts(file: _ModelFile, laid: tuple[Hyper, Floats, Indices]) -> UniversalKriging:
+def _contacts(file: _ModelFile, samples: tuple[Hyper, Floats, Indices]) -> UniversalKriging:
     """Return the model of the contacts' coefficients, which has the parameters of the pose."""
     weights = file["contact_weights"]
     linear = len(weights) - file.card.samples
-    return _solve_recovered(laid, weights[:linear], weights[linear:])
+    return _solve_recovered(samples, weights[:linear], weights[linear:])
 
 
 def _event_model(file: _ModelFile, pose: UniversalKriging) -> UniversalKriging | None:
@@ -170,9 +158,9 @@ def _event_model(file: _ModelFile, pose: UniversalKriging) -> UniversalKriging |
 
 def _hyper(file: _ModelFile, name: str) -> Hyper:
     """Return the parameters of a quantity: the pose's, but for its own of the card."""
-    if name not in file.making.fields:
+    if name not in file.card.making.fields:
         raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
-    nugget, trend, *offsets = file.making.fields[name]
+    nugget, trend, *offsets = file.card.making.fields[name]
     return replace(file.card.kriging.with_offsets(*offsets), nugget=nugget, trend=trend)
 
 
@@ -186,11 +174,9 @@ def _power_law(file: _ModelFile) -> PowerLaw | None:
 
 def _order(file: _ModelFile, points: Floats) -> Indices:
     """Return the index (n,) on the card of each sample of the graph."""
-    order, held = (
-        reduced_motion.importance_order(file.card, file.numbers, points),
-        file["samples"].T,
-    )
-    if np.abs(points[order, : len(file.card.controls)] - held).max() > SAMPLE_TOLERANCE:
+    order = reduced_motion.importance_order(file.card, file.numbers, points)
+    stored = file["samples"].T
+    if np.abs(points[order, : len(file.card.controls)] - stored).max() > SAMPLE_TOLERANCE:
         raise ModelError(file.source, "its card lists other samples than its graph holds")
     return order
 
@@ -222,23 +208,23 @@ def _coefficient_model(
 
 
 def _solve_kriging(
-    file: _ModelFile, name: str, laid: tuple[Hyper, Floats, Indices]
+    file: _ModelFile, name: str, samples: tuple[Hyper, Floats, Indices]
 ) -> UniversalKriging:
     """Return one kriging model, solved for the sample values recovered from its dual weights."""
     columns = _columns(file, name)
     stored = file[f"{name}_weights"][:, : columns.stop - columns.start]
-    return _solve_recovered(laid, file["linear_weights"][:, columns], stored)
+    return _solve_recovered(samples, file["linear_weights"][:, columns], stored)
 
 
 def _solve_recovered(
-    laid: tuple[Hyper, Floats, Indices], straight: Floats, stored: Floats
+    samples: tuple[Hyper, Floats, Indices], straight: Floats, stored: Floats
 ) -> UniversalKriging:
     """Return the kriging model of the values with these weights.
 
     straight: weights (p + 1 + d, m) of labels, one and controls. stored: weights (n, m) of the
     covariances, in the order of the graph.
     """
-    hyper, points, order = laid
+    hyper, points, order = samples
     near = np.empty_like(stored)
     near[order] = stored
     covariances = kriging_model.stationary_covariances(hyper, points, points)
@@ -251,12 +237,14 @@ def _solve_recovered(
 def _decoder(file: _ModelFile, bank: KrigingBank) -> Decoder:
     """Return a decoder with the core's coordinates for the first mode."""
     finest = file.card.levels[0]
-    held = reduced_motion.read(file.numbers, replace(finest, event=0), file.card)
-    core = held.core.transpose(1, 0, 2)
-    bases = np.eye(len(core)), held.time, bank.pose.values
-    blend = _event_blend(file.card, core, held.time) if finest.event else None
-    tensor, chart = TuckerTensor(core, bases), PoseChart(held.rotations, held.chart)
-    return Decoder(tensor, held.mean, held.directions.T, chart, event=blend, curves=held.curves)
+    stored = reduced_motion.read(file.numbers, replace(finest, event=0), file.card)
+    core = stored.core.transpose(1, 0, 2)
+    bases = np.eye(len(core)), stored.time, bank.pose.values
+    blend = _event_blend(file.card, core, stored.time) if finest.event else None
+    tensor, chart = TuckerTensor(core, bases), PoseChart(stored.rotations, stored.chart)
+    return Decoder(
+        tensor, stored.mean, stored.directions.T, chart, event=blend, curves=stored.curves
+    )
 
 
 def _event_blend(card: ModelCard, core: Floats, basis: Floats) -> EventBlend | None:

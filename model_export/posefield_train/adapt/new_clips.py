@@ -96,12 +96,12 @@ def examples_of_table(
     and a skeleton. Raises RecipeError, naming line and column, for an invalid cell, and as
     `examples_of_files`.
     """
-    own = clip_table.open_table(path)
+    table = clip_table.open_table(path)
     landmarks, controls = _landmark_columns(reopened), reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     sets = _open_sets(reopened, labels)
     curves = [COLUMN] * have_files(reopened.card)
-    own.require(
+    table.require(
         {
             "file": "the motion file",
             **dict.fromkeys(landmarks, "a landmark"),
@@ -110,90 +110,105 @@ def examples_of_table(
             **dict.fromkeys(curves, "the file of the clip's curves"),
         }
     )
-    known = (*landmarks, *(control.name for control in controls), *sets, *curves)
-    own.expect_only({"file", "first_frame", "last_frame", *known})
-    rows, given = [], []
-    for line, record in own.records:
-        told = {**labels, **{name: _label(reopened, own, line, record, name) for name in sets}}
-        row = _table_row(own, line, record, told, tuple(landmarks))
-        places = [_place(own, line, record, column) for column in curves]
-        rows.append(replace(row, curve_place=places[0]) if places else row)
+    columns = (*landmarks, *(control.name for control in controls), *sets, *curves)
+    table.expect_only({"file", "first_frame", "last_frame", *columns})
+    rows, controls_by_row = [], []
+    for line, record in table.records:
+        row_labels = {
+            **labels,
+            **{name: _label(reopened, table, line, record, name) for name in sets},
+        }
+        row = _table_row(table, line, record, row_labels, tuple(landmarks))
+        curve_files = [_place(table, line, record, column) for column in curves]
+        rows.append(replace(row, curve_place=curve_files[0]) if curve_files else row)
         names = [control.name for control in controls if control.name in record]
-        given.append({name: own.number(line, record, name) for name in names})
+        controls_by_row.append({name: table.number(line, record, name) for name in names})
     clip_table.refuse_repeats(rows)
-    return _examples(reopened, rows, NewFiles(source, rate), given)
+    return _examples(reopened, rows, NewFiles(source, rate), controls_by_row)
 
 
 def _open_sets(reopened: ReconstructedModel, labels: Mapping[str, str]) -> list[str]:
     """Return the label sets of a model that labels do not name."""
-    return [own.name for own in reopened.card.labels if own.name not in labels]
+    return [label_set.name for label_set in reopened.card.labels if label_set.name not in labels]
 
 
 def _label(
-    reopened: ReconstructedModel, own: ClipTable, line: int, record: dict[str, str], name: str
+    reopened: ReconstructedModel, table: ClipTable, line: int, record: dict[str, str], name: str
 ) -> str:
     """Return the name of a row in a label set; RecipeError for one that the model lacks."""
-    known = next(one.names for one in reopened.card.labels if one.name == name)
-    if record[name] not in known:
-        found = f"{record[name]!r}{did_you_mean(record[name], known)}"
-        expected = f"expected one of {', '.join(known)}"
-        raise RecipeError(own.name, f"column {name!r}: {found}, {expected}", line)
+    names = next(one.names for one in reopened.card.labels if one.name == name)
+    if record[name] not in names:
+        suggestion = f"{record[name]!r}{did_you_mean(record[name], names)}"
+        expected = f"expected one of {', '.join(names)}"
+        raise RecipeError(table.name, f"column {name!r}: {suggestion}, {expected}", line)
     return record[name]
 
 
 def _row(reopened: ReconstructedModel, path: Path, labels: Mapping[str, str]) -> ClipRow:
-    who, others = _split(labels)
-    beside = place_beside(reopened.card, path)
-    own = ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), other_labels=others)
-    return replace(own, curve_place=beside)
+    performer, other_labels = _split(labels)
+    curve_file = place_beside(reopened.card, path)
+    row = ClipRow(
+        path, str(path), None, performer, 0, None, np.zeros(0), (), other_labels=other_labels
+    )
+    return replace(row, curve_place=curve_file)
 
 
 def _split(labels: Labels) -> tuple[str, dict[str, str]]:
     """Return the performer and the names in further label sets."""
-    others = {name: label for name, label in labels.items() if name != PERFORMER}
-    return labels[PERFORMER], others
+    other_labels = {name: label for name, label in labels.items() if name != PERFORMER}
+    return labels[PERFORMER], other_labels
 
 
 def _table_row(
-    own: ClipTable,
+    table: ClipTable,
     line: int,
     record: dict[str, str],
     labels: Mapping[str, str],
     landmarks: tuple[str, ...],
 ) -> ClipRow:
-    first = own.frame(line, record, "first_frame") if "first_frame" in record else 0
-    last = own.frame(line, record, "last_frame") if "last_frame" in record else None
+    first = table.frame(line, record, "first_frame") if "first_frame" in record else 0
+    last = table.frame(line, record, "last_frame") if "last_frame" in record else None
     if last is not None and last <= first:
-        raise RecipeError(own.name, f"frames {first} to {last}, expected at least two", line)
-    place = _place(own, line, record, "file")
-    marks = tuple(own.frame(line, record, column) for column in landmarks)
-    who, others = _split(labels)
-    return ClipRow(place, own.name, line, who, first, last, np.zeros(0), marks, other_labels=others)
+        raise RecipeError(table.name, f"frames {first} to {last}, expected at least two", line)
+    location = _place(table, line, record, "file")
+    marks = tuple(table.frame(line, record, column) for column in landmarks)
+    performer, other_labels = _split(labels)
+    return ClipRow(
+        location,
+        table.name,
+        line,
+        performer,
+        first,
+        last,
+        np.zeros(0),
+        marks,
+        other_labels=other_labels,
+    )
 
 
-def _place(own: ClipTable, line: int, record: dict[str, str], column: str) -> FileLocation:
+def _place(table: ClipTable, line: int, record: dict[str, str], column: str) -> FileLocation:
     """Return the file that a cell names, relative to its table."""
     try:
-        return data_folder.find(Path(own.name).parent, record[column])
+        return data_folder.find(Path(table.name).parent, record[column])
     except RecipeError as fault:
-        raise RecipeError(own.name, f"column {column!r}: {fault.message}", line) from fault
+        raise RecipeError(table.name, f"column {column!r}: {fault.message}", line) from fault
 
 
 def _examples(
     reopened: ReconstructedModel,
     rows: Sequence[ClipRow],
     conventions: NewFiles,
-    given: Sequence[Mapping[str, float]],
+    controls_by_row: Sequence[Mapping[str, float]],
 ) -> tuple[list[Example], list[str]]:
     alone = are_alone(reopened.card)
     files = {} if alone else ingest.read_files(rows, conventions.source)
     examples, notes, stretches = [], list[str](), []
-    for row, values in zip(rows, given, strict=True):
-        whole, left_out = whole_clip(reopened.card, row, files, conventions)
-        example, said, stretch = _example(reopened, row, whole)
+    for row, values in zip(rows, controls_by_row, strict=True):
+        clip, left_out = whole_clip(reopened.card, row, files, conventions)
+        example, row_notes, stretch = _example(reopened, row, clip)
         controls = _controls(reopened, example, values)
         examples.append(replace(example, controls=controls))
-        notes += [note for note in (*left_out, *said) if note not in notes]
+        notes += [note for note in (*left_out, *row_notes) if note not in notes]
         stretches.append(stretch)
     if conventions.source.root_offset is None:
         notes += ingest.offset_notes(files)
@@ -202,35 +217,35 @@ def _examples(
 
 
 def _example(
-    reopened: ReconstructedModel, row: ClipRow, whole: Clip
+    reopened: ReconstructedModel, row: ClipRow, uncut: Clip
 ) -> tuple[Example, list[str], float]:
     """Return the example of a row, notes on it, and the stretch of its bones, m.
 
     whole: all frames of its file.
     """
-    own = reopened.card
-    cut, last = ingest.cut_frames(whole, row)
-    clip, notes = _reduce_to_skeleton(_without_dummies(cut, own.skeleton), own.skeleton, row)
-    ahead = reopened.making.facing
-    clip = facing.turn_basis(clip, ahead or 0.0)
+    card = reopened.card
+    cut, last = ingest.cut_frames(uncut, row)
+    clip, notes = _reduce_to_skeleton(_without_dummies(cut, card.skeleton), card.skeleton, row)
+    facing_angle = reopened.card.making.facing
+    clip = facing.turn_basis(clip, facing_angle or 0.0)
     clip, jumps, stretch = canonical.canonicalize(
-        clip, own.cyclic, own.root == "in_place", ahead is not None
+        clip, card.cyclic, card.root == "in_place", facing_angle is not None
     )
     marks = (
         *measured_controls.landmarks(row, last, _landmark_columns(reopened)),
         *_found_landmarks(reopened, row, clip),
     )
-    nothing = np.full(len(own.controls), np.nan)
-    return Example(row, clip, nothing, marks, jumps, facing=ahead), notes, stretch
+    nothing = np.full(len(card.controls), np.nan)
+    return Example(row, clip, nothing, marks, jumps, facing=facing_angle), notes, stretch
 
 
 def _without_dummies(clip: Clip, family: Skeleton) -> Clip:
     """Return the clip without the dummy roots that the family's files had above its root."""
-    own = clip.skeleton
-    above = own.names.index(family.names[0]) if family.names[0] in own.names else 0
+    figure = clip.skeleton
+    above = figure.names.index(family.names[0]) if family.names[0] in figure.names else 0
     chain = list(range(-1, above))
-    is_chain = list(own.parents[: above + 1]) == chain
-    alone = all(own.parents.count(joint) == 1 for joint in range(above))
+    is_chain = list(figure.parents[: above + 1]) == chain
+    alone = all(figure.parents.count(joint) == 1 for joint in range(above))
     return skeleton_checks.collapse_roots(clip, above) if is_chain and alone else clip
 
 
@@ -240,8 +255,8 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
     Raises RecipeError if joints are missing or have other parents.
     """
     clip = clip_joints.with_end_joints(clip, family.names)
-    own = clip.skeleton
-    missing = [name for name in family.names if name not in own.names]
+    figure = clip.skeleton
+    missing = [name for name in family.names if name not in figure.names]
     if missing:
         raise row.error(
             f"{row.place} has no joints {missing}, which the model has: expected a clip of the "
@@ -253,9 +268,9 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
             f"{row.place} has the model's joints with other parents: expected a clip of the same "
             "skeleton"
         )
-    others = [name for name in own.names if name not in family.names]
-    said = f"{row.place}: joints {others}, which the model does not have, were left out"
-    return smaller, [said] if others else []
+    surplus = [name for name in figure.names if name not in family.names]
+    note = f"{row.place}: joints {surplus}, which the model does not have, were left out"
+    return smaller, [note] if surplus else []
 
 
 def remeasure(
@@ -265,40 +280,46 @@ def remeasure(
 
     The travel of a cycle on an arc depends on the phase at which it begins.
     """
-    found = []
+    examples = []
     for old, new in zip(before, after, strict=True):
-        said = zip(reopened.card.controls, old.controls, _controls(reopened, old, {}), strict=True)
-        given = {control.name: float(own) for control, own, again in said if own != again}
-        found.append(replace(new, controls=_controls(reopened, new, given)))
-    return found
+        controls = zip(
+            reopened.card.controls, old.controls, _controls(reopened, old, {}), strict=True
+        )
+        stated = {
+            control.name: float(value) for control, value, measured in controls if value != measured
+        }
+        examples.append(replace(new, controls=_controls(reopened, new, stated)))
+    return examples
 
 
-def _controls(reopened: ReconstructedModel, example: Example, given: Mapping[str, float]) -> Floats:
+def _controls(
+    reopened: ReconstructedModel, example: Example, stated: Mapping[str, float]
+) -> Floats:
     """Return the controls (d,) of an example: given, measured, or else unchanged."""
-    seen = measured_controls.measured_quantities(example.clip)
+    quantities = measured_controls.measured_quantities(example.clip)
 
-    def value(control: Control, own: float) -> float:
-        if control.name in given:
-            return given[control.name]
+    def value(control: Control, default: float) -> float:
+        if control.name in stated:
+            return stated[control.name]
         if control.measure is None:
-            return own
+            return default
         at = _landmark(reopened, control, example) * (len(example.clip) - 1)
-        found = measures.evaluate(control.measure, replace(seen, landmark=at))
-        return round(found, measured_controls.DECIMALS) + 0.0
+        measured = measures.evaluate(control.measure, replace(quantities, landmark=at))
+        return round(measured, measured_controls.DECIMALS) + 0.0
 
     pairs = zip(reopened.card.controls, example.controls.tolist(), strict=True)
-    return np.array([value(control, own) for control, own in pairs])
+    return np.array([value(control, default) for control, default in pairs])
 
 
 def _landmark_columns(reopened: ReconstructedModel) -> list[str]:
     """Return the columns of the landmarks, in their order in time."""
-    times = reopened.making.landmarks
+    times = reopened.card.making.landmarks
     return sorted((name for name in times if name not in TIME_NAMES), key=lambda name: times[name])
 
 
 def _found_names(reopened: ReconstructedModel) -> list[str]:
     """Return the moments of the event that are found in each clip: one or none."""
-    return [name for name in reopened.making.landmarks if name in TIME_NAMES]
+    return [name for name in reopened.card.making.landmarks if name in TIME_NAMES]
 
 
 def _found_landmarks(reopened: ReconstructedModel, row: ClipRow, clip: Clip) -> list[float]:
@@ -306,12 +327,12 @@ def _found_landmarks(reopened: ReconstructedModel, row: ClipRow, clip: Clip) -> 
     event = reopened.card.event
     if event is None:
         return []
-    found = []
+    landmarks = []
     for at in _found_names(reopened):
         share = measured_controls.moment_share(clip, event.joint, at)
         name = clip.skeleton.names[event.joint]
-        found.append(measured_controls.event_landmark(row, name, at, share))
-    return found
+        landmarks.append(measured_controls.event_landmark(row, name, at, share))
+    return landmarks
 
 
 def _landmark(reopened: ReconstructedModel, control: Control, example: Example) -> float:
@@ -319,7 +340,7 @@ def _landmark(reopened: ReconstructedModel, control: Control, example: Example) 
     if control.measure is None or control.measure.share is None:
         return 0.0
     names = [*_landmark_columns(reopened), *_found_names(reopened)]
-    times = np.array([reopened.making.landmarks[name] for name in names])
+    times = np.array([reopened.card.making.landmarks[name] for name in names])
     return example.landmarks[int(np.argmin(np.abs(times - control.measure.share)))]
 
 
@@ -340,14 +361,14 @@ def place_beside(card: ModelCard, motion: Path) -> Path | None:
     """
     if not have_files(card):
         return None
-    place = motion.with_suffix(SUFFIX)
-    if not place.is_file():
+    path = motion.with_suffix(SUFFIX)
+    if not path.is_file():
         raise RecipeError(
             str(motion),
-            f"found no {place.name} beside it, expected the file of its curves, which the model "
+            f"found no {path.name} beside it, expected the file of its curves, which the model "
             f"has; or a table with a column {COLUMN!r}",
         )
-    return place
+    return path
 
 
 def whole_clip(
@@ -360,9 +381,9 @@ def whole_clip(
     """
     if not card.curves:
         return ingest.clip_of_file(files[row.motion], conventions.source), []
-    values, others = curve_files.read_known(row.curve_file, card.curves)
-    said = f"{row.curve_file}: curves {others}, which the model does not have, were left out"
-    notes = [said] if others else []
+    values, surplus = curve_files.read_known(row.curve_file, card.curves)
+    note = f"{row.curve_file}: curves {surplus}, which the model does not have, were left out"
+    notes = [note] if surplus else []
     if not are_alone(card):
         clip = ingest.clip_of_file(files[row.motion], conventions.source)
         return curve_files.with_curves(clip, values, row), notes

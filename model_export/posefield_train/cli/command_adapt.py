@@ -96,10 +96,10 @@ def adapt(
         raise InvalidField("licence", "blank, expected a text")
     with ProgressPrinter("adapting", STEPS) as progress:
         progress(f"reading {model}")
-        known = model_reconstruction.load(model)
-        adapted_file.check_name(known.card, performer)
+        reopened = model_reconstruction.load(model)
+        adapted_file.check_name(reopened.card, performer)
         labels = _labels(files.label or [])
-        adapted_file.check_labels(known.card, labels)
+        adapted_file.check_labels(reopened.card, labels)
         labels[PERFORMER] = performer
         source = Source(
             metres_per_unit=files.unit,
@@ -109,26 +109,28 @@ def adapt(
         )
         progress("reading clips")
         if files.table:
-            found = new_clips.examples_of_table(known, files.table, source, labels, files.rate)
+            clips = new_clips.examples_of_table(reopened, files.table, source, labels, files.rate)
         else:
             paths = files.clips or []
-            found = new_clips.examples_of_files(known, paths, source, labels, files.rate)
-        examples, notes = found
+            clips = new_clips.examples_of_files(reopened, paths, source, labels, files.rate)
+        examples, notes = clips
         progress("adapting, and comparing the graph with the reference")
-        made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
-        atomic_files.write(made.content, output)
+        exported = adapted_file.export_adapted(
+            reopened, NewPerformer(performer, examples, licence, notes)
+        )
+        atomic_files.write(exported.content, output)
         progress("done")
-    typer.echo(output_files.format_output(made, output, json))
+    typer.echo(output_files.format_output(exported, output, json))
 
 
-def _labels(given: list[str]) -> dict[str, str]:
+def _labels(options: list[str]) -> dict[str, str]:
     """Return names by label set; InvalidField for another form, or a set that is named twice."""
-    found: dict[str, str] = {}
-    for text in given:
+    labels: dict[str, str] = {}
+    for text in options:
         name, mark, label = text.partition("=")
         if not (name and mark and label):
             raise InvalidField("label", f"{text!r}, expected SET=NAME")
-        if name in found:
+        if name in labels:
             raise InvalidField("label", f"{name!r} twice, expected once")
-        found[name] = label
-    return found
+        labels[name] = label
+    return labels

@@ -133,7 +133,7 @@ def discover(
 
 
 def _write_recipes(
-    folder: Path, output: Path, stated: StatementOptions, wanted: FamilyOptions, json: bool
+    folder: Path, output: Path, stated: StatementOptions, family_options: FamilyOptions, json: bool
 ) -> None:
     from posefield.console.progress import ProgressBar
     from posefield_train.discover.recordings import FileStatements
@@ -142,39 +142,41 @@ def _write_recipes(
 
     if output.suffix in (".csv", ".toml", ".json"):
         raise InvalidField("output", f"{output.name!r}, expected a folder of recipes")
-    replaced = recipe_folder.expect_free(output, wanted.overwrite)
+    replaced = recipe_folder.expect_free(output, family_options.overwrite)
     files = MotionFiles(KEPT_POSES)
     read = _read(folder, stated, files)
     names = [recording.file for recording in read.recordings]
-    statements = FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
+    statements = FileStatements(family_options.unit, stated.up, _roles(stated), stated.rate)
     with ProgressBar("bodies", len(names)) as bar:
         kinds = found_families.find_kinds(folder, names, statements, bar.update, read.figures)
-    with ProgressBar("candidates", wanted.candidates) as bar:
-        listed = found_families.find_families(read.recordings, kinds, wanted.candidates, bar.update)
-    found = recipe_folder.offer(listed, folder, wanted.licence, files)
-    facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
-    page = contact_sheet.render(found, read.recordings, output.as_posix(), read.refused)
-    written = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}
-    recipe_folder.write(written, output, replaced)
+    with ProgressBar("candidates", family_options.candidates) as bar:
+        listed = found_families.find_families(
+            read.recordings, kinds, family_options.candidates, bar.update
+        )
+    families = recipe_folder.offer(listed, folder, family_options.licence, files)
+    facts = recipe_folder.summary(families, folder, read, kinds, family_options.candidates)
+    page = contact_sheet.render(families, read.recordings, output.as_posix(), read.refused)
+    contents = recipe_folder.contents(families, facts) | {recipe_folder.PAGE: page}
+    recipe_folder.write(contents, output, replaced)
     if json:
         typer.echo(as_json(facts))
     else:
-        _tell_families(found, output, len(read.recordings))
+        _tell_families(families, output, len(read.recordings))
 
 
-def _tell_families(found: "FoundFamilies", output: Path, recordings: int) -> None:
+def _tell_families(families: "FoundFamilies", output: Path, recordings: int) -> None:
     """Print each family that is offered, and how to accept it."""
     from posefield_train.families import recipe_folder
 
-    for one in found.offered:
+    for one in families.offered:
         controls = ", ".join(map(recipe_folder.control_name, one.proposal.controls))
         typer.echo(
             f"{output / one.name}.toml: {len(one.family.rows)} {one.family.kind}, "
             f"{one.family.seconds:.1f} s; controls {controls}"
         )
     typer.echo(
-        f"{output}: {len(found.offered)} families of {recordings} recordings, "
-        f"{len(found.refused)} not offered; look at {output / recipe_folder.PAGE}, then accept "
+        f"{output}: {len(families.offered)} families of {recordings} recordings, "
+        f"{len(families.refused)} not offered; look at {output / recipe_folder.PAGE}, then accept "
         f"with: posefield review {output} --accept NUMBER"
     )
 
@@ -187,15 +189,15 @@ def _write_table(
     if output.suffix != ".csv":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .csv")
     read = _read(folder, stated)
-    found, facts = _search(read, search)
-    atomic_files.write(found_clips.table(found), output)
+    clips, facts = _search(read, search)
+    atomic_files.write(found_clips.table(clips), output)
     if json:
-        own = {"table": str(output), "clips": len(found), "recordings": len(read.recordings)}
-        typer.echo(as_json({**own, **facts, "refused": read.refused, "notes": read.notes}))
+        summary = {"table": str(output), "clips": len(clips), "recordings": len(read.recordings)}
+        typer.echo(as_json({**summary, **facts, "refused": read.refused, "notes": read.notes}))
         return
     kind = "strides" if search.like is None else f"{search.name}, examples first"
     typer.echo(
-        f"{output}: {len(found)} clips ({kind}) of {len(read.recordings)} recordings; set "
+        f"{output}: {len(clips)} clips ({kind}) of {len(read.recordings)} recordings; set "
         "accepted to true in the rows to train from"
     )
 
@@ -207,17 +209,17 @@ def _search(
     from posefield_train.discover import found_clips, motion_features
 
     if search.like is None:
-        found, in_place = found_clips.strides(read.recordings)
+        clips, in_place = found_clips.strides(read.recordings)
         if in_place:
             typer.echo(f"left out: {in_place} swings of the legs that do not travel", err=True)
-        return found, {"in_place": in_place}
+        return clips, {"in_place": in_place}
     examples = found_clips.parse_examples(read.recordings, search.like)
-    found = found_clips.like(read.recordings, examples, search.name, search.most)
+    clips = found_clips.like(read.recordings, examples, search.name, search.most)
     lacking = motion_features.lacking_roles(read.recordings)
     if lacking:
-        said = f"not compared, because some recordings have none: {', '.join(lacking)}"
-        typer.echo(said, err=True)
-    return found, {"not_compared": lacking}
+        note = f"not compared, because some recordings have none: {', '.join(lacking)}"
+        typer.echo(note, err=True)
+    return clips, {"not_compared": lacking}
 
 
 def _read(
@@ -229,11 +231,11 @@ def _read(
     from posefield_train.source import motion_readers
 
     with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
-        known = recordings.FileStatements(None, stated.up, _roles(stated), stated.rate)
-        read = recordings.read_recordings(folder, known, bar.update, files)
+        statements = recordings.FileStatements(None, stated.up, _roles(stated), stated.rate)
+        read = recordings.read_recordings(folder, statements, bar.update, files)
     output_files.tell_files("left out", list(read.refused.items()))
     output_files.tell_files(
-        "note", [(file, said) for file, own in read.notes.items() for said in own]
+        "note", [(file, note) for file, notes in read.notes.items() for note in notes]
     )
     return read
 
@@ -278,7 +280,7 @@ def review(
     folder: Annotated[
         Path, typer.Argument(help="folder that posefield discover wrote", metavar="FOLDER")
     ],
-    given: DecisionOptions,
+    options: DecisionOptions,
     decisions: Annotated[
         Path | None,
         typer.Option(
@@ -297,14 +299,16 @@ def review(
     from posefield_train.families import review as family_decisions
     from posefield_train.families import review as family_review
 
-    if (decisions is None) == (given == DecisionOptions()):
+    if (decisions is None) == (options == DecisionOptions()):
         raise InvalidField("decisions", "expected either --decisions FILE or other decisions")
-    found = (
-        family_decisions.of_texts(given.accept, given.reject, given.merge or [], given.drop or [])
+    contents = (
+        family_decisions.of_texts(
+            options.accept, options.reject, options.merge or [], options.drop or []
+        )
         if decisions is None
         else family_decisions.read(decisions)
     )
-    facts = family_review.apply(folder, found, data)
+    facts = family_review.apply(folder, contents, data)
     if json:
         typer.echo(as_json(facts))
         return

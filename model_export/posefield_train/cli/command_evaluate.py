@@ -72,8 +72,8 @@ class EvaluateOptions:
         """Open the executor of the folds."""
         from posefield_train.jobs import FinishedJobs
 
-        with executors.jobs(self.scheduler, self.jobs) as own:
-            yield FinishedJobs(own, self.resume) if self.resume else own
+        with executors.jobs(self.scheduler, self.jobs) as jobs:
+            yield FinishedJobs(jobs, self.resume) if self.resume else jobs
 
     def print(self, text: str) -> None:
         """Print a result for people: on standard error if standard output has the JSON."""
@@ -86,7 +86,7 @@ def evaluate(
         Path,
         typer.Argument(help="recipe (TOML file or name of a shipped recipe)", metavar="RECIPE"),
     ],
-    wanted: EvaluateOptions,
+    options: EvaluateOptions,
     data: Annotated[
         Path | None,
         typer.Option(help="folder of the motion data; default: the recipe's folder"),
@@ -98,7 +98,7 @@ def evaluate(
     whole model again without the held-out clips.
     """
     recipe_file = data_folder.recipe_file(recipe, data)
-    _evaluate(recipe_file, data or recipe_file.parent, wanted)
+    _evaluate(recipe_file, data or recipe_file.parent, options)
 
 
 class EvaluateCommand(PlainCommand):
@@ -115,14 +115,14 @@ def json_file_words(words: Sequence[str]) -> list[str]:
     A word after --json is its file unless it is an option, or the recipe: a TOML file or the name
     of a shipped recipe.
     """
-    found = list(words)
+    arguments = list(words)
     for at, (word, after) in enumerate(zip_longest(words, words[1:], fillvalue="-")):
         is_recipe = after.endswith(".toml") or after in data_folder.shipped_names()
         if word.startswith("--json=") or (
             word == "--json" and not after.startswith("-") and not is_recipe
         ):
-            found[at] = word.replace("--json", "--json-file", 1)
-    return found
+            arguments[at] = word.replace("--json", "--json-file", 1)
+    return arguments
 
 
 EXAMPLES = [
@@ -136,7 +136,7 @@ def add(app: typer.Typer) -> None:
     register(app, evaluate, MAKE, EXAMPLES, "evaluate", EvaluateCommand)
 
 
-def _evaluate(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> None:
+def _evaluate(recipe_file: Path, data: Path, options: EvaluateOptions) -> None:
     from posefield_train.evaluate import protocol, summary
     from posefield_train.source import ingest, recipe
 
@@ -144,23 +144,23 @@ def _evaluate(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> None:
     family = recipe.read_accepted(recipe_file)
     examples, _ = ingest.ingest(family, data)
     allowed = protocol.protocols(examples)
-    names = [one.value for one in wanted.protocol or []]
+    names = [one.value for one in options.protocol or []]
     for name in names:
         if name not in allowed:
             can = ", ".join(allowed)
             raise InvalidField("protocol", f"{name!r}, but {family.name} can only: {can}")
-    results = _results(family, examples, names or allowed, wanted)
-    wanted.print(summary.legend(results))
-    first, *others = map(summary.facts, results)
-    figures = as_json({**first, "others": others})
-    if wanted.json:
+    results = _results(family, examples, names or allowed, options)
+    options.print(summary.legend(results))
+    first, *rest = map(summary.facts, results)
+    figures = as_json({**first, "others": rest})
+    if options.json:
         typer.echo(figures)
-    if wanted.json_file:
-        atomic_files.write(figures.encode(), wanted.json_file)
+    if options.json_file:
+        atomic_files.write(figures.encode(), options.json_file)
 
 
 def _results(
-    family: "Recipe", examples: "list[Example]", names: list[str], wanted: EvaluateOptions
+    family: "Recipe", examples: "list[Example]", names: list[str], options: EvaluateOptions
 ) -> "list[EvaluationResult]":
     """Run the protocols and print each result when it is complete."""
     from posefield.console.progress import ProgressBar
@@ -168,7 +168,7 @@ def _results(
 
     counts = [len(protocol.folds_of(examples, name)) for name in names]
     results = []
-    with wanted.executor() as jobs:
+    with options.executor() as jobs:
         for index, name in enumerate(names):
             before, total = sum(counts[:index]), sum(counts)
             # One bar for all protocols, so that the estimate is that of the command.
@@ -176,7 +176,7 @@ def _results(
                 report = _after(bar, before, total)
                 results.append(protocol.run_protocol(family, examples, name, jobs, report))
             trust = "\n".join(summary.trust_text(results[-1]))
-            wanted.print(f"{summary.table(results[-1])}\n\n{trust}\n")
+            options.print(f"{summary.table(results[-1])}\n\n{trust}\n")
     return results
 
 

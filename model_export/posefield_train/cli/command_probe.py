@@ -62,23 +62,23 @@ def init(
         raise FileError(folder, "not a folder, expected one with motion files")
     recipe = folder / recipe_draft.RECIPE
     _refuse_existing(recipe)
-    known = None if table is None else recipe_draft.read_table(folder / table)
-    if known is None:
+    table_draft = None if table is None else recipe_draft.read_table(folder / table)
+    if table_draft is None:
         _refuse_existing(folder / recipe_draft.TABLE)
         files = [*motion_readers.find_files(folder), *motion_readers.find_refused(folder)]
     else:
-        files = recipe_draft.files_of(known, folder)
+        files = recipe_draft.files_of(table_draft, folder)
     if not files:
         raise InvalidField("FOLDER", f"{folder} has no motion files, expected one or more")
     report = _probe(files)
-    written = [recipe]
-    if known is None:
-        written.insert(0, folder / recipe_draft.TABLE)
-        atomic_files.write(recipe_draft.table_text(report, folder).encode(), written[0])
-    proposed = _proposed(report, folder) if known is None else []
-    draft = recipe_draft.recipe_text(report, folder.resolve().name, known, proposed)
+    paths = [recipe]
+    if table_draft is None:
+        paths.insert(0, folder / recipe_draft.TABLE)
+        atomic_files.write(recipe_draft.table_text(report, folder).encode(), paths[0])
+    proposed = _proposed(report, folder) if table_draft is None else []
+    draft = recipe_draft.recipe_text(report, folder.resolve().name, table_draft, proposed)
     atomic_files.write(draft.encode(), recipe)
-    _tell(report, written, "the licence" if proposed else "the licence and the controls", json)
+    _tell(report, paths, "the licence" if proposed else "the licence and the controls", json)
 
 
 LONG = 12.0
@@ -131,15 +131,15 @@ def _refuse_existing(path: Path) -> None:
         raise FileError(path, f"exists already, and is not overwritten{hint}")
 
 
-def _tell(report: "ProbeReport", written: list[Path], todo: str, json: bool) -> None:
+def _tell(report: "ProbeReport", files: list[Path], todo: str, json: bool) -> None:
     """Print the files that were written, and what has to be completed."""
     from posefield_train.probe import probe_report
 
     if json:
-        typer.echo(as_json({"written": [str(path) for path in written], **report.facts()}))
+        typer.echo(as_json({"written": [str(path) for path in files], **report.facts()}))
         return
     typer.echo("\n".join(probe_report.summary(report)))
     typer.echo(
-        f"wrote {' and '.join(map(str, written))}: complete {todo} (TODO), "
-        f"then: posefield train {written[-1]} -o model.onnx"
+        f"wrote {' and '.join(map(str, files))}: complete {todo} (TODO), "
+        f"then: posefield train {files[-1]} -o model.onnx"
     )

@@ -87,23 +87,23 @@ def convert(
         if value is not None and not 0.0 < value < float("inf"):
             raise InvalidField(name, f"{value}, expected a positive number")
     options = ReadOptions(source.rate, source.animation, source.skeleton, source.unit, source.up)
-    found = converted_file.convert(source.file, options, source.blender)
-    atomic_files.write(found.content, output)
+    converted = converted_file.convert(source.file, options, source.blender)
+    atomic_files.write(converted.content, output)
     facts = {
         "file": str(output),
-        "frames": len(found.clip),
-        "fps": found.clip.rate,
-        "joints": len(found.clip.skeleton),
-        "notes": list(found.notes),
+        "frames": len(converted.clip),
+        "fps": converted.clip.rate,
+        "joints": len(converted.clip.skeleton),
+        "notes": list(converted.notes),
     }
     if json:
         typer.echo(as_json(facts))
         return
-    for note in found.notes:
+    for note in converted.notes:
         typer.echo(f"note: {note}")
     typer.echo(
-        f"{output}: {len(found.clip)} frames at {found.clip.rate:g} a second, "
-        f"{len(found.clip.skeleton)} joints, in centimetres with y up"
+        f"{output}: {len(converted.clip)} frames at {converted.clip.rate:g} a second, "
+        f"{len(converted.clip.skeleton)} joints, in centimetres with y up"
     )
 
 
@@ -169,9 +169,11 @@ def sample(
     if family != FAMILY:
         suggestion = did_you_mean(family, [FAMILY])
         raise InvalidField("family", f"{family!r}{suggestion}, expected {FAMILY}")
-    given = [option.name for option in fields(size) if getattr(size, option.name) is not None]
-    if true.truth and given:
-        raise InvalidField(given[0], "found with --truth, expected for a family of clips")
+    size_options = [
+        option.name for option in fields(size) if getattr(size, option.name) is not None
+    ]
+    if true.truth and size_options:
+        raise InvalidField(size_options[0], "found with --truth, expected for a family of clips")
     if not true.truth:
         path = _write_reaching(output, size)
         typer.echo(

@@ -50,7 +50,7 @@ def train_command(
 ) -> None:
     """Train the model of each recipe, one .onnx file each."""
     output_files.expect_html(report)
-    recipe_files = [data_folder.recipe_file(given, data) for given in recipes]
+    recipe_files = [data_folder.recipe_file(recipe, data) for recipe in recipes]
     if len(recipe_files) == 1:
         _train(recipe_files[0], data, output, executor, report, json)
     elif report:
@@ -125,32 +125,32 @@ def _write_report(
 
 
 def _sweep(
-    recipe_files: list[Path], data: Path | None, folder: Path, place: ExecutorOptions, json: bool
+    recipe_files: list[Path], data: Path | None, folder: Path, executor: ExecutorOptions, json: bool
 ) -> None:
     from posefield.console.progress import ProgressBar
     from posefield_train import sweep
 
     if folder.suffix == ".onnx":
         raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
-    found, failed = [], []
+    summaries, failed = [], []
     with (
-        executors.jobs(place.scheduler, place.jobs) as jobs,
+        executors.jobs(executor.scheduler, executor.jobs) as jobs,
         ProgressBar("models", len(recipe_files)) as bar,
     ):
-        for made in sweep.train_models(recipe_files, data, jobs):
+        for result in sweep.train_models(recipe_files, data, jobs):
             bar.advance(1)
-            if isinstance(made.outcome, TrainingError):
-                failed.append(made.name)
-                bar.print(f"{made.name}: {made.outcome}")
+            if isinstance(result.outcome, TrainingError):
+                failed.append(result.name)
+                bar.print(f"{result.name}: {result.outcome}")
                 continue
-            path = folder / f"{made.name}.onnx"
-            atomic_files.write(made.outcome.content, path)
-            found.append(output_files.facts(made.outcome, path))
+            path = folder / f"{result.name}.onnx"
+            atomic_files.write(result.outcome.content, path)
+            summaries.append(output_files.facts(result.outcome, path))
             if json:
-                bar.print(output_files.summary(made.outcome, path))
+                bar.print(output_files.summary(result.outcome, path))
             else:
-                typer.echo(output_files.summary(made.outcome, path))
+                typer.echo(output_files.summary(result.outcome, path))
     if json:
-        typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
+        typer.echo(as_json(sorted(summaries, key=lambda facts: str(facts["file"]))))
     if failed:
         raise TrainingError(f"{', '.join(sorted(failed))} of {len(recipe_files)} made no model")

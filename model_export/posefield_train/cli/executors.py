@@ -59,8 +59,12 @@ def parts(options: ExecutorOptions) -> "Iterator[Jobs]":
     from posefield_train.jobs import FinishedJobs, SerialJobs
 
     alone = options.jobs is None and options.scheduler is None
-    with nullcontext(SerialJobs()) if alone else jobs(options.scheduler, options.jobs) as own:
-        yield FinishedJobs(own, options.resume) if options.resume else own
+    with (
+        nullcontext(SerialJobs())
+        if alone
+        else jobs(options.scheduler, options.jobs) as jobs_of_options
+    ):
+        yield FinishedJobs(jobs_of_options, options.resume) if options.resume else jobs_of_options
 
 
 def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextManager[Jobs]":

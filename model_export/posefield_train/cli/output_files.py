@@ -51,29 +51,29 @@ def facts(exported: "ExportedModel", output: Path) -> dict[str, Any]:
 
 def summary(exported: "ExportedModel", output: Path) -> str:
     """Return the summary of a written model as text."""
-    found = facts(exported, output)
-    notes = [f"note: {note}" for note in found["notes"][:MAX_NOTES]]
-    if len(found["notes"]) > MAX_NOTES:
-        others = len(found["notes"]) - MAX_NOTES
-        notes.append(f"note: {others} further notes: posefield inspect {output}")
+    figures = facts(exported, output)
+    notes = [f"note: {note}" for note in figures["notes"][:MAX_NOTES]]
+    if len(figures["notes"]) > MAX_NOTES:
+        hidden = len(figures["notes"]) - MAX_NOTES
+        notes.append(f"note: {hidden} further notes: posefield inspect {output}")
     return "\n".join(
         [
             *notes,
-            f"{output}: {found['bytes'] / 1000:.1f} kB from {found['clips']} clips, "
-            f"ranks {found['ranks']} of {found['tensor']}",
-            f"truncation costs {100 * found['truncation_rms_m']:.2f} cm, a clip left out lies "
-            f"{100 * found['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
-            f"onnxruntime differs from the reference by at most {100 * found['parity_m']:.5f} cm",
+            f"{output}: {figures['bytes'] / 1000:.1f} kB from {figures['clips']} clips, "
+            f"ranks {figures['ranks']} of {figures['tensor']}",
+            f"truncation costs {100 * figures['truncation_rms_m']:.2f} cm, a clip left out lies "
+            f"{100 * figures['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
+            f"onnxruntime differs from the reference by at most {100 * figures['parity_m']:.5f} cm",
         ]
     )
 
 
-def tell_files(what: str, said: Sequence[tuple[str, str]]) -> None:
+def tell_files(what: str, reasons: Sequence[tuple[str, str]]) -> None:
     """Print a line for each of a bounded number of files to standard error."""
-    for file, reason in said[:MAX_NOTES]:
+    for file, reason in reasons[:MAX_NOTES]:
         typer.echo(f"{what}: {file}: {reason}", err=True)
-    if len(said) > MAX_NOTES:
-        typer.echo(f"{what}: {len(said) - MAX_NOTES} further files: see --json", err=True)
+    if len(reasons) > MAX_NOTES:
+        typer.echo(f"{what}: {len(reasons) - MAX_NOTES} further files: see --json", err=True)
 
 
 SHORTEST = 10.0

@@ -219,16 +219,12 @@ ContactPredictor = Callable[[Floats], Floats]
 """Map from shares (F,) of the duration to probabilities (M, F, K) for the clips held out."""
 
 
-@dataclass(frozen=True)
-class HeldOutClips:
-    """Clips that a model was trained on, and clips that were held out."""
-
-    rest: Sequence[Example]
-    held_out: Sequence[Example]
-
-
 def held_out_accuracies(
-    recipe: Recipe, clips: HeldOutClips, joints: Sequence[int], predict: ContactPredictor
+    recipe: Recipe,
+    rest: Sequence[Example],
+    held_out: Sequence[Example],
+    joints: Sequence[int],
+    predict: ContactPredictor,
 ) -> list[ContactAccuracy]:
     """Return the accuracy of each clip held out, at equal shares of the durations.
 
@@ -238,8 +234,8 @@ def held_out_accuracies(
     """
     if recipe.alignment.begin == "in_phase" and recipe.motion.cyclic:
         return []
-    mean = _labels_at_shares(recipe, clips.rest, joints).mean(axis=0)
-    pairs = zip(_labels_at_shares(recipe, clips.held_out, joints), predict(SHARES), strict=True)
+    mean = _labels_at_shares(recipe, rest, joints).mean(axis=0)
+    pairs = zip(_labels_at_shares(recipe, held_out, joints), predict(SHARES), strict=True)
     return [
         ContactAccuracy.measure(predicted, labels, labels - mean) for labels, predicted in pairs
     ]

@@ -53,11 +53,11 @@ class MotionEvent:
 def motion_of_clip(clip: Clip, event: MotionEvent | None) -> ComparedMotion:
     """Return the motion of a captured clip on its own skeleton."""
     poses = motion_tensor.captured_poses(clip)
-    own = motion_of_poses(clip.skeleton.parents, *poses, clip.duration, event)
+    motion = motion_of_poses(clip.skeleton.parents, *poses, clip.duration, event)
     if clip.curves is None:
-        return own
+        return motion
     values = time_alignment.interpolate(clip.curves.values, UNIFORM_SHARES)
-    return replace(own, curves=replace(clip.curves, values=values))
+    return replace(motion, curves=replace(clip.curves, values=values))
 
 
 def with_curves(
@@ -67,7 +67,9 @@ def with_curves(
     if not curves:
         return list(motions)
     pairs = zip(motions, values, strict=True)
-    return [replace(motion, curves=CurveValues(curves, own)) for motion, own in pairs]
+    return [
+        replace(motion, curves=CurveValues(curves, curve_values)) for motion, curve_values in pairs
+    ]
 
 
 def motion_of_poses(
@@ -78,8 +80,8 @@ def motion_of_poses(
     event: MotionEvent | None,
 ) -> ComparedMotion:
     """Return the motion of local rotations (FRAMES, J, 4) and translations (FRAMES, J, 3), m."""
-    (found,) = motions_of_poses(parents, rotations[None], translations[None], [duration], [event])
-    return found
+    (motion,) = motions_of_poses(parents, rotations[None], translations[None], [duration], [event])
+    return motion
 
 
 def motions_of_poses(
@@ -97,8 +99,8 @@ def motions_of_poses(
     )
     listed = zip(points, durations, positions, events, strict=True)
     return [
-        ComparedMotion(own, duration, event.position_of(joints) if event else None)
-        for own, duration, joints, event in listed
+        ComparedMotion(shell, duration, event.position_of(joints) if event else None)
+        for shell, duration, joints, event in listed
     ]
 
 
@@ -153,39 +155,43 @@ class MotionErrors:
 
 
 def compare_motions(
-    made: ComparedMotion, captured: ComparedMotion, feet: tuple[int, ...]
+    synthesized: ComparedMotion, captured: ComparedMotion, feet: tuple[int, ...]
 ) -> MotionErrors:
     """Return the errors of a synthesized motion. feet: joint indices."""
-    return compare_all([made], captured, feet)[0]
+    return compare_all([synthesized], captured, feet)[0]
 
 
 def compare_all(
-    made: Sequence[ComparedMotion], captured: ComparedMotion, feet: tuple[int, ...]
+    synthesized: Sequence[ComparedMotion], captured: ComparedMotion, feet: tuple[int, ...]
 ) -> list[MotionErrors]:
     """Return the errors of several motions against one captured motion. feet: joint indices."""
-    own, true = np.stack([motion.points for motion in made]), captured.points
-    known = np.concatenate([_warping_features(true), _curve_features(captured)], axis=-1)
-    shown = [np.concatenate([_warping_features(m.points), _curve_features(m)], -1) for m in made]
-    features = np.broadcast_to(known, (len(made), *known.shape))
-    phases = dtw.warp(features, np.stack(shown))
-    warped = np.stack([_resample(*pair) for pair in zip(own, phases, strict=True)])
-    apart = _joint_distances(warped, true)
+    points, true = np.stack([motion.points for motion in synthesized]), captured.points
+    captured_features = np.concatenate(
+        [_warping_features(true), _curve_features(captured)], axis=-1
+    )
+    synthesized_features = [
+        np.concatenate([_warping_features(m.points), _curve_features(m)], -1) for m in synthesized
+    ]
+    features = np.broadcast_to(captured_features, (len(synthesized), *captured_features.shape))
+    phases = dtw.warp(features, np.stack(synthesized_features))
+    warped = np.stack([_resample(*pair) for pair in zip(points, phases, strict=True)])
+    distances = _joint_distances(warped, true)
     shell = np.linalg.norm(_root_relative(warped) - _root_relative(true), axis=-1)
     spreads = zip(
         _distances(_joint_distances(_root_relative(warped), _root_relative(true))),
-        _distances(apart),
-        _distances(_joint_distances(_root_relative(own), _root_relative(true))),
-        _distances(_joint_distances(own, true)),
+        _distances(distances),
+        _distances(_joint_distances(_root_relative(points), _root_relative(true))),
+        _distances(_joint_distances(points, true)),
         _distances(shell[..., 1:].max(axis=-1)),
         strict=True,
     )
-    jerks = _ratios(acceleration(own), acceleration(true))
+    jerks = _ratios(acceleration(points), acceleration(true))
     slid = skate(captured, feet)
-    channels = [_curve_errors(*pair, captured) for pair in zip(made, phases, strict=True)]
-    squares = np.mean(np.square(apart), axis=1)
+    channels = [_curve_errors(*pair, captured) for pair in zip(synthesized, phases, strict=True)]
+    squares = np.mean(np.square(distances), axis=1)
     return [
         MotionErrors(
-            *found,
+            *statistics,
             _effector(motion.event, captured.event),
             float(jerk),
             skate(motion, feet),
@@ -194,35 +200,41 @@ def compare_all(
             joints,
             *errors,
         )
-        for motion, found, jerk, joints, errors in zip(
-            made, spreads, jerks, squares, channels, strict=True
+        for motion, statistics, jerk, joints, errors in zip(
+            synthesized, spreads, jerks, squares, channels, strict=True
         )
     ]
 
 
 def _curve_features(motion: ComparedMotion) -> Floats:
     """Return the curves (FRAMES, C) as the distances that they count as, m, for time warping."""
-    own = motion.curves
-    return np.zeros((FRAMES, 0)) if own is None else own.values * curves.distances(own.curves)
+    curve_values = motion.curves
+    return (
+        np.zeros((FRAMES, 0))
+        if curve_values is None
+        else curve_values.values * curves.distances(curve_values.curves)
+    )
 
 
 def _curve_errors(
-    made: ComparedMotion, phase: Floats, captured: ComparedMotion
+    synthesized: ComparedMotion, phase: Floats, captured: ComparedMotion
 ) -> tuple[Floats, Floats]:
     """Return mean squared errors (C,) of the curves, in their own units and as distances, m².
 
     phase: (FRAMES,), places of the made motion after time warping.
     """
-    if made.curves is None or captured.curves is None:
+    if synthesized.curves is None or captured.curves is None:
         return np.zeros(0), np.zeros(0)
-    apart = time_alignment.interpolate(made.curves.values, phase) - captured.curves.values
-    squares = np.mean(np.square(apart), axis=0)
+    differences = (
+        time_alignment.interpolate(synthesized.curves.values, phase) - captured.curves.values
+    )
+    squares = np.mean(np.square(differences), axis=0)
     return squares, squares * np.square(curves.distances(captured.curves.curves))
 
 
-def _ratios(made: Floats, captured: Floats) -> Floats:
+def _ratios(synthesized: Floats, captured: Floats) -> Floats:
     """Return the ratios of accelerations (M,); NaN for a captured motion that rests."""
-    return made / captured if captured > 0.0 else np.full(len(made), np.nan)
+    return synthesized / captured if captured > 0.0 else np.full(len(synthesized), np.nan)
 
 
 def compare_methods(
@@ -231,19 +243,23 @@ def compare_methods(
     feet: tuple[int, ...],
 ) -> dict[str, list[MotionErrors | None]]:
     """Return the errors of every method by clip; None for clips that it did not predict."""
-    found: dict[str, list[MotionErrors | None]] = {name: [] for name in motions}
-    for place, true in enumerate(captured):
-        made = {name: own for name, listed in motions.items() if (own := listed[place])}
-        errors = dict(zip(made, compare_all(list(made.values()), true, feet), strict=True))
-        for name, results in found.items():
+    by_method: dict[str, list[MotionErrors | None]] = {name: [] for name in motions}
+    for index, true in enumerate(captured):
+        synthesized = {
+            name: motion for name, listed in motions.items() if (motion := listed[index])
+        }
+        errors = dict(
+            zip(synthesized, compare_all(list(synthesized.values()), true, feet), strict=True)
+        )
+        for name, results in by_method.items():
             results.append(errors.get(name))
-    return found
+    return by_method
 
 
-def _effector(made: Floats | None, captured: Floats | None) -> float:
-    if made is None or captured is None:
+def _effector(synthesized: Floats | None, captured: Floats | None) -> float:
+    if synthesized is None or captured is None:
         return math.nan
-    return float(np.linalg.norm(made - captured))
+    return float(np.linalg.norm(synthesized - captured))
 
 
 def _root_relative(points: Floats) -> Floats:
@@ -263,9 +279,9 @@ def _joint_distances(a: Floats, b: Floats) -> Floats:
     return np.linalg.norm(a[..., 0, :] - b[..., 0, :], axis=-1)
 
 
-def _distances(apart: Floats) -> list[DistanceStatistics]:
+def _distances(distances: Floats) -> list[DistanceStatistics]:
     """Return the statistics of distances (M, FRAMES, J) of each of M motions."""
-    flat = apart.reshape(len(apart), -1)
+    flat = distances.reshape(len(distances), -1)
     p95, p99 = np.percentile(flat, [95, 99], axis=1)
     rms = np.sqrt(np.mean(np.square(flat), axis=1))
     rows = zip(flat.mean(axis=1), rms, p95, p99, flat.max(axis=1), strict=True)
@@ -321,8 +337,8 @@ def mean(errors: Sequence[MotionErrors]) -> MotionErrors:
     )
 
 
-def _pool(parts: Sequence[DistanceStatistics]) -> DistanceStatistics:
-    listed = np.array([[d.mean, d.rms, d.p95, d.p99, d.largest] for d in parts])
+def _pool(statistics: Sequence[DistanceStatistics]) -> DistanceStatistics:
+    listed = np.array([[d.mean, d.rms, d.p95, d.p99, d.largest] for d in statistics])
     average = listed.mean(axis=0)
     rms = np.sqrt(np.mean(np.square(listed[:, 1])))
     return DistanceStatistics(

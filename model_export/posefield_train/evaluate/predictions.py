@@ -20,7 +20,6 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import motion_tensor, truncation_error
 from posefield_train.tensor.motion_tensor import UNIFORM_SHARES
 from posefield_train.tensor.truncation_error import EventFrame
@@ -39,8 +38,8 @@ def predict_process(samples: SamplePoints, values: Floats, queries: Floats) -> F
     kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(lengths, (0.1, 100.0))
     noisy = kernel + WhiteKernel(0.1, (1e-5, 10.0))
     scaled = (values - centre) / size
-    apart = np.square(samples.points[:, None] - samples.points)
-    likelihood = MarginalLikelihood(apart, scaled)
+    squares = np.square(samples.points[:, None] - samples.points)
+    likelihood = MarginalLikelihood(squares, scaled)
     model = GaussianProcessRegressor(noisy, optimizer=likelihood.optimize, random_state=0)
     with warnings.catch_warnings():
         # A length scale at its bound is a valid result: the control has no influence, or all.
@@ -130,27 +129,29 @@ class Predictions:
     joint_sigma: Floats
 
 
-def predict(recipe: Recipe, trained: TrainedModel, queries: Queries) -> Predictions:
+def predict(trained: TrainedModel, queries: Queries) -> Predictions:
     """Return the predictions of every method, posefield's first."""
     points, values = query_points(trained, queries), trained.values
     process = {
-        name: predict_process(trained.samples, known, points) for name, known in values.items()
+        name: predict_process(trained.samples, sample_values, points)
+        for name, sample_values in values.items()
     }
-    mean = {name: np.tile(known.mean(axis=0), (len(points), 1)) for name, known in values.items()}
+    mean = {
+        name: np.tile(sample_values.mean(axis=0), (len(points), 1))
+        for name, sample_values in values.items()
+    }
     peers = {GP: with_pose_vectors(trained, process), MEAN: with_pose_vectors(trained, mean)}
-    return with_sigma(recipe, trained, queries, peers)
+    return with_sigma(trained, queries, peers)
 
 
-def with_sigma(
-    recipe: Recipe, trained: TrainedModel, queries: Queries, peers: Mapping[str, Values]
-) -> Predictions:
+def with_sigma(trained: TrainedModel, queries: Queries, peers: Mapping[str, Values]) -> Predictions:
     """Return the predictions of posefield and of peers by name, and posefield's sigma.
 
     peers: predicted values, with pose vectors.
     """
     bank = trained.model.bank
-    motions = {OURS: predict_posefield(recipe, trained, queries)}
-    motions |= motions_of_values(recipe, trained, peers)
+    motions = {OURS: predict_posefield(trained, queries)}
+    motions |= motions_of_values(trained, peers)
     sigma = bank.sigma(bank.numpy(query_points(trained, queries))[VARIANCE])
     return Predictions(motions, sigma, sigma[:, None] * trained.joints)
 
@@ -164,10 +165,9 @@ def _labels(trained: TrainedModel, queries: Queries) -> Floats:
     return sample_points.label_weights(queries.labels, trained.model.bank.labels)
 
 
-def captured_event(
-    recipe: Recipe, trained: TrainedModel, landmarks: Sequence[float]
-) -> MotionEvent | None:
+def captured_event(trained: TrainedModel, landmarks: Sequence[float]) -> MotionEvent | None:
     """Return the event of a captured clip from its landmarks; None if the recipe names none."""
+    recipe = trained.recipe
     frame = truncation_error.event_frame(recipe, trained.examples)
     if frame is None or recipe.event is None:
         return None
@@ -176,11 +176,9 @@ def captured_event(
     return MotionEvent(frame.joint, landmarks[recipe.landmark_names.index(recipe.event.at)])
 
 
-def predict_posefield(
-    recipe: Recipe, trained: TrainedModel, queries: Queries
-) -> list[ComparedMotion]:
+def predict_posefield(trained: TrainedModel, queries: Queries) -> list[ComparedMotion]:
     """Return the predictions of the exported model."""
-    event = truncation_error.event_frame(recipe, trained.examples)
+    event = truncation_error.event_frame(trained.recipe, trained.examples)
     labels, model = _labels(trained, queries), trained.model
     fields = model.bank.numpy(model.bank.points(queries.controls, labels))
     times = np.exp(fields["duration"]) * UNIFORM_SHARES
@@ -210,15 +208,17 @@ def pose_vectors(trained: TrainedModel, coefficients: Floats) -> Floats:
 
 
 def motions_of_values(
-    recipe: Recipe, trained: TrainedModel, peers: Mapping[str, Values]
+    trained: TrainedModel, peers: Mapping[str, Values]
 ) -> dict[str, list[ComparedMotion]]:
     """Return motions of the values that peers predict, with pose vectors.
 
     They have the model's timing, travel, chart and bones.
     """
-    event, model = truncation_error.event_frame(recipe, trained.examples), trained.model
+    event, model = truncation_error.event_frame(trained.recipe, trained.examples), trained.model
     names = next(iter(peers.values()))
-    values = {name: np.concatenate([known[name] for known in peers.values()]) for name in names}
+    values = {
+        name: np.concatenate([predicted[name] for predicted in peers.values()]) for name in names
+    }
     poses = motion_tensor.predicted_poses(
         model.timing, trained.tensor, values["pose"], values["warp"], values.get("travel")
     )

@@ -10,7 +10,7 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield_train.contacts import contact_model
-from posefield_train.contacts.contact_model import ContactAccuracy, HeldOutClips
+from posefield_train.contacts.contact_model import ContactAccuracy
 from posefield_train.evaluate import motion_errors, predictions
 from posefield_train.evaluate.motion_errors import ComparedMotion, MotionErrors
 from posefield_train.evaluate.predictions import Predictions, Queries
@@ -34,8 +34,8 @@ class Fold:
 
     def split(self, examples: Sequence[Example]) -> tuple[list[Example], list[Example]]:
         """Return the examples to train from, and those held out."""
-        held = set(self.held_out)
-        rest = [example for i, example in enumerate(examples) if i not in held]
+        indices = set(self.held_out)
+        rest = [example for i, example in enumerate(examples) if i not in indices]
         return rest, [examples[i] for i in self.held_out]
 
 
@@ -53,13 +53,13 @@ def clip_folds(examples: Sequence[Example]) -> list[Fold]:
             "held out (clips.recording states recordings)"
         )
     if len(recordings) > MANY:
-        recordings = [sum(recordings[part::PARTS], ()) for part in range(PARTS)]
+        recordings = [sum(recordings[start::PARTS], ()) for start in range(PARTS)]
     return [Fold(clips) for clips in recordings]
 
 
 def performer_folds(examples: Sequence[Example]) -> list[Fold]:
     """Return folds that hold out every performer once, with all of their clips."""
-    return [Fold(own) for own in _groups([example.row.performer for example in examples])]
+    return [Fold(clips) for clips in _groups([example.row.performer for example in examples])]
 
 
 def _groups(names: Sequence[str]) -> list[tuple[int, ...]]:
@@ -95,27 +95,27 @@ class SupportFlags:
         )
 
 
-def measure_flags(controls: Floats, names: Sequence[str], parts: Sequence[Fold]) -> SupportFlags:
+def measure_flags(controls: Floats, names: Sequence[str], folds: Sequence[Fold]) -> SupportFlags:
     """Return the flags over controls (N, d) of clips held out by folds."""
     alarms, beyond = [], []
-    for fold in parts:
+    for fold in folds:
         is_held = np.isin(np.arange(len(controls)), fold.held_out)
-        held, fitted = controls[is_held], support.fit_support(controls[~is_held])
-        alarms.append(~fitted.supported(held))
-        flagged = [_flagged_beyond(fitted, held, control) for control in range(len(names))]
+        points, fitted = controls[is_held], support.fit_support(controls[~is_held])
+        alarms.append(~fitted.supported(points))
+        flagged = [_flagged_beyond(fitted, points, control) for control in range(len(names))]
         beyond.append(np.stack(flagged, axis=1))
     shares = np.concatenate(beyond).mean(axis=0).tolist()
     return SupportFlags(float(np.concatenate(alarms).mean()), dict(zip(names, shares, strict=True)))
 
 
-def _flagged_beyond(fitted: support.Support, held: Floats, control: int) -> Floats:
+def _flagged_beyond(fitted: support.Support, points: Floats, control: int) -> Floats:
     """Return the share (H,) of both ends of a control beyond which each held clip is flagged."""
     room = BEYOND_SHARE * (fitted.high - fitted.low)[control]
     flagged = []
     for end in (fitted.low[control] - room, fitted.high[control] + room):
-        moved = held.copy()
-        moved[:, control] = end
-        flagged.append(~fitted.supported(moved))
+        outside = points.copy()
+        outside[:, control] = end
+        flagged.append(~fitted.supported(outside))
     return np.asarray(np.mean(flagged, axis=0))
 
 
@@ -179,7 +179,6 @@ class TrainedFold:
     rest: clips that it was trained on. captured: motions of those held out.
     """
 
-    recipe: Recipe
     trained: TrainedModel
     fold: Fold
     rest: Sequence[Example]
@@ -207,8 +206,8 @@ def run_protocol(
     Raises TrainingError if the examples that remain are too few to train from.
     """
     listed = folds_of(examples, protocol)
-    parts = jobs.run(run_fold, [(fold,) for fold in listed], (recipe, examples))
-    return held_out_result(recipe, examples, protocol, with_progress(parts, len(listed), report))
+    results = jobs.run(run_fold, [(fold,) for fold in listed], (recipe, examples))
+    return held_out_result(recipe, examples, protocol, with_progress(results, len(listed), report))
 
 
 def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) -> Iterator[Any]:
@@ -222,32 +221,32 @@ def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) 
 def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> PartialResult:
     """Return the result for the clips of one fold. Raises TrainingError as `run_protocol` does."""
     trained = train_fold(recipe, examples, fold)
-    return compare_fold(trained, predictions.predict(recipe, trained.trained, trained.queries))
+    return compare_fold(trained, predictions.predict(trained.trained, trained.queries))
 
 
 def train_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> TrainedFold:
     """Return the model of the clips that a fold does not hold out."""
-    rest, held = fold.split(examples)
+    rest, held_out = fold.split(examples)
     try:
         trained = train_examples(recipe, rest)
     except TrainingError as error:
-        named = ", ".join(sorted({example.row.place.name for example in held}))
-        raise TrainingError(f"with {named} held out: {error}") from error
-    queries = Queries(np.stack([e.controls for e in held]), [e.row.labels for e in held])
+        file_names = ", ".join(sorted({example.row.place.name for example in held_out}))
+        raise TrainingError(f"with {file_names} held out: {error}") from error
+    queries = Queries(np.stack([e.controls for e in held_out]), [e.row.labels for e in held_out])
     # As captured: closing a cycle moves joints, which would favour what closes the same way.
     captured = [
         motion_errors.motion_of_clip(
             example.captured or example.clip,
-            predictions.captured_event(recipe, trained, example.landmarks),
+            predictions.captured_event(trained, example.landmarks),
         )
-        for example in held
+        for example in held_out
     ]
-    return TrainedFold(recipe, trained, fold, rest, held, queries, captured)
+    return TrainedFold(trained, fold, rest, held_out, queries, captured)
 
 
 def compare_fold(fold: TrainedFold, predicted: Predictions) -> PartialResult:
     """Return the errors of predictions for the clips that are held out."""
-    feet = tuple(map(fold.trained.skeleton.names.index, fold.recipe.motion.feet))
+    feet = tuple(map(fold.trained.skeleton.names.index, fold.trained.recipe.motion.feet))
     errors = motion_errors.compare_methods(predicted.motions, fold.captured, feet)
     contacts = _contact_accuracies(fold)
     return PartialResult(
@@ -268,8 +267,9 @@ def _contact_accuracies(fold: TrainedFold) -> list[ContactAccuracy]:
         return np.zeros((len(durations), len(shares), 0)) if contacts is None else contacts
 
     joints = [statistics.joint for statistics in fitted.statistics]
-    clips = HeldOutClips(fold.rest, fold.held_out)
-    return contact_model.held_out_accuracies(fold.recipe, clips, joints, predict)
+    return contact_model.held_out_accuracies(
+        fold.trained.recipe, fold.rest, fold.held_out, joints, predict
+    )
 
 
 def held_out_result(
@@ -302,32 +302,32 @@ def merge(
     results: Iterator[PartialResult],
 ) -> EvaluationResult:
     """Merge results for some of the clips, in any order, into one."""
-    parts = sorted(results, key=lambda part: part.clips)
+    ordered = sorted(results, key=lambda result: result.clips)
     # A fold that leaves one performer lacks the methods that distinguish performers.
-    names = dict.fromkeys(name for part in parts for name in part.errors)
+    names = dict.fromkeys(name for result in ordered for name in result.errors)
 
     def errors_of(name: str) -> Callable[[PartialResult], Sequence[MotionErrors | None]]:
-        return lambda part: part.errors.get(name, [None] * len(part.clips))
+        return lambda result: result.errors.get(name, [None] * len(result.clips))
 
     return EvaluationResult(
         recipe.name,
         protocol,
         tuple(clips),
-        {name: in_order(parts, errors_of(name)) for name in names},
-        np.array(in_order(parts, lambda part: part.sigma)),
-        np.array(in_order(parts, lambda part: part.joint_sigma)),
+        {name: in_order(ordered, errors_of(name)) for name in names},
+        np.array(in_order(ordered, lambda result: result.sigma)),
+        np.array(in_order(ordered, lambda result: result.joint_sigma)),
         joints,
         tuple(recordings),
-        contacts=tuple(in_order(parts, lambda part: part.contacts)),
+        contacts=tuple(in_order(ordered, lambda result: result.contacts)),
         has_positions=recipe.curves is None or not recipe.curves.alone,
     )
 
 
-def in_order(parts: Sequence[Any], values: Callable[[Any], Sequence[Any]]) -> list[Any]:
+def in_order(results: Sequence[Any], values: Callable[[Any], Sequence[Any]]) -> list[Any]:
     """Return a value of each clip in the order of the clips; empty where some have none.
 
     parts: each with `clips`, indices of which `values` are.
     """
-    order = np.argsort([clip for part in parts for clip in part.clips])
-    listed = [value for part in parts for value in values(part)]
+    order = np.argsort([clip for result in results for clip in result.clips])
+    listed = [value for result in results for value in values(result)]
     return [listed[i] for i in order] if len(listed) == len(order) else []

@@ -264,10 +264,10 @@ def trust_text(result: EvaluationResult) -> list[str]:
     flags = [result.flags.text()] if result.flags else []
     if not ratios:
         return [f"sigma ratio by joint: {NOT_APPLICABLE}, the clips have no skeleton", *flags]
-    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    steadiest, worst = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
     joints = (
         f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
-        f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
+        f"from {ratios[steadiest]:.2f} ({steadiest}) to {ratios[worst]:.2f} ({worst})"
     )
     contacts = [contact_model.accuracy_text(result.contacts)] if result.contacts else []
     return [joints, *flags, *contacts]

@@ -199,8 +199,10 @@ def _drawn_clip(trained: TrainedModel, clip: int) -> tuple[dict[str, Any], Chart
     alt = f"Stick figures of {facts['clip']}: as captured, and as predicted from other clips."
     bones = [(parent, child) for child, parent in enumerate(figure.parents) if parent >= 0]
     bones += [(joint, len(figure) + tip) for tip, joint in enumerate(figure.tip_joints)]
-    moved = captured[:, : len(figure)] - captured[:, : len(figure)].mean(axis=0)
-    direction = widest_direction(np.concatenate([moved, (captured - predicted)[:, : len(figure)]]))
+    centred = captured[:, : len(figure)] - captured[:, : len(figure)].mean(axis=0)
+    direction = widest_direction(
+        np.concatenate([centred, (captured - predicted)[:, : len(figure)]])
+    )
     return facts, _draw_strip(captured, predicted, bones, direction, alt, caption)
 
 
@@ -220,8 +222,8 @@ def body_points(trained: TrainedModel, clip: int, motion: Floats) -> Floats:
     translations = skeleton.translations(example.offsets, root)
     figure = example.clip.skeleton
     joints, turns = skeleton.forward_kinematics(figure.parents, rotations, translations)
-    ends = list(figure.tip_joints)
-    tips = joints[:, ends] + quat.rotate(turns[:, ends], figure.tip_offsets)
+    tip_joints = list(figure.tip_joints)
+    tips = joints[:, tip_joints] + quat.rotate(turns[:, tip_joints], figure.tip_offsets)
     return np.concatenate([joints, tips], axis=1)
 
 
@@ -257,8 +259,8 @@ def _draw_strip(
     shifts = np.zeros((FRAMES, 1, 2))
     shifts[:, 0, 0] = step * np.arange(FRAMES) - left + 0.5 * MARGIN
     # A family of a single joint has no bones.
-    ends = np.array(bones, dtype=np.int64).reshape(-1, 2)
-    lines = [(points + shifts)[:, ends] for points in flat]
+    indices = np.array(bones, dtype=np.int64).reshape(-1, 2)
+    lines = [(points + shifts)[:, indices] for points in flat]
     floor = float(lines[0][..., 1].min(initial=0.0))
     width, height = step * FRAMES, max(float(ys[..., 1].max()) for ys in lines) - floor
     height += 0.5 * MARGIN

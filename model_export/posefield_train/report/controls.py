@@ -254,8 +254,8 @@ def _paint_calibration(predicted: Floats, actual: Floats, figure: Figure) -> Non
     left, right = figure.subplots(1, 2)
     top = 108 * max(float(predicted.max()), float(actual.max()))
     for times, style, label in ((1.0, "-", "error = sigma"), (2.0, ":", "error = 2 sigma")):
-        ends = [0.0, top / times]
-        left.plot(ends, [0.0, top], style, color=page.INK, linewidth=0.9, label=label)
+        sigmas = [0.0, top / times]
+        left.plot(sigmas, [0.0, top], style, color=page.INK, linewidth=0.9, label=label)
     left.plot(100 * predicted, 100 * actual, ".", color=page.BLUE, markersize=7)
     left.set(xlabel="sigma (cm)", ylabel="error (cm)", xlim=(0, top), ylim=(0, top))
     left.set_title("left-out clips")

@@ -250,9 +250,9 @@ def _limit_text(warps: TimeWarps) -> str:
     )
     if not count:
         return f"{rule}. No clip is near this limit."
-    ends = int(np.sum(warps.at_limit & (np.abs(warps.change_times - 0.5) > 0.5 - END_SHARE)))
+    near_ends = int(np.sum(warps.at_limit & (np.abs(warps.change_times - 0.5) > 0.5 - END_SHARE)))
     return (
-        f"{rule}. {count} of {len(warps.maps)} clips are at this limit, {ends} of them in the "
+        f"{rule}. {count} of {len(warps.maps)} clips are at this limit, {near_ends} of them in the "
         "first or last tenth. There it usually means that the clip was cut at another phase "
         "than the others, and elsewhere that it pauses where the others do not."
     )

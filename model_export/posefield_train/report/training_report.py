@@ -102,9 +102,9 @@ def render(
     page = Page(
         "training report", card.name, card.description, key_values, [*sections, TERMS_SECTION]
     )
-    parts = {section.name: significant_digits.round_all(section.facts) for section in sections}
+    facts = {section.name: significant_digits.round_all(section.facts) for section in sections}
     text = json.dumps(
-        {"report": REPORT_VERSION, **parts},
+        {"report": REPORT_VERSION, **facts},
         indent=1,
         sort_keys=True,
         allow_nan=False,
