@@ -99,12 +99,12 @@ def test_a_name_and_clips_of_the_performer_reduce_the_error(results):
     assert new_performers.facts([clips]) == {}
 
 
-def test_clips_to_adapt_with_are_far_apart_and_never_of_the_asked_take(family):
-    held = [replace(e, take=f"take {i // 2}") for i, e in enumerate(family)]
+def test_clips_to_adapt_with_are_far_apart_and_never_of_the_asked_recording(family):
+    held = [replace(e, recording=f"recording {i // 2}") for i, e in enumerate(family)]
     for asked in range(CLIPS):
         shown = new_performers.choose_clips(held, asked, 5)
-        takes = [i // 2 for i in shown]
-        assert len(shown) == 5 == len(set(takes)) and asked // 2 not in takes
+        recordings = [i // 2 for i in shown]
+        assert len(shown) == 5 == len(set(recordings)) and asked // 2 not in recordings
         three = new_performers.choose_clips(held, asked, 3)
         assert set(three) <= set(shown)
         assert np.ptp([held[i].controls[0] for i in three]) >= 7
