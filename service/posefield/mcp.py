@@ -4,8 +4,9 @@ The tools list models, plan a performance and write one to a file.
 """
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -68,31 +69,16 @@ class FileRequest(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True)
-class AgentTool:
-    """A tool: its name, what it does, and the JSON Schemas of its arguments and its result.
-
-    call: returns the result; raises MotionError. writes: whether it writes a file.
-    """
-
-    name: str
-    description: str
-    arguments: Facts
-    result: Facts
-    call: Callable[[Mapping[str, Any]], Facts]
-    writes: bool = False
-
-
-@dataclass(frozen=True)
 class Toolbox:
     """Models that agents may use, and the folder that files are written to."""
 
     models: ModelRegistry
     folder: Path
-    tools: Mapping[str, AgentTool] = field(init=False)
 
-    def __post_init__(self) -> None:
-        listed = (_list_tool(self), _plan_tool(self), _perform_tool(self))
-        object.__setattr__(self, "tools", {tool.name: tool for tool in listed})
+    @cached_property
+    def tools(self) -> dict[str, Tool]:
+        """Tools by name."""
+        return {tool.name: tool for tool in (_list_tool(), _plan_tool(), _perform_tool())}
 
     def call(self, name: str, arguments: Mapping[str, Any]) -> Facts:
         """Return the result of a tool.
@@ -104,7 +90,8 @@ class Toolbox:
             names = ", ".join(self.tools)
             hint = did_you_mean(name, self.tools)
             raise InvalidField("", f"no tool {name!r}{hint}, expected one of {names}")
-        return self.tools[name].call(arguments)
+        calls = {"list_models": self.list_models, "plan_performance": self.plan}
+        return calls.get(name, self.perform)(arguments)
 
     def list_models(self, arguments: Mapping[str, Any]) -> Facts:
         """Return the models, what segment of a script each can be, and its controls."""
@@ -183,7 +170,20 @@ def _object(required: Mapping[str, Facts]) -> Facts:
     }
 
 
-def _list_tool(box: Toolbox) -> AgentTool:
+def _tool(name: str, description: str, arguments: Facts, result: Facts) -> Tool:
+    hints = ToolAnnotations(
+        read_only_hint=name != "perform", idempotent_hint=True, open_world_hint=False
+    )
+    return Tool(
+        name=name,
+        description=description,
+        input_schema=arguments,
+        output_schema=result,
+        annotations=hints,
+    )
+
+
+def _list_tool() -> Tool:
     text, numbers = {"type": "string"}, {"type": "array", "items": {"type": "number"}}
     texts = {"type": "array", "items": text}
     kind = {
@@ -204,29 +204,27 @@ def _list_tool(box: Toolbox) -> AgentTool:
             "labels": {"type": "object", "additionalProperties": texts},
         }
     )
-    return AgentTool(
+    return _tool(
         "list_models",
         "List the models of motions: their names, whether each is for walks or for acts, their "
         "controls with units and ranges, and the names of their joints. Read this first.",
         _object({}),
         _object({"models": {"type": "array", "items": model}}),
-        box.list_models,
     )
 
 
-def _plan_tool(box: Toolbox) -> AgentTool:
-    return AgentTool(
+def _plan_tool() -> Tool:
+    return _tool(
         "plan_performance",
         "Plan one continuous motion through the segments of a script, without making it: when each "
         "segment begins, how well the joins and targets go, and warnings with pointers into the "
         "script. Errors say what to change.",
         _object({"script": contract.schema("PerformanceQuestion")}),
         contract.schema("PerformanceReport"),
-        box.plan,
     )
 
 
-def _perform_tool(box: Toolbox) -> AgentTool:
+def _perform_tool() -> Tool:
     endings = ", ".join(CLIP_ENCODERS)
     file = {
         "type": "string",
@@ -237,7 +235,7 @@ def _perform_tool(box: Toolbox) -> AgentTool:
     }
     report = contract.schema("PerformanceReport")
     path = {"type": "string", "description": "Path of the written file."}
-    return AgentTool(
+    return _tool(
         "perform",
         "Write one continuous motion through the segments of a script to a file, and return its "
         "path and its report. The same script gives the same bytes.",
@@ -247,8 +245,6 @@ def _perform_tool(box: Toolbox) -> AgentTool:
             "properties": {"file": path, **report["properties"]},
             "required": ["file", *report["required"]],
         },
-        box.perform,
-        writes=True,
     )
 
 
@@ -262,7 +258,7 @@ def server(box: Toolbox) -> Server[Any]:
     turns = CapacityLimiter(1)
 
     async def list_tools(context: Any, params: Any) -> ListToolsResult:
-        return ListToolsResult(tools=[_described(tool) for tool in box.tools.values()])
+        return ListToolsResult(tools=list(box.tools.values()))
 
     async def call_tool(context: Any, params: CallToolRequestParams) -> CallToolResult:
         arguments = params.arguments or {}
@@ -282,31 +278,14 @@ async def _serve(server: Server[Any]) -> None:
         await server.run(incoming, outgoing, server.create_initialization_options())
 
 
-def _described(tool: AgentTool) -> Tool:
-    return Tool(
-        name=tool.name,
-        description=tool.description,
-        input_schema=tool.arguments,
-        output_schema=tool.result,
-        annotations=ToolAnnotations(
-            read_only_hint=not tool.writes, idempotent_hint=True, open_world_hint=False
-        ),
-    )
-
-
 def _result(box: Toolbox, name: str, arguments: dict[str, Any]) -> CallToolResult:
     """Return the result of a tool, or what is wrong with its arguments, for the agent to mend."""
     try:
         answer = box.call(name, arguments)
     except MotionError as fault:
-        text = TextContent(text=error_text(fault))
+        # The field of a QueryError is a JSON pointer to the cause in the arguments.
+        pointer = "/" if isinstance(fault, QueryError) and fault.field else ""
+        text = TextContent(text=f"{pointer}{fault}")
         return CallToolResult(content=[text], is_error=True)
     text = TextContent(text=orjson.dumps(answer).decode())
     return CallToolResult(content=[text], structured_content=answer)
-
-
-def error_text(fault: MotionError) -> str:
-    """Return an error in one line, with a JSON pointer to its cause in the arguments."""
-    if isinstance(fault, QueryError) and fault.field:
-        return f"/{fault}"
-    return str(fault)

@@ -30,9 +30,9 @@ def box(registry, tmp_path):
 def called(box, name, arguments):
     """The result of a tool, after its arguments and the result have passed their schemas."""
     tool = box.tools[name]
-    jsonschema.validate(arguments, tool.arguments, jsonschema.Draft202012Validator)
+    jsonschema.validate(arguments, tool.input_schema, jsonschema.Draft202012Validator)
     found = json.loads(json.dumps(box.call(name, arguments)))
-    jsonschema.validate(found, tool.result, jsonschema.Draft202012Validator)
+    jsonschema.validate(found, tool.output_schema, jsonschema.Draft202012Validator)
     return found
 
 
@@ -66,7 +66,9 @@ def test_a_link_in_the_folder_is_replaced_and_leads_nowhere_else(box, tmp_path):
 
 
 def test_only_performing_writes(box, tmp_path):
-    assert [tool.name for tool in box.tools.values() if tool.writes] == ["perform"]
+    assert [tool.name for tool in box.tools.values() if not tool.annotations.read_only_hint] == [
+        "perform"
+    ]
     called(box, "list_models", {})
     called(box, "plan_performance", {"script": WALKS})
     assert list(tmp_path.iterdir()) == []

@@ -149,9 +149,11 @@ def export(
         () if character is None else character.facts,
     )
     shard = Shard.parse(execution.shard)
-    target = _absolute(output) if execution.scheduler else output
+    # Workers of a cluster have other working folders.
+    local = execution.scheduler and not target.URL.match(output)
+    location = str(Path(output).absolute()) if local else output
     with _runner(execution) as runner, ExportMonitor() as monitor:
-        work = WorkerInput(job, content, target, execution.skip_errors, character)
+        work = WorkerInput(job, content, location, execution.skip_errors, character)
         outcome = run.run(work, source, monitor, runner, shard, execution.verify)
     _finish(output, outcome, monitor, execution.verify, json)
 
@@ -177,11 +179,6 @@ def _character(output: str, execution: RunArguments) -> "UserCharacter | None":
     if character is not None:
         run.check_character_layout(execution.layout)
     return character
-
-
-def _absolute(output: str) -> str:
-    """Return the target with an absolute path, valid in any folder; URLs unchanged."""
-    return output if target.URL.match(output) else str(Path(output).absolute())
 
 
 class ExportMonitor:
@@ -250,33 +247,33 @@ class ExportMonitor:
 
 
 def _finish(
-    target: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool, json: bool
+    location: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool, json: bool
 ) -> None:
     """Print the outcome; exit with the code that shells expect after a signal."""
     if json:
         facts = {
-            "target": target,
+            "target": location,
             "rows": outcome.rows,
             "done": outcome.done,
             "seconds": monitor.seconds,
             "export": outcome.facts,
         }
         typer.echo(as_json(facts))
-    typer.echo(_summary(target, outcome, monitor, verify), err=json)
+    typer.echo(_summary(location, outcome, monitor, verify), err=json)
     if monitor.signal and outcome.done < outcome.rows:
         raise typer.Exit(128 + monitor.signal)
 
 
-def _summary(target: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool) -> str:
+def _summary(location: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool) -> str:
     if outcome.done < outcome.rows:
         return (
-            f"{target}: stopped when {outcome.done} of {outcome.rows} clips were finished; the "
+            f"{location}: stopped when {outcome.done} of {outcome.rows} clips were finished; the "
             "same command resumes the export"
         )
     if outcome.facts is None:
-        return f"{target}: clips of this part: {outcome.rows}, all finished; other parts are not"
+        return f"{location}: clips of this part: {outcome.rows}, all finished; other parts are not"
     facts = outcome.facts
-    text = f"{target}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
+    text = f"{location}: {facts['clips']} clips, {facts['bytes'] / 1e6:.1f} MB"
     if facts["warned"]:
         text += f", with a warning in the manifest: {facts['warned']}"
     if facts["skipped"]:

@@ -84,12 +84,12 @@ def with_question_options(
 
         @functools.wraps(command)
         def run(**values: Any) -> None:
-            fields = {
+            question_fields = {
                 p.field: _value(p, values.pop(p.field), defaults[p.field]) for p in shown_parameters
             }
             if CONTROLS_FIELD in form.__struct_fields__:
-                fields[CONTROLS_FIELD] = parse_controls(values.pop("control", None) or [])
-            command(question=form(**fields), **values)
+                question_fields[CONTROLS_FIELD] = parse_controls(values.pop("control", None) or [])
+            command(question=form(**question_fields), **values)
 
         arguments = [p.replace(kind=p.KEYWORD_ONLY) for p in (*first, *options, *last)]
         run.__signature__ = inspect.Signature(arguments)  # type: ignore[attr-defined]

@@ -240,33 +240,11 @@ def checked_order(
     frames or bytes beyond the limits of the settings.
     """
     order, flat = orders.from_question(question), question.instancing == "flatten"
-    _check_size(order, flat, settings)
-    skeleton, curves = card.skeleton, len(card.curves)
-    points = character.body_size(skeleton, question.body or DEFAULT_BODY)
-    motions = order.motions or order.count
-    frames = walking_crowd.frame_count(motions, order.seconds, order.fps, order.seed)
-    counts = CrowdCounts(len(skeleton), order.count, motions, frames, points, curves)
-    _check_output(counts, flat, ending, settings)
-    return order
-
-
-def _check_output(counts: CrowdCounts, flat: bool, ending: str, settings: Settings) -> None:
-    size = crowd_size.file_size_bound(counts, ending, flat)
-    if size > settings.output_limit:
-        raise InvalidField(
-            "count",
-            f"{size / 1e6:.1f} MB for {counts.characters} characters and {counts.motions} motions "
-            f"of {counts.frames} frames as {ending}, expected at most "
-            f"{settings.output_limit / 1e6:.1f} MB",
-        )
-
-
-def _check_size(order: CrowdOrder, flat: bool, settings: Settings) -> None:
     if order.count > settings.crowd_limit:
         raise InvalidField("count", f"{order.count}, expected at most {settings.crowd_limit}")
     # A flattened layer has a copy of the motion for each character.
-    shared = None if flat else order.motions
-    poses = walking_crowd.poses(shared or order.count, order.seconds, order.fps)
+    copies = order.count if flat else order.motions or order.count
+    poses = walking_crowd.poses(copies, order.seconds, order.fps)
     if poses > settings.crowd_poses:
         raise InvalidField(
             "count", f"{poses:.3g} poses of all motions, expected at most {settings.crowd_poses}"
@@ -276,6 +254,18 @@ def _check_size(order: CrowdOrder, flat: bool, settings: Settings) -> None:
         raise InvalidField(
             "seconds", f"{longest:.6g} frames of a motion, expected at most {settings.crowd_frames}"
         )
+    points = character.body_size(card.skeleton, question.body or DEFAULT_BODY)
+    motions = order.motions or order.count
+    frames = walking_crowd.frame_count(motions, order.seconds, order.fps, order.seed)
+    counts = CrowdCounts(len(card.skeleton), order.count, motions, frames, points, len(card.curves))
+    size = crowd_size.file_size_bound(counts, ending, flat)
+    if size > settings.output_limit:
+        raise InvalidField(
+            "count",
+            f"{size / 1e6:.1f} MB for {order.count} characters and {motions} motions of {frames} "
+            f"frames as {ending}, expected at most {settings.output_limit / 1e6:.1f} MB",
+        )
+    return order
 
 
 async def answer_crowd(request: ServiceRequest) -> Response:

@@ -212,10 +212,10 @@ _WEIGHT = re.compile(r"q=(0(?:\.[0-9]{0,3})?|1(?:\.0{0,3})?)", re.IGNORECASE)
 
 def parse_weights(header: str) -> list[tuple[str, float]]:
     """Return the names, in lower case, and their weights; 1 for a missing or invalid weight."""
-    return [_parse_weight(member) for member in header.split(",") if member.strip()]
-
-
-def _parse_weight(member: str) -> tuple[str, float]:
-    name, *parameters = (piece.strip() for piece in member.split(";"))
-    weights = [match for match in map(_WEIGHT.fullmatch, parameters) if match]
-    return name.lower(), float(weights[0][1]) if weights else 1.0
+    pairs = []
+    for member in filter(str.strip, header.split(",")):
+        name, *parameters = map(str.strip, member.split(";"))
+        matches = filter(None, map(_WEIGHT.fullmatch, parameters))
+        weight = next(matches, None)
+        pairs.append((name.lower(), float(weight[1]) if weight else 1.0))
+    return pairs

@@ -15,7 +15,6 @@ from posefield.registry.model_registry import (
     LoadFailure,
     ModelRegistry,
     RegistryProvider,
-    ReloadStatistics,
 )
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -50,10 +49,18 @@ class Readiness:
             names = ", ".join(name for name in wrong if may_read(name.partition("@")[0]))
             detail = f"not as when opened answers {names or 'a model'}"
             raise RequestError(problems.NOT_READY, detail)
+        reloads = self.models.reloads
+        changed = datetime.fromtimestamp(reloads.changed, UTC).isoformat(timespec="seconds")
         return {
             "status": "ready",
             "models": [m.identity for m in library.models.values() if may_read(m.name)],
-            "reload": _reload_facts(self.models.reloads, may_read),
+            "reload": {
+                "looks": reloads.looks,
+                "opened": reloads.opened,
+                "failed": reloads.failed,
+                "changed": changed,
+                "faults": [_fault_facts(fault) for fault in reloads.faults if may_read(fault.name)],
+            },
         }
 
     def _tested(self, library: ModelRegistry) -> list[str]:
@@ -76,16 +83,6 @@ def _gives_trial_output(model: Synthesizer) -> bool:
         return model.session.run_trial() == model.session.golden
     except Exception:  # onnxruntime's exceptions share no base of their own
         return False
-
-
-def _reload_facts(reloads: ReloadStatistics, may_read: Callable[[str], bool]) -> dict[str, Any]:
-    return {
-        "looks": reloads.looks,
-        "opened": reloads.opened,
-        "failed": reloads.failed,
-        "changed": datetime.fromtimestamp(reloads.changed, UTC).isoformat(timespec="seconds"),
-        "faults": [_fault_facts(fault) for fault in reloads.faults if may_read(fault.name)],
-    }
 
 
 def _fault_facts(fault: LoadFailure) -> dict[str, str]:

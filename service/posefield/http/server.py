@@ -249,7 +249,7 @@ def _application(
     models: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
 ) -> App:
     sys.setswitchinterval(worker_threads.SWITCH_INTERVAL)
-    log = telemetry.to_standard_error() if settings.log == "on" else None
+    log = telemetry.LogBuffer(sys.stderr.fileno()) if settings.log == "on" else None
     background = partial(lifespan, models=models, announcement=announcement)
     return create_app(Readiness(models), settings, log, background)
 

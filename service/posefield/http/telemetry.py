@@ -7,7 +7,6 @@ request's time.
 import asyncio
 import os
 import re
-import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -39,12 +38,8 @@ class LogBuffer:
         """Write the buffer."""
         lines, self._buffer = self._buffer, []
         for piece in _pieces(lines):
-            _write(self._target, piece)
-
-
-def _write(target: int, piece: bytes) -> None:
-    while piece:
-        piece = piece[os.write(target, piece) :]
+            while piece:
+                piece = piece[os.write(self._target, piece) :]
 
 
 def _pieces(lines: list[bytes]) -> list[bytes]:
@@ -57,11 +52,6 @@ def _pieces(lines: list[bytes]) -> list[bytes]:
         pieces[-1].append(line)
         size += len(line)
     return [b"".join(piece) for piece in pieces if piece]
-
-
-def to_standard_error() -> LogBuffer:
-    """Return a log buffer for standard error."""
-    return LogBuffer(sys.stderr.fileno())
 
 
 def timestamp(seconds: float) -> str:

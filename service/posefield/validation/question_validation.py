@@ -87,11 +87,6 @@ def implausible_duration(card: ModelCard, duration: float) -> str:
     )
 
 
-def accepted_names(performers: tuple[str, ...]) -> str:
-    """Return the accepted performers as text for a message."""
-    return f"one of {', '.join(performers)}" if performers else "none: this model knows none"
-
-
 ROUNDING = 1e-6
 """Excess of a sum of weights over one that is the rounding of clients."""
 
@@ -120,7 +115,8 @@ def label_weights(
 def check_name(field: str, name: str, names: tuple[str, ...]) -> None:
     """Raise InvalidField for a name that is not among the known ones of its label set."""
     if name not in names:
-        expected = f"expected {accepted_names(names)}"
+        expected = "expected "
+        expected += f"one of {', '.join(names)}" if names else "none: this model knows none"
         raise InvalidField(field, f"{name!r}{did_you_mean(name, names)}, {expected}")
 
 

@@ -136,17 +136,13 @@ def request_error_response(request: Request, fault: RequestError) -> Response:
 
 def query_error_response(request: Request, error: QueryError) -> Response:
     """Return the response to a QueryError."""
-    location = _error_location(error, in_body=request.method == "POST")
-    errors = [{**location, "detail": _shortened(error.message)}]
-    return _problem_response(
-        request, _problem_kind(error, request.method), _shortened(str(error)), errors
-    )
-
-
-def _problem_kind(error: QueryError, method: str) -> ProblemKind:
+    in_body = request.method == "POST"
     if isinstance(error, FormError):
-        return BAD_BODY if method == "POST" else BAD_PARAMETER
-    return QUERY_ERROR_PROBLEMS[type(error)]
+        kind = BAD_BODY if in_body else BAD_PARAMETER
+    else:
+        kind = QUERY_ERROR_PROBLEMS[type(error)]
+    errors = [{**_error_location(error, in_body), "detail": _shortened(error.message)}]
+    return _problem_response(request, kind, _shortened(str(error)), errors)
 
 
 def nested_error(error: QueryError, where: str) -> RequestError:
