@@ -136,7 +136,7 @@ class _Bodies:
         changes = np.empty(by_leg.shape)
         for change, path, leg in zip(changes, by_leg, self.legs, strict=True):
             change[:] = path - self.poses.position(leg.tip)
-        whole = followed + lowered
+        root_lowered = followed + lowered
         for motion, (request, poses) in enumerate(
             zip(self.requests, self.poses.split(), strict=True)
         ):
@@ -151,7 +151,7 @@ class _Bodies:
                     for path, row in zip(by_leg[:, frames], stances, strict=True)
                 ),
                 changes[:, frames],
-                whole[frames],
+                root_lowered[frames],
                 followed[frames],
                 float(grounded[motion]),
                 poses,

@@ -261,12 +261,12 @@ class _Placing:
         ways, factors = self.ways[motions], self.factors[motions]
         earlier = floor_plane.at_height(np.conj(factors) * (floor - ways), heights)
         later = floor_plane.at_height(ways + factors * floor, heights)
-        over, begun = cyclic & (last >= counts), cyclic & (first == 0)
+        over, from_start = cyclic & (last >= counts), cyclic & (first == 0)
         return (
-            np.concatenate([motions, motions[over], motions[begun]]),
-            np.concatenate([first, (first - counts)[over], counts[begun]]),
-            np.concatenate([last, (last - counts)[over], (last + counts)[begun]]),
-            np.concatenate([anchors, earlier[over], later[begun]]),
+            np.concatenate([motions, motions[over], motions[from_start]]),
+            np.concatenate([first, (first - counts)[over], counts[from_start]]),
+            np.concatenate([last, (last - counts)[over], (last + counts)[from_start]]),
+            np.concatenate([anchors, earlier[over], later[from_start]]),
         )
 
 

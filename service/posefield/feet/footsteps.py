@@ -77,12 +77,12 @@ class Led:
         return up, down
 
 
-def joined(found: Sequence[Led]) -> Led:
+def joined(leads: Sequence[Led]) -> Led:
     """Return the leads of motions whose frames lie one after another."""
     feet, limbs = (
-        np.concatenate([getattr(own, n) for own in found], axis=1) for n in ("feet", "limbs")
+        np.concatenate([getattr(lead, n) for lead in leads], axis=1) for n in ("feet", "limbs")
     )
-    return Led(feet, limbs, np.concatenate([own.root for own in found]))
+    return Led(feet, limbs, np.concatenate([lead.root for lead in leads]))
 
 
 def always(feet: int, limbs: int, frames: int) -> Led:
@@ -239,36 +239,36 @@ class LimbChoice:
 
 
 def choose_limbs(
-    parents: tuple[int, ...], bones: Bones, feet: Sequence[int], held: Iterable[int]
+    parents: tuple[int, ...], bones: Bones, feet: Sequence[int], exact_joints: Iterable[int]
 ) -> LimbChoice:
     """Return the legs of feet, and the limbs that keep the paths of joints with constraints.
 
-    held: joints whose positions are exact. A leg with such a joint keeps its path; a joint of the
-    trunk keeps the root at its height.
+    exact_joints: joints whose positions are exact. A leg with such a joint keeps its path; a joint
+    of the trunk keeps the root at its height.
     """
-    joints = set(held)
+    joints = set(exact_joints)
     legs: dict[int, Limb] = {}
     left: list[tuple[int, str]] = []
-    kept: list[Limb] = []
+    kept_limbs: list[Limb] = []
     used: set[int] = set()
-    for place, foot in enumerate(feet):
+    for index, foot in enumerate(feet):
         leg = limbs.find_limb(parents, bones, foot)
         chain = set() if leg is None else {leg.upper, leg.middle, leg.lower}
         if leg is None:
             left.append((foot, "is as predicted: no two bones lead to it"))
         elif chain & used:
             left.append((foot, "is as predicted: its leg moves another foot"))
-        elif own := {
+        elif below := {
             joint for joint in joints if leg.lower in skeleton.joint_chain(parents, joint)
         }:
             left.append((foot, "is as predicted: its leg meets an exact target"))
-            kept.append(leg)
-            joints -= own
+            kept_limbs.append(leg)
+            joints -= below
         else:
-            legs[place] = leg
+            legs[index] = leg
         used |= chain
     arms, fixed = _arms(parents, bones, joints, used)
-    character = Character(parents, bones, tuple(legs.values()), (*kept, *arms), fixed)
+    character = Character(parents, bones, tuple(legs.values()), (*kept_limbs, *arms), fixed)
     return LimbChoice(character, tuple(legs), tuple(left))
 
 
@@ -276,16 +276,16 @@ def _arms(
     parents: tuple[int, ...], bones: Bones, joints: set[int], used: set[int]
 ) -> tuple[list[Limb], bool]:
     """Return the limbs that keep the paths of joints, and whether a joint has none."""
-    found: list[Limb] = []
+    arms: list[Limb] = []
     for joint in sorted(joints):
         limb = limbs.find_kept_limb(parents, bones, joint)
         chain = set() if limb is None else {limb.upper, limb.middle, limb.lower}
         if limb is None or chain & used:
-            if limb in found or any(
-                own.lower in skeleton.joint_chain(parents, joint) for own in found
+            if limb in arms or any(
+                arm.lower in skeleton.joint_chain(parents, joint) for arm in arms
             ):
                 continue
-            return found, True
+            return arms, True
         used |= chain
-        found.append(limb)
-    return found, False
+        arms.append(limb)
+    return arms, False

@@ -50,7 +50,7 @@ class LimbPoses:
 
     @cached_property
     def _places(self) -> dict[int, int]:
-        return {joint: place for place, joint in enumerate(self.joints)}
+        return {joint: index for index, joint in enumerate(self.joints)}
 
     def position(self, joint: int) -> Points:
         """Return the positions (..., F, 3), m, of a joint of the whole skeleton."""
@@ -66,19 +66,19 @@ class LimbPoses:
 
     def length(self, joint: int) -> Annotated[Floats, "*owners"]:
         """Return the length (..., 1) of the bone that ends at a joint, m; (F,) for groups."""
-        found: Floats = np.linalg.norm(self.bones[..., self._places[joint], :], axis=-1)
-        return found[..., None] if self.groups is None else found[self.groups.group]
+        lengths: Floats = np.linalg.norm(self.bones[..., self._places[joint], :], axis=-1)
+        return lengths[..., None] if self.groups is None else lengths[self.groups.group]
 
     def split(self) -> "list[LimbPoses]":
         """Return the poses of each motion of the groups."""
         assert self.groups is not None
-        parts = zip(
+        motions = zip(
             self.bones,
             self.groups.split(self.positions),
             self.groups.split(self.orientations),
             strict=True,
         )
-        return [LimbPoses(self.joints, self.parents, *own) for own in parts]
+        return [LimbPoses(self.joints, self.parents, *motion) for motion in motions]
 
     def mean(self, values: Points) -> Annotated[Floats, "*characters _ 3"]:
         """Return the mean (..., 1, 3) of values (..., F, 3) over a motion; (F, 3) for groups."""
@@ -96,13 +96,13 @@ def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
     """
     chain = skeleton.joint_chain(tuple(parents), tip)[::-1]
     # The ankle is the tip's parent, or the tip itself. The joint above the hip exists in both.
-    found = [
+    candidates = [
         Limb(chain[first + 2], chain[first + 1], chain[first], tip)
         for first in (1, 0)
         if len(chain) > first + 3
     ]
-    scores = [_similarity(bones, limb) for limb in found]
-    return found[int(np.argmax(scores))] if max(scores, default=0.0) > 0.0 else None
+    scores = [_similarity(bones, limb) for limb in candidates]
+    return candidates[int(np.argmax(scores))] if max(scores, default=0.0) > 0.0 else None
 
 
 def find_kept_limb(parents: Sequence[int], bones: Bones, joint: int) -> Limb | None:
@@ -140,52 +140,56 @@ def evaluate_motions(
     groups: FrameGroups,
 ) -> LimbPoses:
     """Return the poses of the limbs of several motions, one after another; bones (M, J, 3), m."""
-    joints, own = _compact(parents, [limb.tip for limb in limbs])
+    joints, compact_parents = _compact(parents, [limb.tip for limb in limbs])
     arms = bones[:, list(joints)]
-    moved = arms[groups.group]
-    moved[:, 0] = roots
-    found = skeleton.forward_kinematics(own, rotations[:, list(joints)], moved)
-    return LimbPoses(joints, own, arms, *found, groups)
+    translations = arms[groups.group]
+    translations[:, 0] = roots
+    evaluated = skeleton.forward_kinematics(
+        compact_parents, rotations[:, list(joints)], translations
+    )
+    return LimbPoses(joints, compact_parents, arms, *evaluated, groups)
 
 
-def join(found: Sequence[LimbPoses]) -> LimbPoses:
+def join(motions: Sequence[LimbPoses]) -> LimbPoses:
     """Return the poses of the same limbs in several motions, each without groups, as groups."""
-    first = found[0]
+    first = motions[0]
     return LimbPoses(
         first.joints,
         first.parents,
-        np.stack([own.bones for own in found]),
-        np.concatenate([own.positions for own in found]),
-        np.concatenate([own.orientations for own in found]),
-        frame_groups.of_lengths([own.positions for own in found]),
+        np.stack([motion.bones for motion in motions]),
+        np.concatenate([motion.positions for motion in motions]),
+        np.concatenate([motion.orientations for motion in motions]),
+        frame_groups.of_lengths([motion.positions for motion in motions]),
     )
 
 
 def evaluate_joints(
     parents: Sequence[int],
     bones: Annotated[Floats, "*characters joints 3"],
-    wanted: Sequence[int],
+    tips: Sequence[int],
     rotations: Annotated[Floats, "*characters frames joints 4"],
     roots: Points,
 ) -> LimbPoses:
     """Return the poses of joints and of those above them; arguments as for `evaluate_poses`."""
-    joints, own = _compact(parents, wanted)
+    joints, compact_parents = _compact(parents, tips)
     arms = bones[..., list(joints), :]
-    moved = skeleton.translations(arms, roots)
-    found = skeleton.forward_kinematics(own, rotations[..., list(joints), :], moved)
-    return LimbPoses(joints, own, arms, *found)
+    translations = skeleton.translations(arms, roots)
+    evaluated = skeleton.forward_kinematics(
+        compact_parents, rotations[..., list(joints), :], translations
+    )
+    return LimbPoses(joints, compact_parents, arms, *evaluated)
 
 
 def _compact(
-    parents: Sequence[int], wanted: Sequence[int]
+    parents: Sequence[int], tips: Sequence[int]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return joints with those above them, in order, and the place of each one's parent."""
     needed = {0}
-    for joint in wanted:
+    for joint in tips:
         needed.update(skeleton.joint_chain(tuple(parents), joint))
     joints = tuple(sorted(needed))
-    places = {joint: place for place, joint in enumerate(joints)}
-    return joints, tuple(places.get(parents[joint], -1) for joint in joints)
+    indices = {joint: index for index, joint in enumerate(joints)}
+    return joints, tuple(indices.get(parents[joint], -1) for joint in joints)
 
 
 def _similarity(bones: Bones, limb: Limb) -> float:

@@ -48,8 +48,8 @@ class _Chains:
     @property
     def frames(self) -> Annotated[Indices, "chain_frames"]:
         """Return the frames (N,) of the paths."""
-        found: Indices = self.firsts[self.groups.group] + self.groups.frame
-        return found
+        frames: Indices = self.firsts[self.groups.group] + self.groups.frame
+        return frames
 
     @property
     def ends(self) -> tuple[Indices, Indices]:
@@ -59,13 +59,13 @@ class _Chains:
     def sums(self, values: Annotated[Floats, "columns chain_frames"]) -> Sides:
         """Return the sums (C, U, R) over the frames of each unknown."""
         size, chains = int(self.counts.max()), len(self.counts)
-        place = self.unknowns * chains + self.groups.group
-        found = [np.bincount(place, own, size * chains) for own in values]
-        return np.stack(found).reshape(-1, size, chains).astype(np.float64)
+        bins = self.unknowns * chains + self.groups.group
+        sums = [np.bincount(bins, column, size * chains) for column in values]
+        return np.stack(sums).reshape(-1, size, chains).astype(np.float64)
 
-    def spread(self, found: Sides) -> Annotated[Floats, "columns chain_frames"]:
+    def spread(self, solution: Sides) -> Annotated[Floats, "columns chain_frames"]:
         """Return the values (C, N) of unknowns (C, U, R) at their frames."""
-        return found[:, self.unknowns, self.groups.group]
+        return solution[:, self.unknowns, self.groups.group]
 
 
 def smooth_change(
@@ -89,23 +89,25 @@ def smooth_change(
     if not len(rows):
         return path
     if len(rows) < len(changed):
-        found = path.copy()
-        own = changed[feet.rows.groups.group]
-        place = np.cumsum(changed) - 1
-        some = Runs(place[stances.rows], stances.begins, stances.ends)
-        part = None if fixed is None else fixed[own]
-        found[own] = smooth_change(feet.select(rows), path[own], some, values, part)
-        return found
+        smoothed = path.copy()
+        frames = changed[feet.rows.groups.group]
+        new_rows = np.cumsum(changed) - 1
+        some = Runs(new_rows[stances.rows], stances.begins, stances.ends)
+        fixed_frames = None if fixed is None else fixed[frames]
+        smoothed[frames] = smooth_change(
+            feet.select(rows), path[frames], some, values, fixed_frames
+        )
+        return smoothed
     chains = _chains(feet, stances)
     system = _System.of(feet, chains, path, level=not np.iscomplexobj(path))
-    known, given = _known(chains, system.goal.shape, stances, values)
+    fixed_unknowns, fixed_values = _known(chains, system.goal.shape, stances, values)
     if fixed is not None:
         # No path with fixed frames is a cycle.
         single = chains.unknowns[through], chains.groups.group[through]
-        known[single] = True
-        for column, numbers in zip(given, _parts(fixed[through]), strict=True):
+        fixed_unknowns[single] = True
+        for column, numbers in zip(fixed_values, _parts(fixed[through]), strict=True):
             column[single] = numbers
-    return system.path(known, given, values is None and bool(chains.closed.any()))
+    return system.path(fixed_unknowns, fixed_values, values is None and bool(chains.closed.any()))
 
 
 def _chains(feet: FootRows, stances: Runs) -> _Chains:
@@ -135,21 +137,21 @@ def _known(
     values: Annotated[Numbers, "runs"] | None,
 ) -> tuple[Annotated[Booleans, "size chains"], Sides]:
     """Return which unknowns are known, and their values (C, U, R)."""
-    given = np.zeros(shape)
-    known = np.zeros(shape[1:], bool)
-    known[np.arange(shape[1])[:, None] >= chains.counts] = True
+    fixed_values = np.zeros(shape)
+    fixed_unknowns = np.zeros(shape[1:], bool)
+    fixed_unknowns[np.arange(shape[1])[:, None] >= chains.counts] = True
     if values is not None:
         row = stances.rows
         begins = chains.groups.starts[row] + (stances.begins - chains.firsts[row]) % (
             chains.groups.counts[row] - 2 * chains.closed[row]
         )
-        known[chains.unknowns[begins], row] = True
-        last, chain = (own[chains.closed] for own in chains.ends)
-        known[last, chain] = True
-        for column, part in zip(given, _parts(values), strict=True):
-            column[chains.unknowns[begins], row] = part
+        fixed_unknowns[chains.unknowns[begins], row] = True
+        last, chain = (end[chains.closed] for end in chains.ends)
+        fixed_unknowns[last, chain] = True
+        for column, numbers in zip(fixed_values, _parts(values), strict=True):
+            column[chains.unknowns[begins], row] = numbers
             column[last, chain] = column[0, chain]
-    return known, given
+    return fixed_unknowns, fixed_values
 
 
 @dataclass(frozen=True)
@@ -174,61 +176,69 @@ class _System:
             target = places(feet, path, rows, chains.frames)
         weights = (groups.frame < feet.rows.counts[rows]).astype(float)
         stiffness = (SPREAD * feet.rows.rates) ** 4
-        right = np.stack([_right(groups, weights, stiffness, own) for own in _parts(target)])
+        right = np.stack(
+            [_right(groups, weights, stiffness, component) for component in _parts(target)]
+        )
         return cls(feet, chains, _bands(chains, weights, stiffness), chains.sums(right))
 
-    def path(self, known: Annotated[Booleans, "size chains"], given: Sides, joined: bool) -> Paths:
+    def path(
+        self, fixed_unknowns: Annotated[Booleans, "size chains"], fixed_values: Sides, joined: bool
+    ) -> Paths:
         """Return the paths (N,). joined: the places of first stances of cycles are unknown."""
         if joined:
-            found = self._joined(known, given)
+            solution = self._joined(fixed_unknowns, fixed_values)
         else:
-            found = banded_systems.solve(self.bands, self.goal, known, given)
-        whole = self.chains.spread(found)
-        path = whole[0] + 1j * whole[1] if len(whole) > 1 else whole[0]
+            solution = banded_systems.solve(self.bands, self.goal, fixed_unknowns, fixed_values)
+        components = self.chains.spread(solution)
+        path = components[0] + 1j * components[1] if len(components) > 1 else components[0]
         return self._in_cycle(path)
 
-    def _joined(self, known: Annotated[Booleans, "size chains"], given: Sides) -> Sides:
+    def _joined(
+        self, fixed_unknowns: Annotated[Booleans, "size chains"], fixed_values: Sides
+    ) -> Sides:
         """Return the solutions (2, U, R), of cycles with the first place that fits both ends."""
         chains, feet = self.chains, self.feet
-        last, chain = (own[chains.closed] for own in chains.ends)
-        known = known.copy()
-        known[0, chain] = known[last, chain] = True
-        ends = np.zeros((4, *known.shape))
-        ends[:2] = given
-        ends[0, last, chain], ends[1, last, chain] = (
+        last, chain = (end_index[chains.closed] for end_index in chains.ends)
+        fixed_unknowns = fixed_unknowns.copy()
+        fixed_unknowns[0, chain] = fixed_unknowns[last, chain] = True
+        end_values = np.zeros((4, *fixed_unknowns.shape))
+        end_values[:2] = fixed_values
+        end_values[0, last, chain], end_values[1, last, chain] = (
             feet.ways[chain].real,
             feet.ways[chain].imag,
         )
-        ends[2, 0, chain], ends[3, last, chain] = 1.0, 1.0
+        end_values[2, 0, chain], end_values[3, last, chain] = 1.0, 1.0
         goal = np.concatenate([self.goal, np.zeros(self.goal.shape)])
-        found = banded_systems.solve(self.bands, goal, known, ends)
-        left = banded_systems.product(self.bands, found) - goal
+        solution = banded_systems.solve(self.bands, goal, fixed_unknowns, end_values)
+        left = banded_systems.product(self.bands, solution) - goal
         factor = feet.factors[chain]
         first = left[:, 0, chain] + 0j, left[:, last, chain] + 0j
-        begin, end = ((own[0] + 1j * own[1], own[2], own[3]) for own in first)
+        begin, end = (
+            (end_index[0] + 1j * end_index[1], end_index[2], end_index[3]) for end_index in first
+        )
         plain = begin[0] + np.conj(factor) * end[0]
         bent = begin[1] + factor * begin[2] + np.conj(factor) * (end[1] + factor * end[2])
-        place = np.zeros(known.shape[1], complex)
-        place[chain] = -plain / bent
-        turned = place * feet.factors
-        found[0] += place.real * found[2] + turned.real * found[3]
-        found[1] += place.imag * found[2] + turned.imag * found[3]
-        return found[:2]
+        shared = np.zeros(fixed_unknowns.shape[1], complex)
+        shared[chain] = -plain / bent
+        turned = shared * feet.factors
+        solution[0] += shared.real * solution[2] + turned.real * solution[3]
+        solution[1] += shared.imag * solution[2] + turned.imag * solution[3]
+        return solution[:2]
 
     def _in_cycle(self, path: Annotated[Numbers, "chain_frames"]) -> Paths:
         """Return the paths of chains in the frames of the paths, within one cycle."""
         chains, feet = self.chains, self.feet
         rows = chains.groups.group
-        own = chains.groups.frame < feet.rows.counts[rows]
-        row, frames = rows[own], chains.frames[own]
-        found = np.empty(len(row), path.dtype)
-        values = path[own]
+        within = chains.groups.frame < feet.rows.counts[rows]
+        row, frames = rows[within], chains.frames[within]
+        paths = np.empty(len(row), path.dtype)
+        values = path[within]
         if np.iscomplexobj(values):
             after = frames >= feet.rows.counts[row]
             back = np.conj(feet.factors[row]) * (values - feet.ways[row])
             values = np.where(after, back, values)
-        found[feet.rows.flat(row, frames)] = values
-        return found
+        paths[feet.rows.flat(row, frames)] = values
+        return paths
 
 
 def _parts(values: Numbers) -> list[Floats]:
@@ -248,10 +258,10 @@ def _right(
     bent[1:-1] = target[:-2] - 2.0 * target[1:-1] + target[2:]
     bent[groups.starts] = bent[groups.starts + groups.counts - 1] = 0.0
     bent *= stiffness[groups.group]
-    found: Floats = weights * target - 2.0 * bent
-    found[1:] += bent[:-1]
-    found[:-1] += bent[1:]
-    return found
+    sides: Floats = weights * target - 2.0 * bent
+    sides[1:] += bent[:-1]
+    sides[:-1] += bent[1:]
+    return sides
 
 
 def _bands(
@@ -264,21 +274,21 @@ def _bands(
     Unknowns are in the order of their frames, so a second difference couples neighbours alone.
     """
     size, count = int(chains.counts.max()), len(chains.counts)
-    found = np.zeros((3, size, count))
-    found[0] = chains.sums(weights[None])[0]
+    bands = np.zeros((3, size, count))
+    bands[0] = chains.sums(weights[None])[0]
     inner = (chains.groups.frame > 0) & (
         chains.groups.frame < chains.groups.counts[chains.groups.group] - 1
     )
     middle = np.flatnonzero(inner)
     chain = chains.groups.group[middle]
-    own = [chains.unknowns[middle + offset] for offset in (-1, 0, 1)]
+    columns = [chains.unknowns[middle + offset] for offset in (-1, 0, 1)]
     for row in range(3):
         for column in range(row, 3):
-            apart = own[column] - own[row]
+            distance = columns[column] - columns[row]
             # A product off the diagonal of the frames counts twice on that of a stance.
-            share = np.where((apart == 0) & (row != column), 2.0, 1.0)
+            share = np.where((distance == 0) & (row != column), 2.0, 1.0)
             value = stiffness[chain] * share * (BENDS[row] * BENDS[column])
-            place = (apart * size + own[row]) * count + chain
-            found += np.bincount(place, value, 3 * size * count).reshape(3, size, count)
-    found[0][np.arange(size)[:, None] >= chains.counts] = 1.0
-    return found
+            bins = (distance * size + columns[row]) * count + chain
+            bands += np.bincount(bins, value, 3 * size * count).reshape(3, size, count)
+    bands[0][np.arange(size)[:, None] >= chains.counts] = 1.0
+    return bands

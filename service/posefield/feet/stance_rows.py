@@ -81,20 +81,20 @@ class Runs:
     def inner(self, rows: FrameRows) -> Annotated[Booleans, "runs"]:
         """Return which runs touch no end of their row; those of cycles do not."""
         touches = (self.begins == 0) | (self.ends >= rows.counts[self.rows])
-        found: Booleans = rows.cyclic[self.rows] | ~touches
-        return found
+        inner: Booleans = rows.cyclic[self.rows] | ~touches
+        return inner
 
     def mask(self, rows: FrameRows) -> Mask:
         """Return whether each frame (N,) is in one of the runs."""
-        found = np.zeros(len(rows.groups.group), bool)
+        mask = np.zeros(len(rows.groups.group), bool)
         run, frames = self.frames()
-        found[rows.flat(self.rows[run], frames)] = True
-        return found
+        mask[rows.flat(self.rows[run], frames)] = True
+        return mask
 
     def frames(self) -> tuple[PerRun, PerRun]:
         """Return the run and the frame of all frames of all runs, run after run."""
-        own = FrameGroups(self.lengths)
-        return own.group, own.frame + self.begins[own.group]
+        groups = FrameGroups(self.lengths)
+        return groups.group, groups.frame + self.begins[groups.group]
 
     def sort(self) -> "Runs":
         """Return the runs row by row and in order."""
@@ -102,16 +102,16 @@ class Runs:
 
     def of_rows(self, rows: Annotated[Indices, "chosen"]) -> "Runs":
         """Return the runs of some rows, in order, which are counted anew."""
-        own = self.select(np.isin(self.rows, rows))
-        return replace(own, rows=np.searchsorted(rows, own.rows))
+        selected = self.select(np.isin(self.rows, rows))
+        return replace(selected, rows=np.searchsorted(rows, selected.rows))
 
     def by_row(self, rows: int) -> list[tuple[Interval, ...]]:
         """Return the runs of each of R rows."""
-        found: list[list[Interval]] = [[] for _ in range(rows)]
-        ends = zip(self.begins.tolist(), self.ends.tolist(), strict=True)
-        for row, (begin, end) in zip(self.rows.tolist(), ends, strict=True):
-            found[row].append(Interval(begin, end))
-        return [tuple(own) for own in found]
+        by_row: list[list[Interval]] = [[] for _ in range(rows)]
+        intervals = zip(self.begins.tolist(), self.ends.tolist(), strict=True)
+        for row, (begin, end) in zip(self.rows.tolist(), intervals, strict=True):
+            by_row[row].append(Interval(begin, end))
+        return [tuple(row_intervals) for row_intervals in by_row]
 
 
 @dataclass(frozen=True)
@@ -137,10 +137,10 @@ class FootRows:
     def select(self, rows: Annotated[Indices, "chosen"]) -> "FootRows":
         """Return some of the rows."""
         frames = np.isin(self.rows.groups.group, rows)
-        parts = {name: getattr(self, name)[frames] for name in ("floor", "heights", "walking")}
+        selected = {name: getattr(self, name)[frames] for name in ("floor", "heights", "walking")}
         names = ("height", "swing", "longest_swing", "clearance", "ways", "factors")
-        parts |= {name: getattr(self, name)[rows] for name in names}
-        return replace(self, rows=self.rows.select(rows), **parts)
+        selected |= {name: getattr(self, name)[rows] for name in names}
+        return replace(self, rows=self.rows.select(rows), **selected)
 
     @property
     def positions(self) -> Annotated[Floats, "frames 3"]:
@@ -149,8 +149,8 @@ class FootRows:
 
     def contact(self, row: int) -> FootContact:
         """Return the statistics of one row's contacts."""
-        own = (self.height, self.swing, self.longest_swing, self.clearance)
-        return FootContact(0, *(float(values[row]) for values in own))
+        statistics = (self.height, self.swing, self.longest_swing, self.clearance)
+        return FootContact(0, *(float(values[row]) for values in statistics))
 
     def places(self, rows: PerRun, frames: PerRun) -> Annotated[FloorVectors, "runs"]:
         """Return floor points of rows at frames, which may lie within later cycles."""
@@ -161,17 +161,21 @@ def places(
     feet: FootRows, floor: Annotated[FloorVectors, "frames"], rows: PerRun, frames: PerRun
 ) -> Annotated[FloorVectors, "runs"]:
     """Return floor points of paths (N,) at frames, which may lie within later cycles."""
-    found: FloorVectors = floor[feet.rows.flat(rows, frames)]
+    points: FloorVectors = floor[feet.rows.flat(rows, frames)]
     later = np.where(feet.rows.cyclic[rows], frames // feet.rows.counts[rows], 0)
     for cycle in range(int(later.max(initial=0))):
-        moved = feet.ways[rows] + feet.factors[rows] * found
-        found = np.where(later > cycle, moved, found)
-    return found
+        next_cycle = feet.ways[rows] + feet.factors[rows] * points
+        points = np.where(later > cycle, next_cycle, points)
+    return points
 
 
-def from_intervals(found: Sequence[Sequence[Interval]]) -> Runs:
+def from_intervals(rows: Sequence[Sequence[Interval]]) -> Runs:
     """Return the runs of rows, each with its intervals."""
-    runs = [(row, own.begin, own.end) for row, every in enumerate(found) for own in every]
+    runs = [
+        (row, interval.begin, interval.end)
+        for row, intervals in enumerate(rows)
+        for interval in intervals
+    ]
     return Runs(*np.array(runs, np.int64).reshape(-1, 3).T)
 
 
@@ -186,27 +190,27 @@ def runs(down: Mask, rows: FrameRows) -> Runs:
     before, after = np.zeros((2, len(down)), bool)
     before[1:], after[:-1] = down[:-1], down[1:]
     before[starts] = after[starts + counts - 1] = False
-    begins, ends = np.flatnonzero(down & ~before), np.flatnonzero(down & ~after) + 1
+    begins, stops = np.flatnonzero(down & ~before), np.flatnonzero(down & ~after) + 1
     row = rows.groups.group[begins]
-    return _join_over_ends(Runs(row, begins - starts[row], ends - starts[row]), rows)
+    return _join_over_ends(Runs(row, begins - starts[row], stops - starts[row]), rows)
 
 
-def _join_over_ends(found: Runs, rows: FrameRows) -> Runs:
+def _join_over_ends(separate: Runs, rows: FrameRows) -> Runs:
     """Return the runs, in which the last run of a cycle goes on as its first one."""
-    cyclic, counts = rows.cyclic[found.rows], rows.counts[found.rows]
-    first = np.flatnonzero(cyclic & (found.begins == 0))
-    last = np.flatnonzero(cyclic & (found.ends == counts))
-    _, own, other = np.intersect1d(
-        found.rows[first], found.rows[last], assume_unique=True, return_indices=True
+    cyclic, counts = rows.cyclic[separate.rows], rows.counts[separate.rows]
+    first = np.flatnonzero(cyclic & (separate.begins == 0))
+    last = np.flatnonzero(cyclic & (separate.ends == counts))
+    _, first_index, last_index = np.intersect1d(
+        separate.rows[first], separate.rows[last], assume_unique=True, return_indices=True
     )
-    first, last = first[own], last[other]
-    apart = first != last
-    first, last = first[apart], last[apart]
-    ends = found.ends.copy()
-    ends[last] += found.ends[first]
-    kept = np.ones(len(ends), bool)
-    kept[first] = False
-    return replace(found, ends=ends).select(kept)
+    first, last = first[first_index], last[last_index]
+    different = first != last
+    first, last = first[different], last[different]
+    stops = separate.ends.copy()
+    stops[last] += separate.ends[first]
+    remaining = np.ones(len(stops), bool)
+    remaining[first] = False
+    return replace(separate, ends=stops).select(remaining)
 
 
 def tidy(down: Mask, rows: FrameRows) -> Runs:
@@ -216,8 +220,10 @@ def tidy(down: Mask, rows: FrameRows) -> Runs:
     """
     gaps = runs(~down, rows)
     short = gaps.inner(rows) & (gaps.lengths < SHORTEST_GAP * rows.rates[gaps.rows])
-    found = runs(down | gaps.select(short).mask(rows), rows)
-    return found.select(~found.inner(rows) | (found.lengths >= shortest(rows)[found.rows]))
+    contacts = runs(down | gaps.select(short).mask(rows), rows)
+    return contacts.select(
+        ~contacts.inner(rows) | (contacts.lengths >= shortest(rows)[contacts.rows])
+    )
 
 
 def discipline(stances: Runs, feet: FootRows) -> Runs:
@@ -242,48 +248,48 @@ def _swing_frames(swings: Runs, feet: FootRows) -> Mask:
     steps = feet.places(swings.rows, swings.ends) - feet.places(swings.rows, before)
     goes = ~swings.inner(feet.rows) | (np.abs(steps) >= SHORTEST_STEP)
     long = swings.lengths > (feet.longest_swing * feet.rows.rates)[swings.rows]
-    begins, ends = swings.begins.copy(), swings.ends.copy()
+    begins, stops = swings.begins.copy(), swings.ends.copy()
     for run in np.flatnonzero(goes & long & ~_walks(swings, feet)):
-        begins[run], ends[run] = _cut(feet, swings.rows[run], begins[run], ends[run])
-    return Runs(swings.rows, begins, ends).select(goes).mask(feet.rows)
+        begins[run], stops[run] = _cut(feet, swings.rows[run], begins[run], stops[run])
+    return Runs(swings.rows, begins, stops).select(goes).mask(feet.rows)
 
 
 def _walks(swings: Runs, feet: FootRows) -> Annotated[Booleans, "runs"]:
     """Return whether the motion walks during each whole swing."""
     run, frames = swings.frames()
-    own = feet.walking[feet.rows.flat(swings.rows[run], frames)]
-    return FrameGroups(swings.lengths).every(own)
+    walking = feet.walking[feet.rows.flat(swings.rows[run], frames)]
+    return FrameGroups(swings.lengths).every(walking)
 
 
 def _cut(feet: FootRows, row: int, begin: int, end: int) -> tuple[int, int]:
     """Return the frames of a long swing, for the median duration, in which the foot goes most."""
     length = min(max(2, round(float(feet.swing[row] * feet.rows.rates[row]))), end - begin - 1)
     frames = np.arange(begin, end)
-    places = feet.places(np.full(len(frames), row), frames)
-    gone = np.round(np.abs(places[length:] - places[:-length]), MICROMETRES)
+    points = feet.places(np.full(len(frames), row), frames)
+    gone = np.round(np.abs(points[length:] - points[:-length]), MICROMETRES)
     first = begin + int(np.argmax(gone))
     return first, first + length
 
 
-def shortened(found: Runs, beyond: Mask, rows: FrameRows) -> Runs:
+def shortened(stances: Runs, beyond: Mask, rows: FrameRows) -> Runs:
     """Return stances without the frames (N,) beyond reach: of each the longest run that is left.
 
     A stance that becomes too short is dropped.
     """
-    run, frames = found.frames()
-    kept = ~beyond[rows.flat(found.rows[run], frames)]
-    whole = FrameRows(
-        FrameGroups(found.lengths), rows.rates[found.rows], np.zeros(len(found.rows), bool)
+    run, frames = stances.frames()
+    in_reach = ~beyond[rows.flat(stances.rows[run], frames)]
+    stance_rows = FrameRows(
+        FrameGroups(stances.lengths), rows.rates[stances.rows], np.zeros(len(stances.rows), bool)
     )
-    parts = runs(kept, whole)
-    parts = parts.select(np.lexsort((parts.begins, -parts.lengths, parts.rows)))
-    first = np.ones(len(parts.rows), bool)
-    first[1:] = parts.rows[1:] != parts.rows[:-1]
-    parts = parts.select(first & (parts.lengths >= shortest(rows)[found.rows[parts.rows]]))
-    row, begins = found.rows[parts.rows], found.begins[parts.rows] + parts.begins
+    pieces = runs(in_reach, stance_rows)
+    pieces = pieces.select(np.lexsort((pieces.begins, -pieces.lengths, pieces.rows)))
+    first = np.ones(len(pieces.rows), bool)
+    first[1:] = pieces.rows[1:] != pieces.rows[:-1]
+    pieces = pieces.select(first & (pieces.lengths >= shortest(rows)[stances.rows[pieces.rows]]))
+    row, begins = stances.rows[pieces.rows], stances.begins[pieces.rows] + pieces.begins
     # A stance of a cycle begins within it.
     begins = np.where(begins >= rows.counts[row], begins - rows.counts[row], begins)
-    return Runs(row, begins, begins + parts.lengths).sort()
+    return Runs(row, begins, begins + pieces.lengths).sort()
 
 
 def changed_rows(before: Runs, after: Runs, rows: FrameRows) -> Annotated[Indices, "changed"]:
@@ -340,22 +346,22 @@ def statistics(
 
 def heights_above(
     heights: Annotated[Floats, "frames"],
-    found: Runs,
-    usual: Annotated[Floats, "rows"],
+    contacts: Runs,
+    captured_heights: Annotated[Floats, "rows"],
     rows: FrameRows,
 ) -> Annotated[Floats, "rows"]:
     """Return how much higher feet stand than captured ones do (R,), by their medians, m.
 
-    heights: (N,), m. usual: heights (R,), m, of captured feet.
+    heights: (N,), m. captured_heights: heights (R,), m, of captured feet.
     """
-    run, frames = found.frames()
-    row = found.rows[run]
+    run, frames = contacts.frames()
+    row = contacts.rows[run]
     standing = heights[rows.flat(row, frames)]
     standing = standing[np.lexsort((standing, row))]
-    counts = np.bincount(row, minlength=len(usual))
-    above = np.zeros(len(usual))
+    counts = np.bincount(row, minlength=len(captured_heights))
+    above = np.zeros(len(captured_heights))
     stands = counts > 0
     first, count = (np.cumsum(counts) - counts)[stands], counts[stands]
     middle = 0.5 * (standing[first + (count - 1) // 2] + standing[first + count // 2])
-    above[stands] = middle - usual[stands]
+    above[stands] = middle - captured_heights[stands]
     return above

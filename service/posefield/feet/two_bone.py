@@ -51,8 +51,8 @@ def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
     """Return the distance (..., F), m, up to which the end of a limb follows its target exactly."""
     length = poses.length(limb.middle) + poses.length(limb.lower)
     source = np.linalg.norm(poses.position(limb.lower) - poses.position(limb.upper), axis=-1)
-    found: Values = np.maximum(source, REACH * length - SOFTNESS)
-    return found
+    reach: Values = np.maximum(source, REACH * length - SOFTNESS)
+    return reach
 
 
 def soften(
@@ -66,8 +66,8 @@ def soften(
     """
     soft = np.maximum(np.maximum(REACH * length, firm) - firm, 1e-9)
     beyond = np.maximum(distance - firm, 0.0)
-    found: Values = np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
-    return found
+    softened: Values = np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
+    return softened
 
 
 def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points:
@@ -77,12 +77,12 @@ def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points
     3), m; it is approached along its direction if it is out of reach.
     """
     above, below = poses.length(limb.middle), poses.length(limb.lower)
-    apart = target - poses.position(limb.upper) - shift
-    distance = np.linalg.norm(apart, axis=-1)
+    offset = target - poses.position(limb.upper) - shift
+    distance = np.linalg.norm(offset, axis=-1)
     soft = soften(distance, firm_reach(poses, limb), above + below)
     within = np.clip(soft, 1.001 * np.abs(above - below) + 1e-6, above + below)
-    found: Points = apart * (within / np.maximum(distance, 1e-9))[..., None]
-    return found
+    end: Points = offset * (within / np.maximum(distance, 1e-9))[..., None]
+    return end
 
 
 def solve(poses: LimbPoses, limb: Limb, end: Points) -> LimbTurns:
@@ -131,20 +131,20 @@ def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
     frame = poses.orientation(limb.upper)
     mean = poses.mean(quat.rotate(quat.conj(frame), quat.cross(bone, old)))
     size = np.linalg.norm(mean, axis=-1, keepdims=True)
-    least = LEAST_BEND * poses.length(limb.middle)[..., None]
+    smallest_bend = LEAST_BEND * poses.length(limb.middle)[..., None]
     axis = quat.rotate(frame, np.broadcast_to(mean / np.maximum(size, 1e-9), bend.shape))
-    usual = quat.cross(old, axis)
+    mean_side = quat.cross(old, axis)
     bent = np.linalg.norm(bend, axis=-1)
     if limb.tip != limb.lower:
         # A knee that is a little overstretched would bend backwards where its leg is shortened.
         little = np.clip(2.0 - bent / (OVERSTRETCHED * poses.length(limb.middle)), 0.0, 1.0)
-        bent = bent + little * (np.sum(bend * usual, axis=-1) - bent)
-    mixed = bend + np.maximum(least - bent[..., None], 0.0) * usual
+        bent = bent + little * (np.sum(bend * mean_side, axis=-1) - bent)
+    mixed = bend + np.maximum(smallest_bend - bent[..., None], 0.0) * mean_side
     side = quat.rotate(shortest_turn(old, towards), mixed)
     side = _towards_middle(side, chord, bone, towards)
     side = side - np.sum(side * towards, axis=-1, keepdims=True) * towards
-    found: Points = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)
-    return found
+    direction: Points = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)
+    return direction
 
 
 def _towards_middle(side: Points, chord: Points, bone: Points, towards: Points) -> Points:
@@ -154,15 +154,15 @@ def _towards_middle(side: Points, chord: Points, bone: Points, towards: Points) 
     frame, and its plane with it; its middle moves as the limb does. bone: to it (..., F, 3), m.
     """
     size = np.linalg.norm(bone, axis=-1, keepdims=True)
-    apart = np.linalg.norm(chord, axis=-1, keepdims=True)
+    distance = np.linalg.norm(chord, axis=-1, keepdims=True)
     # The distance is compared with the bone, about half of the limb.
-    folded = np.clip(2.0 - apart / (2.0 * FOLDED * size), 0.0, 1.0)
+    folded = np.clip(2.0 - distance / (2.0 * FOLDED * size), 0.0, 1.0)
     across = (bone - np.sum(bone * towards, axis=-1, keepdims=True) * towards) / size
     much = np.linalg.norm(across, axis=-1, keepdims=True)
     folded = folded * np.clip(much / LEAST_ACROSS, 0.0, 1.0)
-    own = np.linalg.norm(side, axis=-1, keepdims=True) / np.maximum(much, 1e-9)
-    found: Points = side + folded * (own * across - side)
-    return found
+    scale = np.linalg.norm(side, axis=-1, keepdims=True) / np.maximum(much, 1e-9)
+    direction: Points = side + folded * (scale * across - side)
+    return direction
 
 
 # The pelvis is lowered this long before and after it is needed, s, and its way is smoothed with a
@@ -181,11 +181,11 @@ def need(
 
     target: of the leg's end (..., F, 3), m. sunk: by how much the pelvis is lowered already, m.
     """
-    apart = poses.position(leg.upper) - np.asarray(sunk)[..., None] * UP - target
-    level = np.sum(np.square(apart * (1.0 - UP)), axis=-1)
+    offset = poses.position(leg.upper) - np.asarray(sunk)[..., None] * UP - target
+    level = np.sum(np.square(offset * (1.0 - UP)), axis=-1)
     room = np.square(firm_reach(poses, leg)) - level
     highest = np.sqrt(np.maximum(room, 0.0))
-    return np.where(room < 0.0, np.inf, np.maximum(apart @ UP - highest, 0.0))
+    return np.where(room < 0.0, np.inf, np.maximum(offset @ UP - highest, 0.0))
 
 
 def room(poses: LimbPoses, limbs: Sequence[Limb]) -> tuple[Frames, Frames]:
@@ -196,21 +196,21 @@ def room(poses: LimbPoses, limbs: Sequence[Limb]) -> tuple[Frames, Frames]:
     count = len(poses.positions)
     up, down = np.full(count, np.inf), np.full(count, np.inf)
     for limb in limbs:
-        apart = poses.position(limb.upper) - poses.position(limb.lower)
-        level = np.sum(np.square(apart * (1.0 - UP)), axis=-1)
+        offset = poses.position(limb.upper) - poses.position(limb.lower)
+        level = np.sum(np.square(offset * (1.0 - UP)), axis=-1)
         reach = np.sqrt(np.maximum(np.square(firm_reach(poses, limb)) - level, 0.0))
-        up, down = np.minimum(up, reach - apart @ UP), np.minimum(down, reach + apart @ UP)
+        up, down = np.minimum(up, reach - offset @ UP), np.minimum(down, reach + offset @ UP)
     return np.maximum(up, 0.0), np.maximum(down, 0.0)
 
 
-def lower(needs: Sequence[Lowering], most: Lowering, rows: FrameRows) -> Lowering:
-    """Return how much the pelvis is lowered (N,), m: smoothly, by `most` (N,) at most.
+def lower(needs: Sequence[Lowering], limit: Lowering, rows: FrameRows) -> Lowering:
+    """Return how much the pelvis is lowered (N,), m: smoothly, by `limit` (N,) at most.
 
     needs: of each leg (N,), m. rows: of the motions, one after another.
     """
-    wanted = np.minimum(np.max([np.zeros(most.shape), *needs], axis=0), most)
-    smooth = cover(wanted, rows)
-    excess = cover(np.maximum(smooth - most, 0.0), rows)
+    needed = np.minimum(np.max([np.zeros(limit.shape), *needs], axis=0), limit)
+    smooth = cover(needed, rows)
+    excess = cover(np.maximum(smooth - limit, 0.0), rows)
     return np.maximum(smooth - excess, 0.0)
 
 
@@ -219,32 +219,32 @@ def cover(needed: Lowering, rows: FrameRows) -> Lowering:
 
     The largest value of the neighbourhood, smoothed with a kernel that is no wider than that.
     """
-    found = np.zeros(needed.shape)
+    covered = np.zeros(needed.shape)
     if not needed.any():
-        return found
+        return covered
     halves = np.maximum(1, np.round(SPREAD * rows.rates)).astype(np.int64)
     for half in np.unique(halves).tolist():
-        own = halves == half
-        frames = own[rows.groups.group]
-        found[frames] = _covered(needed[frames], rows.select(np.flatnonzero(own)), half)
-    return found
+        same_size = halves == half
+        frames = same_size[rows.groups.group]
+        covered[frames] = _covered(needed[frames], rows.select(np.flatnonzero(same_size)), half)
+    return covered
 
 
 def _covered(needed: Lowering, rows: FrameRows, half: int) -> Lowering:
     """Return smooth paths as `cover` does, of rows whose neighbourhoods are of one size."""
     around = range(-half, half + 1)
     kernel = [np.exp(-0.5 * np.square(offset / (SMOOTHING * rows.rates))) for offset in around]
-    beside = [rows.beside(offset) for offset in around]
-    wide = np.max([needed[frames] for frames in beside], axis=0)
-    found = np.zeros(needed.shape)
+    neighbours = [rows.beside(offset) for offset in around]
+    wide = np.max([needed[frames] for frames in neighbours], axis=0)
+    smoothed = np.zeros(needed.shape)
     # Not a matrix product, whose sums could go in another order for more motions.
     total = sum(kernel)
-    for share, frames in zip(kernel, beside, strict=True):
-        found += (share / total)[rows.groups.group] * wide[frames]
-    return found
+    for share, frames in zip(kernel, neighbours, strict=True):
+        smoothed += (share / total)[rows.groups.group] * wide[frames]
+    return smoothed
 
 
-def beyond(needed: Values, most: Values) -> Booleans:
+def beyond(needed: Values, limit: Values) -> Booleans:
     """Return whether a leg needs more than the pelvis can be lowered (..., F)."""
-    found: Booleans = needed > most + 1e-9
-    return found
+    is_beyond: Booleans = needed > limit + 1e-9
+    return is_beyond

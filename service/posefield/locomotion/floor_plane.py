@@ -21,10 +21,10 @@ def project(points: Annotated[Floats, "*batch 3"]) -> Annotated[FloorVectors, "*
 
 
 def at_height(
-    places: Annotated[FloorVectors, "*#batch"], height: Scalars
+    points: Annotated[FloorVectors, "*#batch"], height: Scalars
 ) -> Annotated[Floats, "*batch 3"]:
     """Return points (..., 3), m, at a height above floor points (...)."""
-    return np.stack(np.broadcast_arrays(places.imag, height, places.real), axis=-1)
+    return np.stack(np.broadcast_arrays(points.imag, height, points.real), axis=-1)
 
 
 def unit_vectors(headings: Annotated[Floats, "*batch"]) -> Annotated[FloorVectors, "*batch"]:
@@ -33,15 +33,15 @@ def unit_vectors(headings: Annotated[Floats, "*batch"]) -> Annotated[FloorVector
 
 
 def arc_displacement(
-    way: Annotated[FloorVectors, "*#batch"] | Scalars, turn: Scalars
+    tangent: Annotated[FloorVectors, "*#batch"] | Scalars, turn: Scalars
 ) -> Annotated[FloorVectors, "*batch"]:
     """Return the displacement of a path of constant speed and constant rate of turning.
 
-    way: length and direction of the path at its start. turn: change of heading, rad. This is the
-    exponential map of rigid motion in the plane: a straight line for no turn, else an arc of the
-    same length.
+    tangent: length and direction of the path at its start. turn: change of heading, rad. This is
+    the exponential map of rigid motion in the plane: a straight line for no turn, else an arc of
+    the same length.
     """
-    return way * _arc_factor(turn)
+    return tangent * _arc_factor(turn)
 
 
 def inverse_arc(
@@ -72,7 +72,7 @@ Ends = tuple[Annotated[Floats, "2"] | None, Annotated[Floats, "2"] | None]
 
 
 def headings(
-    waypoints: Annotated[Floats, "waypoints 2"], spacing: float, per_step: int, ends: Ends
+    waypoints: Annotated[Floats, "waypoints 2"], spacing: float, per_step: int, end_slopes: Ends
 ) -> tuple[PerPoint, PerPoint]:
     """Return distances (K,), m, along the spline through waypoints, and its headings (K,), rad.
 
@@ -81,7 +81,7 @@ def headings(
     """
     knots = np.pad(np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)), (1, 0))
     count = per_step * int(np.ceil(knots[-1] / spacing)) + 1
-    points, slopes = spline(knots, waypoints, np.linspace(0.0, knots[-1], count), ends)
+    points, slopes = spline(knots, waypoints, np.linspace(0.0, knots[-1], count), end_slopes)
     gone = np.pad(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), (1, 0))
     return gone, np.unwrap(np.angle(project(np.insert(slopes, 1, 0.0, axis=1))))
 
@@ -90,12 +90,12 @@ def spline(
     knots: Annotated[Floats, "knots"],
     values: Annotated[Floats, "knots 2"],
     at: PerPoint,
-    ends: Ends = (None, None),
+    end_slopes: Ends = (None, None),
 ) -> tuple[Annotated[Floats, "points 2"], Annotated[Floats, "points 2"]]:
     """Return the cubic spline of values (P, 2) at knots (P,): values and slopes at (S,)."""
     gaps = np.diff(knots)
     chords = np.diff(values, axis=0) / gaps[:, None]
-    seconds = _second_derivatives(gaps, chords, ends)
+    seconds = _second_derivatives(gaps, chords, end_slopes)
     piece = np.minimum(np.searchsorted(knots, at, side="right") - 1, len(gaps) - 1)
     gap = gaps[piece][:, None]
     b = (at - knots[piece])[:, None] / gap
@@ -107,7 +107,7 @@ def spline(
 
 
 def _second_derivatives(
-    gaps: Annotated[Floats, "pieces"], chords: Annotated[Floats, "pieces 2"], ends: Ends
+    gaps: Annotated[Floats, "pieces"], chords: Annotated[Floats, "pieces 2"], end_slopes: Ends
 ) -> Annotated[Floats, "knots 2"]:
     """Return the second derivatives at the knots.
 
@@ -118,11 +118,13 @@ def _second_derivatives(
     system += np.diag(gaps / 6.0, 1) + np.diag(gaps / 6.0, -1)
     sides = np.zeros((len(gaps) + 1, 2))
     sides[1:-1] = np.diff(chords, axis=0)
-    if ends[0] is not None:
-        sides[0] = chords[0] - ends[0]
-    if ends[1] is not None:
-        sides[-1] = ends[1] - chords[-1]
-    known = np.array([ends[0] is not None, *[True] * (len(gaps) - 1), ends[1] is not None])
-    found = np.zeros_like(sides)
-    found[known] = np.linalg.solve(system[np.ix_(known, known)], sides[known])
-    return found
+    if end_slopes[0] is not None:
+        sides[0] = chords[0] - end_slopes[0]
+    if end_slopes[1] is not None:
+        sides[-1] = end_slopes[1] - chords[-1]
+    curved = np.array(
+        [end_slopes[0] is not None, *[True] * (len(gaps) - 1), end_slopes[1] is not None]
+    )
+    seconds = np.zeros_like(sides)
+    seconds[curved] = np.linalg.solve(system[np.ix_(curved, curved)], sides[curved])
+    return seconds

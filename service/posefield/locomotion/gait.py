@@ -50,25 +50,28 @@ class WalkerLabels:
             return np.full(len(numbers), -1)
         if self.shares is None:
             return (numbers * len(self.rows)).astype(np.int64)
-        ends = np.cumsum(self.shares)
-        found = np.searchsorted(ends, numbers * ends[-1], side="right")
+        cumulative = np.cumsum(self.shares)
+        indices = np.searchsorted(cumulative, numbers * cumulative[-1], side="right")
         # The product may round up to the last end.
-        return np.minimum(found, np.flatnonzero(self.shares)[-1])
+        return np.minimum(indices, np.flatnonzero(self.shares)[-1])
 
-    def facts(self, who: Annotated[Indices, "characters"]) -> dict[str, Any]:
+    def facts(self, combinations: Annotated[Indices, "characters"]) -> dict[str, Any]:
         """Return the performer of each walker, None for none, and its labels in further sets.
 
         A mixture of performers is among the labels.
         """
         sets = [*self.rows[0]] if self.rows else []
-        found = {name: [self._label(name, int(each)) for each in who] for name in sets}
-        performers: list[Any] = [None] * len(who)
+        labels = {
+            name: [self._label(name, int(combination)) for combination in combinations]
+            for name in sets
+        }
+        performers: list[Any] = [None] * len(combinations)
         if isinstance(self.asked.get(PERFORMER, ""), str):
-            performers = found.pop(PERFORMER, performers)
-        return {"performers": performers} | ({"labels": found} if found else {})
+            performers = labels.pop(PERFORMER, performers)
+        return {"performers": performers} | ({"labels": labels} if labels else {})
 
-    def _label(self, name: str, who: int) -> LabelValue:
-        return self.asked.get(name, self.rows[who][name])
+    def _label(self, name: str, combination: int) -> LabelValue:
+        return self.asked.get(name, self.rows[combination][name])
 
 
 def captured_labels(card: ModelCard) -> WalkerLabels:
@@ -77,38 +80,38 @@ def captured_labels(card: ModelCard) -> WalkerLabels:
     return WalkerLabels(tuple(rows), stride.label_table(card))
 
 
-def requested_labels(card: ModelCard, asked: Mapping[str, LabelValue]) -> WalkerLabels:
+def requested_labels(card: ModelCard, request: Mapping[str, LabelValue]) -> WalkerLabels:
     """Return the captured combinations with the labels of a request in their sets.
 
     The share of a combination is the product of the requested weights of its names, or their sum
     where no captured combination has names of all requested sets. Raises InvalidField for a label
     that the model does not have, and for invalid weights.
     """
-    given = label_weights(card, None, asked)[0]
-    own = captured_labels(card)
-    if not asked:
-        return own
-    weights, parts, first = own.weights.copy(), [], 0
-    for each in card.labels:
-        columns = slice(first, first + len(each.names))
-        if each.name in asked:
-            weights[:-1, columns] = given[columns]
-            shares = dict(zip(each.names, given[columns].tolist(), strict=True))
-            parts.append(np.array([shares[row[each.name]] for row in own.rows]))
+    requested_weights = label_weights(card, None, request)[0]
+    captured = captured_labels(card)
+    if not request:
+        return captured
+    weights, set_shares, first = captured.weights.copy(), [], 0
+    for label_set in card.labels:
+        columns = slice(first, first + len(label_set.names))
+        if label_set.name in request:
+            weights[:-1, columns] = requested_weights[columns]
+            shares = dict(zip(label_set.names, requested_weights[columns].tolist(), strict=True))
+            set_shares.append(np.array([shares[row[label_set.name]] for row in captured.rows]))
         first = columns.stop
-    return WalkerLabels(own.rows, weights, asked, combination_shares(np.array(parts)))
+    return WalkerLabels(captured.rows, weights, request, combination_shares(np.array(set_shares)))
 
 
 def combination_shares(
-    parts: Annotated[Floats, "sets combinations"],
+    set_shares: Annotated[Floats, "sets combinations"],
 ) -> Annotated[Floats, "combinations"]:
     """Return the shares (K,) of combinations.
 
-    parts: (S, K), requested weight of each combination's name in each requested set. Shares are the
-    products over the sets, or the sums where all products are zero.
+    set_shares: (S, K), requested weight of each combination's name in each requested set. Shares
+    are the products over the sets, or the sums where all products are zero.
     """
-    together = parts.prod(axis=0)
-    return together if together.any() else parts.sum(axis=0)
+    together = set_shares.prod(axis=0)
+    return together if together.any() else set_shares.sum(axis=0)
 
 
 # Tolerance for the rounding of points on an edge, m/s and rad/s.
@@ -199,34 +202,37 @@ class Gait:
     region: GaitRegion
     labels: WalkerLabels
 
-    def with_labels(self, asked: Mapping[str, LabelValue]) -> "Gait":
+    def with_labels(self, request: Mapping[str, LabelValue]) -> "Gait":
         """Return the gait of walkers with requested labels, by label set.
 
         Raises InvalidField for a label that the model does not have, and for invalid weights.
         """
-        return replace(self, labels=requested_labels(self.session.card, asked))
+        return replace(self, labels=requested_labels(self.session.card, request))
 
     def mean_controls(
-        self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
+        self, speeds: PerPoint, turning: PerPoint, combinations: Annotated[Indices, "points"]
     ) -> PointControls:
         """Return the conditional mean of the controls (K, d) at given rates.
 
-        speeds: (K,), m/s. turning: (K,), rad/s. who: labels (K,) by index in `stride.label_rows`,
-        -1 for open ones. The mean is a linear regression over the captured clips, which also
-        determines controls that do not affect speed or turning, such as the stride length.
+        speeds: (K,), m/s. turning: (K,), rad/s. combinations: labels (K,) by index in
+        `stride.label_rows`, -1 for open ones. The mean is a linear regression over the captured
+        clips, which also determines controls that do not affect speed or turning, such as the
+        stride length.
         """
-        return _design_matrix(speeds, turning) @ self.slopes + self.performer_offsets[who]
+        return _design_matrix(speeds, turning) @ self.slopes + self.performer_offsets[combinations]
 
     def controls(
-        self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
+        self, speeds: PerPoint, turning: PerPoint, combinations: Annotated[Indices, "points"]
     ) -> PointControls:
         """Return the controls (K, d), along the regression, that lead to these rates."""
-        labels = stride.RowLabels(self.labels.weights, who)
+        labels = stride.RowLabels(self.labels.weights, combinations)
         speed, turn = speeds, turning
         for _ in range(ITERATIONS):
-            done = stride.strides(self.session, self.mean_controls(speed, turn, who), labels)
+            done = stride.strides(
+                self.session, self.mean_controls(speed, turn, combinations), labels
+            )
             speed, turn = speed + speeds - done.speeds, turn + turning - done.turning
-        return self.mean_controls(speed, turn, who)
+        return self.mean_controls(speed, turn, combinations)
 
 
 def fit_gait(session: Session) -> Gait:
@@ -240,18 +246,18 @@ def fit_gait(session: Session) -> Gait:
     if card.root != "travelling":
         raise InvalidField("model", f"{card.name} stays in place, expected one that travels")
     controls = np.array(card.examples)
-    who = stride.clip_performers(card)
-    own = stride.strides(session, controls, stride.labels(session, who))
-    rates = np.column_stack([own.speeds, own.turning])
+    combinations = stride.clip_performers(card)
+    cycles = stride.strides(session, controls, stride.labels(session, combinations))
+    rates = np.column_stack([cycles.speeds, cycles.turning])
     _check_speeds(card.name, rates[:, 0])
     slopes = np.linalg.lstsq(_design_matrix(*rates.T), controls, rcond=None)[0]
     manners = mean_residuals(
-        controls - _design_matrix(*rates.T) @ slopes, who, len(stride.label_rows(card))
+        controls - _design_matrix(*rates.T) @ slopes, combinations, len(stride.label_rows(card))
     )
     # With straight walking at the slowest and the fastest speed: a stride cut from a straight walk
     # turns by a few degrees, which is no lower bound of the turning.
-    ends = np.array([rates[:, 0].min(), rates[:, 0].max()])
-    region = convex_hull(np.vstack([rates, np.column_stack([ends, np.zeros(2)])]))
+    speed_range = np.array([rates[:, 0].min(), rates[:, 0].max()])
+    region = convex_hull(np.vstack([rates, np.column_stack([speed_range, np.zeros(2)])]))
     return Gait(session, rates, slopes, manners, region, captured_labels(card))
 
 
@@ -270,13 +276,13 @@ def _design_matrix(speeds: PerPoint, turning: PerPoint) -> Annotated[Floats, "po
 
 def mean_residuals(
     residuals: Annotated[Floats, "clips controls"],
-    who: Annotated[Indices, "clips"],
+    combinations: Annotated[Indices, "clips"],
     performers: int,
 ) -> Annotated[Floats, "{performers}+1 controls"]:
     """Return the mean residuals (p + 1, d) of performers, with zeros at the end.
 
     Each mean is shrunk by one additional clip with a residual of zero.
     """
-    theirs = np.arange(performers)[:, None] == who
+    theirs = np.arange(performers)[:, None] == combinations
     means = theirs @ residuals / (theirs.sum(axis=1, keepdims=True) + 1.0)
     return np.vstack([means, np.zeros(residuals.shape[1])])

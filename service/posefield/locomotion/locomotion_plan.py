@@ -51,14 +51,14 @@ class LocomotionPlan:
     def relative_to_start(self) -> "LocomotionPlan":
         """Return the plan with each character in the frame of its start."""
         first, facing = self.places[:, :1], self.headings[:, :1]
-        places = (self.places - first) * floor_plane.unit_vectors(-facing)
-        return replace(self, places=places, headings=self.headings - facing)
+        points = (self.places - first) * floor_plane.unit_vectors(-facing)
+        return replace(self, places=points, headings=self.headings - facing)
 
 
 def plan_from_controls(
     gait: Gait,
     controls: Annotated[Floats, "characters frames controls"],
-    who: Annotated[Indices, "characters"],
+    combinations: Annotated[Indices, "characters"],
     phases: PerCharacter,
     starts: tuple[Annotated[FloorVectors, "characters"], PerCharacter],
     rate: float,
@@ -67,20 +67,20 @@ def plan_from_controls(
 
     phases: (N,) and starts: places (N,) and headings (N,), rad, at the first frame.
     """
-    own = _measure_strides(gait, controls, who)
-    turns = _increments(own.turning, rate)
-    ways = _increments(own.travels / own.durations, rate)
+    cycles = _measure_strides(gait, controls, combinations)
+    turns = _increments(cycles.turning, rate)
+    ways = _increments(cycles.travels / cycles.durations, rate)
     headings = starts[1][:, None] + _cumulative_sums(turns)
     steps = floor_plane.unit_vectors(headings[:, :-1]) * floor_plane.arc_displacement(ways, turns)
-    places = starts[0][:, None] + _cumulative_sums(steps)
-    began = _phases(own, phases, rate)
-    return LocomotionPlan(controls, who, began, places, headings, rate, gait.labels)
+    points = starts[0][:, None] + _cumulative_sums(steps)
+    began = _phases(cycles, phases, rate)
+    return LocomotionPlan(controls, combinations, began, points, headings, rate, gait.labels)
 
 
 def plan_along_paths(
     gait: Gait,
     paths: Paths,
-    who: Annotated[Indices, "characters"],
+    combinations: Annotated[Indices, "characters"],
     phases: PerCharacter,
     frames: int,
     rate: float,
@@ -90,60 +90,62 @@ def plan_along_paths(
     phases: (N,), of the cycle at the first frame. Raises InvalidField for a path that ends too
     soon.
     """
-    known = paths.speeds.shape
-    everyone = np.repeat(who, known[1])
+    shape = paths.speeds.shape
+    everyone = np.repeat(combinations, shape[1])
     turning = (paths.speeds * paths.curvatures).ravel()
-    wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
+    point_controls = gait.controls(paths.speeds.ravel(), turning, everyone)
     labels = stride.RowLabels(gait.labels.weights, everyone)
-    speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
+    speeds = stride.strides(gait.session, point_controls, labels).speeds.reshape(shape)
     gone = _distances(speeds, frames, rate)
     _check_path_lengths(paths, gone, (frames - 1) / rate)
-    controls = paths.interpolate(wanted.reshape(*known, -1), gone)
-    own = _measure_strides(gait, controls, who)
-    places, tangents = paths.at(gone)
-    headings, began = tangents - own.drifts, _phases(own, phases, rate)
-    return LocomotionPlan(controls, who, began, places, headings, rate, gait.labels)
+    controls = paths.interpolate(point_controls.reshape(*shape, -1), gone)
+    cycles = _measure_strides(gait, controls, combinations)
+    points, tangents = paths.at(gone)
+    headings, began = tangents - cycles.drifts, _phases(cycles, phases, rate)
+    return LocomotionPlan(controls, combinations, began, points, headings, rate, gait.labels)
 
 
 def synthesize_poses(
     session: Session,
     plan: LocomotionPlan,
-    who: Annotated[Indices, "poses"],
+    characters: Annotated[Indices, "poses"],
     frames: Annotated[Indices, "poses"],
     level: int = 0,
 ) -> RelativePoses:
     """Return the poses of K pairs of a character (K,) and a frame (K,) of the plan."""
-    labels = plan.labels.weights[plan.who[who]]
-    pair = who, frames
-    own = stride.synthesize_poses(session, plan.controls[pair], labels, plan.phases[pair], level)
-    return place_poses(plan, pair, own)
+    labels = plan.labels.weights[plan.who[characters]]
+    pair = characters, frames
+    relative = stride.synthesize_poses(
+        session, plan.controls[pair], labels, plan.phases[pair], level
+    )
+    return place_poses(plan, pair, relative)
 
 
 def place_poses(
     plan: LocomotionPlan,
     pair: tuple[Annotated[Indices, "poses"], Annotated[Indices, "poses"]],
-    own: RelativePoses,
+    poses: RelativePoses,
 ) -> RelativePoses:
     """Return poses where the plan has K pairs of a character (K,) and a frame (K,).
 
-    own: K poses in frames that travel with the characters.
+    poses: K poses in frames that travel with the characters.
     """
     headings = plan.headings[pair]
-    places = plan.places[pair] + own.places * floor_plane.unit_vectors(headings)
-    rotations = floor_plane.turn_roots(own.rotations, headings)
-    return RelativePoses(rotations, own.heights, places, own.curves)
+    roots = plan.places[pair] + poses.places * floor_plane.unit_vectors(headings)
+    rotations = floor_plane.turn_roots(poses.rotations, headings)
+    return RelativePoses(rotations, poses.heights, roots, poses.curves)
 
 
 def _measure_strides(
     gait: Gait,
     controls: Annotated[Floats, "characters frames controls"],
-    who: Annotated[Indices, "characters"],
+    combinations: Annotated[Indices, "characters"],
 ) -> Strides:
     """Return the cycles of controls (N, F, d), with fields (N, F)."""
     frames = controls.shape[:2]
-    labels = stride.RowLabels(gait.labels.weights, np.repeat(who, frames[1]))
-    own = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
-    return Strides(*(value.reshape(frames) for value in vars(own).values()))
+    labels = stride.RowLabels(gait.labels.weights, np.repeat(combinations, frames[1]))
+    cycles = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
+    return Strides(*(value.reshape(frames) for value in vars(cycles).values()))
 
 
 def _increments(paces: Numbers, rate: float) -> Numbers:
@@ -155,8 +157,8 @@ def _cumulative_sums(steps: Numbers) -> Numbers:
     return np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
 
-def _phases(own: Strides, first: PerCharacter, rate: float) -> CharacterFrames:
-    return (first[:, None] + _cumulative_sums(_increments(1.0 / own.durations, rate))) % 1.0
+def _phases(cycles: Strides, first: PerCharacter, rate: float) -> CharacterFrames:
+    return (first[:, None] + _cumulative_sums(_increments(1.0 / cycles.durations, rate))) % 1.0
 
 
 def _distances(
@@ -165,11 +167,13 @@ def _distances(
     """Return the distances (N, F), m, along paths with speeds (N, K) at their known points."""
     arrived = _cumulative_sums(0.5 * POINT_SPACING * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
     # One interpolation for all rows: each row's times are offset beyond those of the row before.
-    apart = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
+    offsets = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
     ways = np.tile(POINT_SPACING * np.arange(speeds.shape[1]), len(speeds))
     # A character that has arrived stays there; the gap between two rows must not be interpolated.
     when = np.minimum(np.arange(frames) / rate, arrived[:, -1:])
-    return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
+    return np.interp((when + offsets).ravel(), (arrived + offsets).ravel(), ways).reshape(
+        -1, frames
+    )
 
 
 def _check_path_lengths(paths: Paths, gone: CharacterFrames, seconds: float) -> None:
@@ -197,9 +201,11 @@ class LevelSchedule:
     previous: Annotated[Indices, "*frames"]
     shares: Annotated[Floats, "*frames"]
 
-    def select(self, who: Annotated[Indices, "chosen"]) -> "LevelSchedule":
+    def select(self, characters: Annotated[Indices, "chosen"]) -> "LevelSchedule":
         """Return the levels of some characters (M,)."""
-        return LevelSchedule(self.levels[who], self.previous[who], self.shares[who])
+        return LevelSchedule(
+            self.levels[characters], self.previous[characters], self.shares[characters]
+        )
 
     def rows(self, rows: slice) -> "LevelSchedule":
         """Return the levels of some of all frames (N F,), character by character."""
@@ -238,19 +244,19 @@ def schedule_levels(
     """
     switch = max(1, round(TRANSITION_SECONDS * rate))
     # Two transitions: one that has just begun ends before the next one.
-    ahead = 2 * switch
-    needed = _finest_ahead(_levels(ladder, scale, limit), ahead)
-    spare = _finest_ahead(_levels(ladder, scale, limit * (1.0 - HYSTERESIS)), ahead)
-    held, before = needed[:, 0], needed[:, 0]
-    age, columns = np.full(len(held), switch), []
+    foresight = 2 * switch
+    needed = _finest_ahead(_levels(ladder, scale, limit), foresight)
+    spare = _finest_ahead(_levels(ladder, scale, limit * (1.0 - HYSTERESIS)), foresight)
+    level, before = needed[:, 0], needed[:, 0]
+    age, columns = np.full(len(level), switch), []
     for need, may in zip(needed.T, spare.T, strict=True):
         cancellation.check()
-        wanted = np.where(need < held, need, np.maximum(held, may))
-        wanted = np.where(age < switch, held, wanted)
-        turning = wanted != held
-        before, age = np.where(turning, held, before), np.where(turning, 0, age + 1)
-        held = wanted
-        columns.append((held, before, np.minimum((age + 1) / (switch + 1), 1.0)))
+        next_level = np.where(need < level, need, np.maximum(level, may))
+        next_level = np.where(age < switch, level, next_level)
+        turning = next_level != level
+        before, age = np.where(turning, level, before), np.where(turning, 0, age + 1)
+        level = next_level
+        columns.append((level, before, np.minimum((age + 1) / (switch + 1), 1.0)))
     levels, origins, shares = (np.stack(column, axis=1) for column in zip(*columns, strict=True))
     return LevelSchedule(levels, origins, quat.smoothstep(shares))
 
@@ -267,5 +273,5 @@ def _finest_ahead(
     """Return the finest level (N, F) from each frame on, over `frames` frames ahead."""
     padded = np.pad(levels, ((0, 0), (0, frames)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, frames + 1, axis=1)
-    least: Indices = windows.min(axis=-1)
-    return least
+    finest: Indices = windows.min(axis=-1)
+    return finest

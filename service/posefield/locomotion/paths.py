@@ -132,13 +132,13 @@ def paths_through(gait: Gait, routes: Sequence[Route]) -> Paths:
     for index, route in enumerate(routes):
         _check_route(gait, index, route)
     curves = [_headings(route.waypoints) for route in routes]
-    places = max(len(headings) for headings, _ in curves) + 1
+    count = max(len(headings) for headings, _ in curves) + 1
     # Padding beyond the end of a path is not walked.
-    rows = [np.pad(headings, (0, places - len(headings)), "edge") for headings, _ in curves]
+    rows = [np.pad(headings, (0, count - len(headings)), "edge") for headings, _ in curves]
     paths = Paths(
         np.array([complex(*route.waypoints[0, ::-1]) for route in routes]),
         np.stack(rows),
-        np.tile([[route.speed] for route in routes], places).astype(np.float64),
+        np.tile([[route.speed] for route in routes], count).astype(np.float64),
         np.array([length for _, length in curves]),
     )
     _check_turning(gait, paths)
@@ -191,11 +191,11 @@ def _check_turning(gait: Gait, paths: Paths) -> None:
     sharp = walked & ~gait.region.contains(paths.speeds, turning)
     for index in np.flatnonzero(sharp.any(axis=1))[:1]:
         at = int(np.argmax(np.where(sharp[index], np.abs(turning[index]), -1.0)))
-        place, speed = paths.places[index, at], paths.speeds[index, at]
+        point, speed = paths.places[index, at], paths.speeds[index, at]
         low, high = gait.region.turning(np.array(speed))
         raise InvalidField(
             f"paths/{index}",
-            f"at x {place.imag:.2f} m, z {place.real:.2f} m it turns by {turning[index, at]:.3f} "
+            f"at x {point.imag:.2f} m, z {point.real:.2f} m it turns by {turning[index, at]:.3f} "
             f"rad/s, expected {low:.3f} to {high:.3f} rad/s at {speed:g} m/s; positive is left",
         )
 
@@ -232,9 +232,9 @@ def draw_characters(gait: Gait, count: int, seed: int) -> Characters:
 
 def initial_placement(count: int, seed: int) -> Placement:
     """Return the initial positions and headings of `count` characters' paths."""
-    drawn = _random_table(count, seed)[:, 2:]
+    numbers = _random_table(count, seed)[:, 2:]
     return Placement(
-        floor_plane.at_height(_starts(drawn[:, :2]), np.zeros(count)), _initial_headings(drawn)
+        floor_plane.at_height(_starts(numbers[:, :2]), np.zeros(count)), _initial_headings(numbers)
     )
 
 
@@ -242,10 +242,10 @@ def draw_paths(gait: Gait, characters: Characters, seconds: float) -> Paths:
     """Return random paths, long enough for `seconds` at the highest speed."""
     spot, pace = characters.random_numbers[:, :2], characters.random_numbers[:, 3]
     waves = 2.0 * np.pi * characters.random_numbers[:, 4:].reshape(len(spot), 2, len(WAVELENGTHS))
-    places = int(np.ceil(gait.region.speeds[1] * seconds / POINT_SPACING)) + 3
-    along = np.linspace(0.0, (places - 1) * POINT_SPACING, places)
-    usual = _captured_speeds(gait, characters.who, pace)
-    speeds = _speeds(gait, usual, _wave(along, waves[:, 0]))
+    count = int(np.ceil(gait.region.speeds[1] * seconds / POINT_SPACING)) + 3
+    along = np.linspace(0.0, (count - 1) * POINT_SPACING, count)
+    mean_speeds = _captured_speeds(gait, characters.who, pace)
+    speeds = _speeds(gait, mean_speeds, _wave(along, waves[:, 0]))
     low, high = gait.region.turning(speeds)
     wave = TURNING_SHARE * _wave(along, waves[:, 1])
     # Curvatures, 1/m: straight where the wave is zero.
@@ -263,9 +263,9 @@ def _random_table(count: int, seed: int) -> Annotated[Floats, "{count} columns"]
 
 
 def _initial_headings(
-    drawn: Annotated[Floats, "characters columns"],
+    numbers: Annotated[Floats, "characters columns"],
 ) -> PerCharacter:
-    return 2.0 * np.pi * drawn[:, 2]
+    return 2.0 * np.pi * numbers[:, 2]
 
 
 def _starts(spot: Annotated[Floats, "characters 2"]) -> Annotated[FloorVectors, "characters"]:
@@ -276,9 +276,9 @@ def _starts(spot: Annotated[Floats, "characters 2"]) -> Annotated[FloorVectors, 
     number = np.arange(len(spot))
     ring = np.sqrt(number).astype(np.int64)
     on = number - ring**2
-    across, ahead = np.minimum(on, ring), np.minimum(2 * ring - on, ring)
-    moved = MAX_JITTER * (2.0 * spot - 1.0)
-    return (SPACING * ahead + moved[:, 0]) + 1j * (SPACING * across + moved[:, 1])
+    columns, rows = np.minimum(on, ring), np.minimum(2 * ring - on, ring)
+    jitter = MAX_JITTER * (2.0 * spot - 1.0)
+    return (SPACING * rows + jitter[:, 0]) + 1j * (SPACING * columns + jitter[:, 1])
 
 
 def _wave(along: PerPoint, phases: Annotated[Floats, "characters waves"]) -> CharacterPoints:
@@ -288,25 +288,27 @@ def _wave(along: PerPoint, phases: Annotated[Floats, "characters waves"]) -> Cha
 
 
 def _captured_speeds(
-    gait: Gait, who: Annotated[Indices, "characters"], drawn: PerCharacter
+    gait: Gait, combinations: Annotated[Indices, "characters"], numbers: PerCharacter
 ) -> Annotated[Floats, "characters 1"]:
     """Return speeds (N, 1), m/s, of captured clips, each of the character's own performer."""
     moved_by = stride.clip_performers(gait.session.card)
     order = np.argsort(moved_by, kind="stable")
-    first, after = (np.searchsorted(moved_by[order], who, side) for side in ("left", "right"))
-    clips = order[first + (drawn * (after - first)).astype(np.int64)]
+    first, after = (
+        np.searchsorted(moved_by[order], combinations, side) for side in ("left", "right")
+    )
+    clips = order[first + (numbers * (after - first)).astype(np.int64)]
     return gait.rates[clips, :1]
 
 
 def _speeds(
     gait: Gait,
-    usual: Annotated[Floats, "characters 1"],
+    mean_speeds: Annotated[Floats, "characters 1"],
     wave: CharacterPoints,
 ) -> CharacterPoints:
     """Return speeds (N, K), m/s, that vary about the mean ones (N, 1)."""
-    ends = np.array(gait.region.speeds)
-    low, high = ends + SPEED_MARGIN * (ends[::-1] - ends)
-    middle = np.clip(usual, low, high)
+    captured = np.array(gait.region.speeds)
+    low, high = captured + SPEED_MARGIN * (captured[::-1] - captured)
+    middle = np.clip(mean_speeds, low, high)
     slower = np.maximum((1.0 - SPEED_VARIATION) * middle, low)
     faster = np.minimum((1.0 + SPEED_VARIATION) * middle, high)
     return _vary(wave, slower, middle, faster)

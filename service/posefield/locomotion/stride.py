@@ -85,7 +85,7 @@ class RelativePoses:
     @property
     def arrays(self) -> dict[str, Any]:
         """Return the arrays that the poses have, by name."""
-        return {name: whole for name, whole in vars(self).items() if whole is not None}
+        return {name: array for name, array in vars(self).items() if array is not None}
 
 
 def strides(
@@ -95,9 +95,9 @@ def strides(
     level: int = 0,
 ) -> Strides:
     """Return the cycles of controls (B, d) for labels (B, p), at a level of detail."""
-    ends = np.full((len(controls), 1), AFTER_END)
-    asked = ("duration", "travel", "root_position")
-    durations, travel, roots = _run_batches(session, controls, ends, labels, level, *asked)
+    after_end = np.full((len(controls), 1), AFTER_END)
+    outputs = ("duration", "travel", "root_position")
+    durations, travel, roots = _run_batches(session, controls, after_end, labels, level, *outputs)
     gap, turns = travel[:, 0, 1] + 1j * travel[:, 0, 0], travel[:, 0, 2]
     # A cycle without its travel ends at its start.
     starts = floor_plane.project(roots[:, 0]) - gap
@@ -112,8 +112,8 @@ def straight_strides(
 ) -> Strides:
     """Return the straight line from first to last pose of clips that are not cyclic."""
     times = np.tile([0.0, AFTER_END], (len(controls), 1))
-    asked = ("duration", "root_position")
-    durations, roots = _run_batches(session, controls, times, labels, level, *asked)
+    outputs = ("duration", "root_position")
+    durations, roots = _run_batches(session, controls, times, labels, level, *outputs)
     begin, end = floor_plane.project(roots).T
     return Strides(durations, end - begin, np.zeros(len(begin)), begin)
 
@@ -126,26 +126,26 @@ def synthesize_poses(
     level: int = 0,
 ) -> RelativePoses:
     """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
-    own = strides(session, controls, labels, level)
-    return poses_of_strides(session, (controls, labels), own, phases, level)
+    cycles = strides(session, controls, labels, level)
+    return poses_of_strides(session, (controls, labels), cycles, phases, level)
 
 
 def poses_of_strides(
     session: Session,
-    who: tuple[PointControls, PointLabels],
-    own: Strides,
+    controls_and_labels: tuple[PointControls, PointLabels],
+    cycles: Strides,
     phases: PerPoint,
     level: int = 0,
 ) -> RelativePoses:
     """Return what `synthesize_poses` does, of known cycles (K,).
 
-    who: controls (K, d) and labels (K, p).
+    controls_and_labels: controls (K, d) and labels (K, p).
     """
-    controls, labels = who
-    times = (phases * own.durations)[:, None]
-    asked = ["rotations", "root_position"] + [onnx_runtime.CURVES] * bool(session.card.curves)
-    rotations, roots, *curves = _run_batches(session, controls, times, labels, level, *asked)
-    posed = relative_poses(own, phases, rotations[:, 0], roots[:, 0])
+    controls, labels = controls_and_labels
+    times = (phases * cycles.durations)[:, None]
+    outputs = ["rotations", "root_position"] + [onnx_runtime.CURVES] * bool(session.card.curves)
+    rotations, roots, *curves = _run_batches(session, controls, times, labels, level, *outputs)
+    posed = relative_poses(cycles, phases, rotations[:, 0], roots[:, 0])
     return replace(posed, curves=curves[0][:, 0]) if curves else posed
 
 
@@ -163,13 +163,13 @@ def root_places(
     """
     # A matrix product with one row sums in another order.
     twice = np.repeat(np.arange(len(controls)), 2)
-    found = strides(session, controls[twice], labels[twice], level)
+    doubled = strides(session, controls[twice], labels[twice], level)
     count = len(phases)
     rows, times = np.repeat(np.arange(len(controls)), count), np.tile(phases, len(controls))
-    own = Strides(*(each[::2][rows] for each in vars(found).values()))
-    at = (times * own.durations)[:, None]
+    cycles = Strides(*(value[::2][rows] for value in vars(doubled).values()))
+    at = (times * cycles.durations)[:, None]
     (roots,) = _run_batches(session, controls[rows], at, labels[rows], level, "root_position")
-    return _relative_places(own, times, roots[:, 0]).reshape(-1, count)
+    return _relative_places(cycles, times, roots[:, 0]).reshape(-1, count)
 
 
 def contact_probabilities(
@@ -184,47 +184,49 @@ def contact_probabilities(
 
     durations: of the cycles (K,), s, as of `strides`; computed if they are not known.
     """
-    found = np.empty((len(controls), len(session.card.contacts)))
+    probabilities = np.empty((len(controls), len(session.card.contacts)))
     for rows in batches(len(controls)):
         cancellation.check()
-        own, names = controls[rows], labels[rows]
+        batch_controls, batch_labels = controls[rows], labels[rows]
         if durations is None:
-            times = phases[rows] * session.durations(own, labels=names, level=level)
+            times = phases[rows] * session.durations(
+                batch_controls, labels=batch_labels, level=level
+            )
         else:
             times = phases[rows] * durations[rows]
         (likely,) = session.run(
-            own, times[:, None], onnx_runtime.CONTACTS, labels=names, level=level
+            batch_controls, times[:, None], onnx_runtime.CONTACTS, labels=batch_labels, level=level
         )
-        found[rows] = likely[:, 0]
-    return found
+        probabilities[rows] = likely[:, 0]
+    return probabilities
 
 
 def relative_poses(
-    own: Strides,
+    cycles: Strides,
     phases: Annotated[Floats, "poses"],
     rotations: Annotated[Floats, "poses joints 4"],
     roots: Annotated[Floats, "poses 3"],
 ) -> RelativePoses:
     """Return poses relative to the travel, at phases (K,) of the cycle.
 
-    own: K strides, or one for all. rotations: (K, J, 4) and roots: (K, 3), m, of the poses.
+    cycles: K strides, or one for all. rotations: (K, J, 4) and roots: (K, 3), m, of the poses.
     """
     return RelativePoses(
-        floor_plane.turn_roots(rotations, -phases * own.turns),
+        floor_plane.turn_roots(rotations, -phases * cycles.turns),
         roots[:, 1],
-        _relative_places(own, phases, roots),
+        _relative_places(cycles, phases, roots),
     )
 
 
 def _relative_places(
-    own: Strides, phases: Annotated[Floats, "poses"], roots: Annotated[Floats, "poses 3"]
+    cycles: Strides, phases: Annotated[Floats, "poses"], roots: Annotated[Floats, "poses 3"]
 ) -> Annotated[FloorVectors, "poses"]:
     """Return the places (K,) of roots (K, 3), m, relative to the travel at phases (K,)."""
-    turned = phases * own.turns
+    turned = phases * cycles.turns
     gone = (
         floor_plane.project(roots)
-        - own.starts
-        - floor_plane.arc_displacement(phases * own.travels, turned)
+        - cycles.starts
+        - floor_plane.arc_displacement(phases * cycles.travels, turned)
     )
     return np.asarray(gone * floor_plane.unit_vectors(-turned))
 
@@ -251,10 +253,10 @@ def clip_performers(card: ModelCard) -> Annotated[Indices, "clips"]:
 
 
 def labels(
-    session: Session, who: Annotated[Indices, "*batch"]
+    session: Session, combinations: Annotated[Indices, "*batch"]
 ) -> Annotated[Floats, "*batch labels"]:
     """Return the weights (..., p) of labels by index in `label_rows`; all zero for -1."""
-    return label_table(session.card)[who]
+    return label_table(session.card)[combinations]
 
 
 def label_table(card: ModelCard) -> Annotated[Floats, "combinations labels"]:
@@ -266,7 +268,7 @@ def label_table(card: ModelCard) -> Annotated[Floats, "combinations labels"]:
 
 def _first_clips(card: ModelCard) -> tuple[Indices, Annotated[Indices, "clips"]]:
     """Return the first clip of each combination of labels, and the combination of each clip."""
-    indices = np.column_stack([own.clips for own in card.labels])
+    indices = np.column_stack([label_set.clips for label_set in card.labels])
     _, first, whose = np.unique(indices, axis=0, return_index=True, return_inverse=True)
     return first, whose.ravel()
 
@@ -280,18 +282,20 @@ def _run_batches(
     *outputs: str,
 ) -> list[Annotated[Floats, "points ..."]]:
     """Return the graph's outputs for any number of rows, computed in batches."""
-    found: list[Floats] = []
+    arrays: list[Floats] = []
     for rows in batches(len(controls)):
         cancellation.check()
-        own = controls[rows], times[rows]
-        parts = session.run(*own, *outputs, labels=labels[rows], level=level)
-        if not found:
-            found = [np.empty((len(controls), *part.shape[1:])) for part in parts]
+        inputs = controls[rows], times[rows]
+        batch_arrays = session.run(*inputs, *outputs, labels=labels[rows], level=level)
+        if not arrays:
+            arrays = [
+                np.empty((len(controls), *batch_array.shape[1:])) for batch_array in batch_arrays
+            ]
         # Copied, not kept: small blocks between onnxruntime's large ones would prevent the
         # allocator from reusing those, and memory would grow with each batch.
-        for whole, part in zip(found, parts, strict=True):
-            whole[rows] = part
-    return found
+        for array, batch_array in zip(arrays, batch_arrays, strict=True):
+            array[rows] = batch_array
+    return arrays
 
 
 def batches(rows: int) -> Iterator[slice]:

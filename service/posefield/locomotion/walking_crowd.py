@@ -89,9 +89,9 @@ def frame_count(count: int, seconds: float, rate: float, seed: int) -> int:
         raise InvalidField("fps", f"{rate:g}, expected {FPS_RANGE[0]:g} to {FPS_RANGE[1]:g}")
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InvalidField("seconds", f"{seconds:g}, expected a time above 0")
-    most = poses(count, seconds, rate)
-    if most > MAX_POSES:
-        raise InvalidField("count", f"{most:.3g} poses, expected {MAX_POSES} at most")
+    pose_count = poses(count, seconds, rate)
+    if pose_count > MAX_POSES:
+        raise InvalidField("count", f"{pose_count:.3g} poses, expected {MAX_POSES} at most")
     # Tolerance of a millionth of a frame for the rounding of seconds * rate.
     return math.floor(seconds * rate + 1e-6) + 1
 
@@ -102,7 +102,7 @@ def poses(count: int, seconds: float, rate: float) -> float:
 
 
 def crowd_of_plan(
-    session: Session, plan: LocomotionPlan, shown: LevelSchedule, make: MotionMaker | None = None
+    session: Session, plan: LocomotionPlan, levels: LevelSchedule, make: MotionMaker | None = None
 ) -> CrowdClip:
     """Return the crowd of a plan, each character with its own motion in the frame of its start.
 
@@ -115,8 +115,8 @@ def crowd_of_plan(
         frames,
         Placement(plan.roots[:, 0], plan.headings[:, 0]),
         np.arange(characters),
-        _batches(session, plan.relative_to_start(), shown, make or motions),
-        {**_facts(session, plan), "level_shares": _level_shares(session, shown)},
+        _batches(session, plan.relative_to_start(), levels, make or motions),
+        {**_facts(session, plan), "level_shares": _level_shares(session, levels)},
         tuple(curve.name for curve in session.card.curves),
     )
 
@@ -132,68 +132,70 @@ def _facts(session: Session, plan: LocomotionPlan) -> dict[str, Any]:
     }
 
 
-def _level_shares(session: Session, shown: LevelSchedule) -> list[float]:
-    counts = np.bincount(shown.levels.ravel(), minlength=len(session.card.levels))
-    return [float(f"{share:.4g}") for share in counts / shown.levels.size]
+def _level_shares(session: Session, levels: LevelSchedule) -> list[float]:
+    counts = np.bincount(levels.levels.ravel(), minlength=len(session.card.levels))
+    return [float(f"{share:.4g}") for share in counts / levels.levels.size]
 
 
 def _batches(
-    session: Session, plan: LocomotionPlan, shown: LevelSchedule, make: MotionMaker
+    session: Session, plan: LocomotionPlan, levels: LevelSchedule, make: MotionMaker
 ) -> Iterator[Motions]:
     count, frames = plan.phases.shape
     together = max(1, POSES_PER_BATCH // frames)
     for first in range(0, count, together):
-        who = np.arange(first, min(first + together, count))
-        yield make(session, plan, who, shown.select(who))
+        characters = np.arange(first, min(first + together, count))
+        yield make(session, plan, characters, levels.select(characters))
 
 
 def motions(
     session: Session,
     plan: LocomotionPlan,
-    who: Annotated[Indices, "motions"],
-    shown: LevelSchedule,
+    characters: Annotated[Indices, "motions"],
+    levels: LevelSchedule,
     pose: PoseMaker = locomotion_plan.synthesize_poses,
 ) -> Motions:
     """Return the motions of characters (M,) of the plan, at their levels of detail.
 
     pose: computes the poses, which are those of the prediction by default.
     """
-    shape = (len(who), plan.phases.shape[1])
+    shape = (len(characters), plan.phases.shape[1])
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
     rotations = np.empty((count, joints, 4), np.float32)
     roots = np.empty((count, 3), np.float32)
     values = np.empty((count, len(session.card.curves)), np.float32)
     for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
         character, frame = np.divmod(np.arange(count)[rows], shape[1])
-        own_pose = partial(pose, session, plan)
-        posed = _blended_poses(session.card, own_pose, (who[character], frame), shown.rows(rows))
+        pose_pairs = partial(pose, session, plan)
+        posed = _blended_poses(
+            session.card, pose_pairs, (characters[character], frame), levels.rows(rows)
+        )
         rotations[rows] = posed.rotations
         roots[rows] = floor_plane.at_height(posed.places, posed.heights)
         if posed.curves is not None:
             values[rows] = curves.clamp(session.card.curves, posed.curves)
     # Bone lengths must not vary with the speed: they are those at the mean controls.
-    usual = plan.controls[who].mean(axis=1)
-    bones = stride.bones(session, usual, plan.labels.weights[plan.who[who]])
+    mean_controls = plan.controls[characters].mean(axis=1)
+    bones = stride.bones(session, mean_controls, plan.labels.weights[plan.who[characters]])
     turns = rotations.reshape(*shape, joints, 4)
-    own_curves = values.reshape(*shape, -1) if values.size else None
-    return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels, own_curves)
+    motion_curves = values.reshape(*shape, -1) if values.size else None
+    return Motions(turns, roots.reshape(*shape, 3), bones, levels.levels, motion_curves)
 
 
 def _blended_poses(
-    card: ModelCard, pose: _PoseMaker, pairs: Pairs, shown: LevelSchedule
+    card: ModelCard, pose: _PoseMaker, pairs: Pairs, levels: LevelSchedule
 ) -> RelativePoses:
     """Return the poses of K pairs of a character and a frame, blended where levels change.
 
-    shown: levels of the pairs, in arrays (K,).
+    levels: levels of the pairs, in arrays (K,).
     """
-    after, shares = _at_levels(card, pose, pairs, shown.levels), shown.shares
+    after, shares = _at_levels(card, pose, pairs, levels.levels), levels.shares
     between = np.flatnonzero(shares < 1.0)
     if len(between):
         some = pairs[0][between], pairs[1][between]
-        before = _at_levels(card, pose, some, shown.previous[between])
-        for name, whole in after.arrays.items():
+        before = _at_levels(card, pose, some, levels.previous[between])
+        for name, blended in after.arrays.items():
             mix = quat.nlerp if name == "rotations" else quat.lerp
-            whole[between] = mix(getattr(before, name), whole[between], shares[between])
+            blended[between] = mix(getattr(before, name), blended[between], shares[between])
     return after
 
 
@@ -207,9 +209,9 @@ def _at_levels(card: ModelCard, pose: _PoseMaker, pairs: Pairs, levels: Indices)
     )
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        own = pose(pairs[0][rows], pairs[1][rows], level)
-        for name, whole in poses.arrays.items():
-            whole[rows] = getattr(own, name)
+        level_poses = pose(pairs[0][rows], pairs[1][rows], level)
+        for name, array in poses.arrays.items():
+            array[rows] = getattr(level_poses, name)
     return poses
 
 
@@ -222,8 +224,8 @@ def measure_foot_skate(
     is ignored, unless the motion is shorter than a stride. Needs a card with feet.
     """
     bones, roots, rotations = (
-        part.astype(np.float64)
-        for part in (motions.bone_offsets, motions.root_position, motions.rotations)
+        values.astype(np.float64)
+        for values in (motions.bone_offsets, motions.root_position, motions.rotations)
     )
     local = skeleton.translations(bones, roots)
     joints = skeleton.positions(card.skeleton.parents, rotations, local)
@@ -247,11 +249,13 @@ def foot_skate_per_clip(gait: Gait, rate: float) -> Annotated[Floats, "clips 1"]
     card = gait.session.card
     controls = np.array(card.examples)
     length = round(float(np.mean(card.durations)) * rate) + 1
-    who = stride.clip_performers(card)
+    combinations = stride.clip_performers(card)
     nowhere = np.zeros(len(controls))
     origin = floor_plane.project(np.zeros((len(controls), 3)))
-    held = np.repeat(controls[:, None], length, axis=1)
-    plan = locomotion_plan.plan_from_controls(gait, held, who, nowhere, (origin, nowhere), rate)
+    constant = np.repeat(controls[:, None], length, axis=1)
+    plan = locomotion_plan.plan_from_controls(
+        gait, constant, combinations, nowhere, (origin, nowhere), rate
+    )
     finest = locomotion_plan.constant_schedule(0, plan.phases.shape)
     return measure_foot_skate(
         card, motions(gait.session, plan, np.arange(len(controls)), finest), rate
@@ -316,28 +320,28 @@ class CrowdOrder:
             raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
 
 
-def from_question(asked: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrder:
+def from_question(question: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrder:
     """Return the order of a question; its characters follow the routes if there are any."""
     camera = None
-    if asked.camera is not None:
-        fov = DEFAULT_FOV if asked.fov is None else asked.fov
-        height = DEFAULT_HEIGHT if asked.height is None else asked.height
-        camera = Camera(np.array(asked.camera), fov, height)
+    if question.camera is not None:
+        fov = DEFAULT_FOV if question.fov is None else question.fov
+        height = DEFAULT_HEIGHT if question.height is None else question.height
+        camera = Camera(np.array(question.camera), fov, height)
     return CrowdOrder(
-        count=asked.count,
+        count=question.count,
         routes=routes,
-        motions=asked.motions,
-        seconds=asked.seconds,
-        fps=asked.fps,
-        seed=asked.seed,
-        level=asked.level,
+        motions=question.motions,
+        seconds=question.seconds,
+        fps=question.fps,
+        seed=question.seed,
+        level=question.level,
         camera=camera,
-        pixels=DEFAULT_PIXELS if asked.pixels is None else asked.pixels,
-        labels=asked.labels,
-        feet=asked.feet,
-        take=asked.take,
-        variety=asked.variety,
-        detail=asked.detail,
+        pixels=DEFAULT_PIXELS if question.pixels is None else question.pixels,
+        labels=question.labels,
+        feet=question.feet,
+        take=question.take,
+        variety=question.variety,
+        detail=question.detail,
     )
 
 
@@ -351,8 +355,8 @@ def build_crowd(
     """
     gait = gait.with_labels(order.labels)
     plan = _build_plan(gait, order)
-    shown = _build_schedule(model, plan, order)
-    crowd = crowd_of_plan(gait.session, plan, shown, make)
+    levels = _build_schedule(model, plan, order)
+    crowd = crowd_of_plan(gait.session, plan, levels, make)
     if order.motions is None:
         return crowd
     # The characters reuse the motions in turn.

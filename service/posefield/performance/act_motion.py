@@ -64,12 +64,12 @@ class Act:
             return min(max(round((when - self.begins) * RATE), 0), last)
         if when == "event":
             return last if self.event is None else self.event
-        moved = skeleton.translations(self.bones, self.passage.roots)
-        paths = skeleton.positions(parents, self.passage.rotations, moved)
+        translations = skeleton.translations(self.bones, self.passage.roots)
+        paths = skeleton.positions(parents, self.passage.rotations, translations)
         return round(measures.moment_frame(Measure("height", (joint,), when), paths, 0.0))
 
 
-def act_passage(model: Synthesizer, asked: MotionQuestion) -> Act:
+def act_passage(model: Synthesizer, act_question: MotionQuestion) -> Act:
     """Return the act of a question in the frame of its segment.
 
     Its frames are those of `RATE` that pass through the event, or through the end where the model
@@ -79,17 +79,17 @@ def act_passage(model: Synthesizer, asked: MotionQuestion) -> Act:
     card = model.session.card
     if card.cyclic:
         raise InvalidField("act", f"{model.name} is a cycle, expected a model of another motion")
-    times, event = _times(model, model.question(asked))
-    given = {name: getattr(asked, name) for name in MotionQuestion.__struct_fields__}
-    answer = poses.synthesize_poses(model, PoseQuestion(**given, times=times.tolist()))
-    own = Passage(
+    times, event = _times(model, model.question(act_question))
+    fields = {name: getattr(act_question, name) for name in MotionQuestion.__struct_fields__}
+    answer = poses.synthesize_poses(model, PoseQuestion(**fields, times=times.tolist()))
+    passage = Passage(
         quat.normalize(answer.rotations.astype(np.float64)),
         answer.root_position.astype(np.float64),
-        _contacts(model, model.question(asked), answer),
+        _contacts(model, model.question(act_question), answer),
         np.full(len(times), answer.trust.sigma),
     )
     return Act(
-        own,
+        passage,
         answer.bone_offsets.astype(np.float64),
         None if card.event is None else event,
         answer.trust,
@@ -112,8 +112,8 @@ def times_through(moment: float, duration: float) -> tuple[Frames, int]:
 
 def _times(model: Synthesizer, question: ValidatedQuestion) -> tuple[Frames, int]:
     """Return the times (F,), s, of an act's frames, and the frame of the event, or the last."""
-    found = model.session.durations(question.point, question.labels, question.level)
-    duration = model.check_duration(float(found[0]))
+    durations = model.session.durations(question.point, question.labels, question.level)
+    duration = model.check_duration(float(durations[0]))
     event, last = model.session.card.event, model.session.card.frames - 1
     if event is None or event.share == 1.0:
         return times_through(duration, duration)
@@ -130,9 +130,9 @@ def _contacts(
     Contacts of a foot of which the model knows none are detected in the motion.
     """
     card = model.session.card
-    found = np.zeros((len(answer.times), len(card.feet)))
-    known = {own.joint: column for column, own in enumerate(card.contacts)}
-    if known:
+    contacts = np.zeros((len(answer.times), len(card.feet)))
+    columns = {contact.joint: column for column, contact in enumerate(card.contacts)}
+    if columns:
         (likely,) = model.session.run(
             question.point,
             answer.times[None],
@@ -140,16 +140,16 @@ def _contacts(
             labels=question.labels,
             level=question.level,
         )
-    others = [joint for joint in card.feet if joint not in known]
+    unknown_joints = [joint for joint in card.feet if joint not in columns]
     # Without a foot to detect, no joint is placed.
-    moved = answer.bone_offsets, others, answer.rotations, answer.root_position
-    placed = limbs.evaluate_joints(card.skeleton.parents, *moved) if others else None
+    motion = answer.bone_offsets, unknown_joints, answer.rotations, answer.root_position
+    placed = limbs.evaluate_joints(card.skeleton.parents, *motion) if unknown_joints else None
     for foot, joint in enumerate(card.feet):
-        if joint in known:
-            found[:, foot] = likely[0][:, known[joint]]
+        if joint in columns:
+            contacts[:, foot] = likely[0][:, columns[joint]]
         elif placed is not None:
-            found[:, foot] = stance_rows.detect(placed.position(joint), RATE)
-    return found
+            contacts[:, foot] = stance_rows.detect(placed.position(joint), RATE)
+    return contacts
 
 
 def _no_goal(angle: float) -> FloorMotion:

@@ -36,23 +36,23 @@ MAX_ROUNDS, PLACE_TOLERANCE = 16, 1e-5
 
 
 def act_at(
-    model: Synthesizer, asked: MotionQuestion, by: FloorMotion, world: Iterable[int] = ()
+    model: Synthesizer, question: MotionQuestion, by: FloorMotion, world: Iterable[int] = ()
 ) -> Act:
     """Return the act of a question in the frame of a segment that `by` places in the world.
 
     world: indices of the targets whose positions are in the world; the other ones are in the frame
     of the segment. Raises as `act_motion.act_passage` does.
     """
-    back, moved = by.inverse(), list(asked.targets)
+    back, targets = by.inverse(), list(question.targets)
     for index in world:
-        found = back.place(np.array(_checked(index, moved[index])))
-        moved[index] = _at(moved[index], found)
-    return act_motion.act_passage(model, replace(asked, targets=tuple(moved)))
+        position = back.place(np.array(_checked(index, targets[index])))
+        targets[index] = _at(targets[index], position)
+    return act_motion.act_passage(model, replace(question, targets=tuple(targets)))
 
 
 def act_from(
     model: Synthesizer,
-    asked: MotionQuestion,
+    question: MotionQuestion,
     position: complex,
     facing: float,
     world: Iterable[int] = (),
@@ -65,26 +65,26 @@ def act_from(
     pose in each round, and as `act_at` does.
     """
     world = tuple(world)
-    rest = tuple(own for index, own in enumerate(asked.targets) if index not in world)
-    free = act_motion.act_passage(model, replace(asked, targets=rest))
+    rest = tuple(target for index, target in enumerate(question.targets) if index not in world)
+    free = act_motion.act_passage(model, replace(question, targets=rest))
     if not world:
         return free, free.motion_to(position, facing)
     by = free.motion_to(position, facing)
-    trial = replace(asked, extrapolate="ok")
+    trial = replace(question, extrapolate="ok")
     for _ in range(rounds):
-        found = act_at(model, trial, by, world)
-        start = complex(floor_plane.project(by.place(found.passage.roots[:1]))[0])
-        gap, turn = abs(start - position), abs(by.turn + found.heading - facing)
+        act = act_at(model, trial, by, world)
+        start = complex(floor_plane.project(by.place(act.passage.roots[:1]))[0])
+        gap, turn = abs(start - position), abs(by.turn + act.heading - facing)
         if max(gap, turn) < PLACE_TOLERANCE:
-            return act_at(model, asked, by, world), by
-        by = found.motion_to(position, facing)
+            return act_at(model, question, by, world), by
+        by = act.motion_to(position, facing)
     raise InvalidField(
         "at", f"the targets move the first pose {gap:.3g} m from it, expected targets that do not"
     )
 
 
 def place_by_target(
-    model: Synthesizer, asked: MotionQuestion, world: int = 0
+    model: Synthesizer, question: MotionQuestion, world: int = 0
 ) -> tuple[Act, complex]:
     """Return the act that takes place where its target in the world is.
 
@@ -95,22 +95,22 @@ def place_by_target(
     OutOfReach for a height that the motion does not reach, unless `extrapolate` is "ok", and as
     `act_motion.act_passage` does.
     """
-    target = asked.targets[world]
+    target = question.targets[world]
     height = _checked(world, target)[1]
-    given, point = _expected_position(model, asked, world)
-    moved = list(asked.targets)
-    moved[world] = _at(target, np.array([point[0], height, point[2]]))
-    own = replace(given, targets=tuple(moved))
+    with_height, point = _expected_position(model, question, world)
+    targets = list(question.targets)
+    targets[world] = _at(target, np.array([point[0], height, point[2]]))
+    with_point = replace(with_height, targets=tuple(targets))
     try:
-        act = act_motion.act_passage(model, own)
+        act = act_motion.act_passage(model, with_point)
     except OutOfReach as fault:
         if fault.field != f"targets/{world}":
             raise
-        raise _out_of_reach(model, asked, world, fault.message) from fault
-    _, results = split_results(act.trust.targets, len(moved))
-    if asked.extrapolate != "ok" and not results[world].reached:
-        said = synthesizer.miss_warnings(results[world : world + 1])[0]
-        raise _out_of_reach(model, asked, world, said)
+        raise _out_of_reach(model, question, world, fault.message) from fault
+    _, results = split_results(act.trust.targets, len(targets))
+    if question.extrapolate != "ok" and not results[world].reached:
+        message = synthesizer.miss_warnings(results[world : world + 1])[0]
+        raise _out_of_reach(model, question, world, message)
     return act, complex(floor_plane.project(point))
 
 
@@ -131,54 +131,56 @@ def _checked(index: int, target: Target) -> tuple[float, ...]:
 
 
 def _expected_position(
-    model: Synthesizer, asked: MotionQuestion, index: int
+    model: Synthesizer, act_question: MotionQuestion, index: int
 ) -> tuple[MotionQuestion, Vector]:
     """Return the question with the target's height as a control, and where the joint then is.
 
     The position (3,), m, is that of the motion without this target, at the target's moment.
     """
-    without = tuple(own for at, own in enumerate(asked.targets) if at != index)
-    free = replace(asked, targets=without)
-    goal = model.solver.constraints(model.question(free), asked).targets[index]
-    heights = _heights(model.session.card, asked, goal)
-    free = replace(free, controls={**asked.controls, **heights})
+    without = tuple(target for at, target in enumerate(act_question.targets) if at != index)
+    free = replace(act_question, targets=without)
+    goal = model.solver.constraints(model.question(free), act_question).targets[index]
+    heights = _heights(model.session.card, act_question, goal)
+    free = replace(free, controls={**act_question.controls, **heights})
     question = model.question(free)
-    held = model.solver.solve(question, model.solver.constraints(question, free))
-    return free, _position(model, question, goal, held)
+    motion = model.solver.solve(question, model.solver.constraints(question, free))
+    return free, _position(model, question, goal, motion)
 
 
-def _heights(card: ModelCard, asked: MotionQuestion, goal: JointTarget) -> dict[str, float]:
+def _heights(card: ModelCard, question: MotionQuestion, goal: JointTarget) -> dict[str, float]:
     """Return the control that is the height of a target, if there is one that is not given."""
-    found = constraint_solver.controls_from_targets(card, asked.controls, (goal,))
-    own = {c.name for c in card.controls if c.measure and c.measure.quantity == "height"}
-    return {name: value for name, value in found.items() if name in own}
+    controls = constraint_solver.controls_from_targets(card, question.controls, (goal,))
+    height_controls = {
+        c.name for c in card.controls if c.measure and c.measure.quantity == "height"
+    }
+    return {name: value for name, value in controls.items() if name in height_controls}
 
 
 def _position(
-    model: Synthesizer, question: ValidatedQuestion, goal: JointTarget, held: ConstrainedMotion
+    model: Synthesizer, question: ValidatedQuestion, goal: JointTarget, motion: ConstrainedMotion
 ) -> Vector:
     """Return the position (3,), m, of a target's joint at its moment of a motion."""
-    at = (goal.moment.share or 0.0) * (held.scene.reduced.frames - 1)
+    at = (goal.moment.share or 0.0) * (motion.scene.reduced.frames - 1)
     if goal.time is not None:
         when = np.array([goal.time])
         at = float(
             model.session.state(question.point, when, question.labels, question.level).frames[0]
         )
     aim = PositionConstraint((goal.name,), goal.moment, (0, 1, 2), np.zeros(3), at)
-    return aim.evaluate(held.scene, held.numbers)[0]
+    return aim.evaluate(motion.scene, motion.numbers)[0]
 
 
 def _out_of_reach(
-    model: Synthesizer, asked: MotionQuestion, index: int, message: str
+    model: Synthesizer, act_question: MotionQuestion, index: int, message: str
 ) -> OutOfReach:
     """Return the error of a target at a height that is out of reach, with those within it."""
-    question = model.question(replace(asked, targets=()))
-    goal = model.solver.constraints(question, asked).targets[index]
+    question = model.question(replace(act_question, targets=()))
+    goal = model.solver.constraints(question, act_question).targets[index]
     card, heights = model.session.card, []
     for controls, labels in zip(card.examples, card.clip_labels, strict=True):
-        own = dataclasses.replace(question, point=np.array([controls]), labels=labels[None])
-        held = model.solver.solve(own, NO_CONSTRAINTS)
-        heights.append(_position(model, own, goal, held)[1])
+        captured = dataclasses.replace(question, point=np.array([controls]), labels=labels[None])
+        motion = model.solver.solve(captured, NO_CONSTRAINTS)
+        heights.append(_position(model, captured, goal, motion)[1])
     return OutOfReach(
         f"targets/{index}",
         f"{message}; captured clips have heights of {min(heights):.2f} to {max(heights):.2f} m",
@@ -189,38 +191,38 @@ EXIT_SECONDS = 1.5
 """Time before the end of an act in which it may go on into the next segment, s."""
 
 
-def question_of(script: Script, own: performance_question.Act) -> MotionQuestion:
+def question_of(script: Script, act: performance_question.Act) -> MotionQuestion:
     """Return the question of an act to its model, with its targets as they are in the script."""
-    asked = script.question
+    performance = script.question
     targets = tuple(
-        Target(joint=each.joint, position=each.position, time=each.time, at=each.at)
-        for each in own.targets
+        Target(joint=target.joint, position=target.position, time=target.time, at=target.at)
+        for target in act.targets
     )
     return MotionQuestion(
-        controls=own.controls,
-        extrapolate=asked.extrapolate,
-        performer=own.performer,
-        labels=own.labels,
-        level=asked.level,
-        exact=own.exact,
+        controls=act.controls,
+        extrapolate=performance.extrapolate,
+        performer=act.performer,
+        labels=act.labels,
+        level=performance.level,
+        exact=act.exact,
         targets=targets,
-        take=asked.take,
-        variety=asked.variety,
-        detail=asked.detail,
+        take=performance.take,
+        variety=performance.variety,
+        detail=performance.detail,
     )
 
 
 def act_of(script: Script, index: int) -> tuple[performance_question.Act, Source]:
     """Return an act of a script and its source."""
-    own, source = script.segments[index], script.sources[index]
-    if not isinstance(own, performance_question.Act) or source is None:
+    act, source = script.segments[index], script.sources[index]
+    if not isinstance(act, performance_question.Act) or source is None:
         raise TypeError(f"segment {index}, expected an act")
-    return own, source
+    return act, source
 
 
-def world_targets(own: performance_question.Act) -> list[int]:
+def world_targets(act: performance_question.Act) -> list[int]:
     """Return the indices of the targets of an act whose positions are in the world."""
-    return [place for place, each in enumerate(own.targets) if each.frame == "world"]
+    return [index for index, target in enumerate(act.targets) if target.frame == "world"]
 
 
 def stage_after_walk(script: Script, index: int) -> StagedAct:
@@ -228,87 +230,92 @@ def stage_after_walk(script: Script, index: int) -> StagedAct:
 
     Raises as `act_from` and `place_by_target` do.
     """
-    own, source = act_of(script, index)
-    asked, world = question_of(script, own), world_targets(own)
-    if own.at is None:
-        free, point = place_by_target(source.model, asked, world[0])
-        goal = complex(floor_plane.project(np.array(own.targets[world[0]].position)))
+    segment, source = act_of(script, index)
+    question, world = question_of(script, segment), world_targets(segment)
+    if segment.at is None:
+        free, point = place_by_target(source.model, question, world[0])
+        goal = complex(floor_plane.project(np.array(segment.targets[world[0]].position)))
 
         def facing(angle: float) -> FloorMotion:
             return free.motion_to(goal, angle, point)
 
-        by = None if own.facing is None else facing(own.facing)
+        by = None if segment.facing is None else facing(segment.facing)
         return StagedAct(index, free, by, goal, facing)
-    goal = complex(own.at[1], own.at[0])
-    if own.facing is None and not world:
-        act = act_motion.act_passage(source.model, asked)
+    goal = complex(segment.at[1], segment.at[0])
+    if segment.facing is None and not world:
+        act = act_motion.act_passage(source.model, question)
         return StagedAct(index, act, None, goal, lambda angle: act.motion_to(goal, angle))
-    if own.facing is None:
+    if segment.facing is None:
         raise InvalidField("facing", "none, expected one: the act has a place and a target")
-    return StagedAct(index, *act_from(source.model, asked, goal, own.facing, world))
+    return StagedAct(index, *act_from(source.model, question, goal, segment.facing, world))
 
 
 def stage_at_join(timeline: Timeline, script: Script, index: int) -> StagedAct:
     """Return an act that takes place where it says, or where the motion before it ends."""
-    own, source = act_of(script, index)
-    asked, world = question_of(script, own), world_targets(own)
-    if own.at is not None:
-        goal = complex(own.at[1], own.at[0])
-        facing = script.question.start.heading if own.facing is None else own.facing
-        return StagedAct(index, *act_from(source.model, asked, goal, facing, world))
-    if own.facing is not None:
-        raise InvalidField("facing", f"{own.facing:g} without at, expected with at only")
+    segment, source = act_of(script, index)
+    question, world = question_of(script, segment), world_targets(segment)
+    if segment.at is not None:
+        goal = complex(segment.at[1], segment.at[0])
+        facing = script.question.start.heading if segment.facing is None else segment.facing
+        return StagedAct(index, *act_from(source.model, question, goal, facing, world))
+    if segment.facing is not None:
+        raise InvalidField("facing", f"{segment.facing:g} without at, expected with at only")
     if timeline.motion is None:
         x, z = script.question.start.position
         heading = script.question.start.heading
-        return StagedAct(index, *act_from(source.model, asked, complex(z, x), heading, world))
+        return StagedAct(index, *act_from(source.model, question, complex(z, x), heading, world))
     if not world:
-        return StagedAct(index, act_motion.act_passage(source.model, asked), None)
-    rest = tuple(each for place, each in enumerate(asked.targets) if place not in world)
-    free = act_motion.act_passage(source.model, replace(asked, targets=rest))
-    own_entries = entry_range(len(free.passage), free.event)
-    cut = timeline.find_cut(script.adapted(index, free.passage), own_entries)
-    return StagedAct(index, act_at(source.model, asked, cut.motion, world), cut.motion)
+        return StagedAct(index, act_motion.act_passage(source.model, question), None)
+    rest = tuple(target for number, target in enumerate(question.targets) if number not in world)
+    free = act_motion.act_passage(source.model, replace(question, targets=rest))
+    entries = entry_range(len(free.passage), free.event)
+    cut = timeline.find_cut(script.adapted(index, free.passage), entries)
+    return StagedAct(index, act_at(source.model, question, cut.motion, world), cut.motion)
 
 
 def add_act(timeline: Timeline, script: Script, staged: StagedAct) -> None:
     """Go on with an act."""
     index, act = staged.segment, staged.act
-    own, _ = act_of(script, index)
+    segment, _ = act_of(script, index)
     passage = script.adapted(index, act.passage) if staged.adapted is None else staged.adapted
     if timeline.motion is None:
         by = staged.by or FloorMotion()
         timeline.begin_with(passage.placed(by))
         first, begin = 0, 0
     else:
-        entries = range(1) if own.join.cut == "end" else entries_of(script, staged, len(passage))
-        if own.join.cut == "end":
+        entries = (
+            range(1) if segment.join.cut == "end" else entries_of(script, staged, len(passage))
+        )
+        if segment.join.cut == "end":
             timeline.exits = timeline.exits[-1:]
         cut = timeline.find_cut(passage, entries, staged.by)
-        check_distance(own.join, cut)
+        check_distance(segment.join, cut)
         by = cut.motion
         gaits = timeline.spans[-1].kind == "walk" if timeline.spans else False, False
-        kind, seconds = choose_blend(own.join, gaits)
+        kind, seconds = choose_blend(segment.join, gaits)
         first = timeline.join(index, passage.placed(by), cut, kind, seconds)
         begin = cut.exit
     _record(timeline, script, staged, (first, begin, by))
 
 
 def _record(
-    timeline: Timeline, script: Script, staged: StagedAct, place: tuple[int, int, FloorMotion]
+    timeline: Timeline, script: Script, staged: StagedAct, placement: tuple[int, int, FloorMotion]
 ) -> None:
-    """Add the span of an act. place: frame of its own first one, of its begin, and its motion."""
-    (first, begin, by), act, index = place, staged.act, staged.segment
+    """Add the span of an act.
+
+    placement: frame of its own first one, of its begin, and its motion.
+    """
+    (first, begin, by), act, index = placement, staged.act, staged.segment
     frames = [first + frame for frame in target_frames(script, staged)]
-    own, source = act_of(script, index)
+    segment, source = act_of(script, index)
     trust, done = act.trust, timeline.done
     # An act that is entered after its event, as a return is, has no event of its own.
     event = None if act.event is None or first + act.event <= begin else first + act.event
-    _, results = split_results(trust.targets, len(own.targets))
+    _, results = split_results(trust.targets, len(segment.targets))
     # How far its limbs stay from targets is said of the character of the performance.
-    missed = synthesizer.miss_warnings(results)
+    miss_warnings = synthesizer.miss_warnings(results)
     for sentence in trust.warnings:
-        if sentence not in missed:
+        if sentence not in miss_warnings:
             timeline.warn(f"/segments/{index}", sentence)
     timeline.spans.append(
         Span(
@@ -327,7 +334,7 @@ def _record(
     last = len(done) - 1
     earliest = max(begin + 1, last - round(EXIT_SECONDS * RATE), event or 0, *frames)
     timeline.exits = range(min(earliest, last), last + 1)
-    for number, (target, frame) in enumerate(zip(own.targets, frames, strict=True)):
+    for number, (target, frame) in enumerate(zip(segment.targets, frames, strict=True)):
         pointer = f"/segments/{index}/targets/{number}"
         position = np.array(target.position, dtype=np.float64)
         if target.frame == "segment":

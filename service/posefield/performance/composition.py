@@ -39,25 +39,25 @@ from posefield.question.results import ConstraintResult, FeetResult
 from posefield.synthesis import standing_feet
 
 
-def plan(script: Script, most: int) -> PerformanceReport:
-    """Return the report of a performance without its poses. most: largest number of frames.
+def plan(script: Script, frame_limit: int) -> PerformanceReport:
+    """Return the report of a performance without its poses. frame_limit: largest number of frames.
 
     Raises QueryError with a pointer into the script.
     """
     timeline = compose(script)
-    times = frame_times(timeline, script.question.fps, most)
+    times = frame_times(timeline, script.question.fps, frame_limit)
     joins = _judge_joins(script, timeline, timeline.performed)
     return _report(script, timeline, joins, len(times), None)
 
 
-def perform(script: Script, most: int) -> PerformanceAnswer:
-    """Return the performance of a script as one clip. most: largest number of frames.
+def perform(script: Script, frame_limit: int) -> PerformanceAnswer:
+    """Return the performance of a script as one clip. frame_limit: largest number of frames.
 
     Raises QueryError with a pointer into the script.
     """
     timeline = compose(script)
     question, character = script.question, script.character
-    times = frame_times(timeline, question.fps, most)
+    times = frame_times(timeline, question.fps, frame_limit)
     feet: FeetResult | None = None
     feet_plan: FeetPlan | None = None
     motion = timeline.performed
@@ -102,8 +102,8 @@ def _judge_joins(script: Script, timeline: Timeline, motion: Passage) -> list[Jo
         if join.reasons:
             timeline.warn(f"/segments/{join.segment}", "; ".join(join.reasons))
     # Acts may be faster than captured clips, as extrapolated ones are.
-    ends = [*(span.begin for span in timeline.spans[1:]), len(timeline.done)]
-    for index, (span, end) in enumerate(zip(timeline.spans, ends, strict=True)):
+    stops = [*(span.begin for span in timeline.spans[1:]), len(timeline.done)]
+    for index, (span, end) in enumerate(zip(timeline.spans, stops, strict=True)):
         if span.kind == "act" and timeline.captured:
             frames = (span.begin - timeline.begin, end - timeline.begin)
             warning = join_quality.judge_act(body, motion, frames, timeline.captured[index])
@@ -178,13 +178,13 @@ def _stage_ahead(script: Script, index: int) -> StagedAct | None:
         return acts.stage_after_walk(script, index + 1)
 
 
-def frame_times(timeline: Timeline, fps: float, most: int) -> Frames:
-    """Return the times (F,), s, of the frames; InvalidField for more than `most`."""
+def frame_times(timeline: Timeline, fps: float, limit: int) -> Frames:
+    """Return the times (F,), s, of the frames; InvalidField for more than `limit`."""
     seconds = (len(timeline.performed) - 1) / RATE
     count = int(seconds * fps + 1e-6) + 1
-    if count > most:
+    if count > limit:
         raise InvalidField(
-            "segments", f"{count} frames at {fps:g} a second, expected at most {most}"
+            "segments", f"{count} frames at {fps:g} a second, expected at most {limit}"
         )
     return np.arange(count) / fps
 
@@ -262,9 +262,9 @@ def _travel(
     walk: WalkPlan, floor: Annotated[FloorVectors, "frames"]
 ) -> Annotated[FloorVectors, "means"]:
     """Return velocities (M,) from one cycle's beginning to its end, m/s."""
-    begins, ends, times = _cycles(walk.phases)
+    begins, stops, times = _cycles(walk.phases)
     frames = np.arange(len(floor))
-    steps = np.interp(ends, frames, floor) - np.interp(begins, frames, floor)
+    steps = np.interp(stops, frames, floor) - np.interp(begins, frames, floor)
     return np.asarray(steps / times)
 
 
@@ -272,10 +272,10 @@ def _means(
     phases: Annotated[Floats, "frames"], values: Annotated[Floats | FloorVectors, "frames"]
 ) -> Annotated[Any, "means"]:
     """Return the means (M,) of values over one cycle of phase that begins at each frame."""
-    begins, ends, _ = _cycles(phases)
+    begins, stops, _ = _cycles(phases)
     steps = 0.5 * (values[1:] + values[:-1]) * np.diff(phases)
     sums, frames = np.pad(np.cumsum(steps), (1, 0)), np.arange(len(values))
-    return np.asarray(np.interp(ends, frames, sums) - np.interp(begins, frames, sums))
+    return np.asarray(np.interp(stops, frames, sums) - np.interp(begins, frames, sums))
 
 
 def _cycles(
@@ -283,8 +283,8 @@ def _cycles(
 ) -> tuple[Annotated[Floats, "means"], Annotated[Floats, "means"], Annotated[Floats, "means"]]:
     """Return frames (M,) at which cycles begin and end, and their durations, s."""
     begins = np.flatnonzero(phases <= phases[-1] - 1.0)
-    ends = np.interp(phases[begins] + 1.0, phases, np.arange(len(phases)))
-    return begins.astype(float), ends, (ends - begins) / RATE
+    stops = np.interp(phases[begins] + 1.0, phases, np.arange(len(phases)))
+    return begins.astype(float), stops, (stops - begins) / RATE
 
 
 def _rms(values: Annotated[Floats, "means"]) -> float:
@@ -302,7 +302,7 @@ def _report(
 
     joins: judged, in order. frames: of its clip. feet: None as predicted.
     """
-    motion, ends = timeline.performed, [later.begin for _, later in pairwise(timeline.spans)]
+    motion, stops = timeline.performed, [later.begin for _, later in pairwise(timeline.spans)]
     misses = {
         target.pointer: miss for target, miss in zip(timeline.targets, timeline.misses, strict=True)
     }
@@ -320,7 +320,7 @@ def _report(
         all(span.supported for span in timeline.spans),
         tuple(
             _segment(timeline, index, end, misses)
-            for index, end in enumerate([*ends, len(timeline.done) - 1])
+            for index, end in enumerate([*stops, len(timeline.done) - 1])
         ),
         tuple(_join(join, timeline.begin) for join in joins),
         (*timeline.warnings, *warnings),

@@ -62,15 +62,15 @@ class Gaze:
 
     def add(self, parents: tuple[int, ...], rotations: Rotations, weights: Frames) -> Rotations:
         """Return poses (F, J, 4) with the turn, of which a weight (F,) is made in each."""
-        moved = np.zeros((*rotations.shape[:-2], len(parents), 3))
-        _, turns = skeleton.forward_kinematics(parents, rotations, moved)
-        found = rotations.copy()
+        origins = np.zeros((*rotations.shape[:-2], len(parents), 3))
+        _, turns = skeleton.forward_kinematics(parents, rotations, origins)
+        turned = rotations.copy()
         for joint, share in self.shares.items():
             # All turns are about one axis, so that those of the joints add up.
             turn = quat.exp(share * weights[:, None] * self.turn)
             above = turns[:, parents[joint]] if parents[joint] >= 0 else quat.IDENTITY
-            found[:, joint] = quat.mul(quat.conj(above), quat.mul(turn, turns[:, joint]))
-        return found
+            turned[:, joint] = quat.mul(quat.conj(above), quat.mul(turn, turns[:, joint]))
+        return turned
 
 
 @dataclass(frozen=True)
@@ -107,41 +107,45 @@ class HeldBody:
             [self.joints[role] for role in roles if self.joints.get(role) in chain]
             for roles in (TRUNK, NECK)
         )
-        part = TRUNK_SHARE if trunk else 0.0
-        return {joint: part / len(trunk) for joint in trunk} | {
-            joint: (1.0 - part) / len(neck) for joint in neck
+        trunk_share = TRUNK_SHARE if trunk else 0.0
+        return {joint: trunk_share / len(trunk) for joint in trunk} | {
+            joint: (1.0 - trunk_share) / len(neck) for joint in neck
         }
 
     def _turned(self, gaze: Gaze, rotations: JointRotations, root: Vector, point: Vector) -> Gaze:
         """Return the turn towards a point, seen from where the head is after a turn."""
         head = self.joints["head"]
-        ahead = np.array([np.sin(self.facing), 0.0, np.cos(self.facing)])
+        forward = np.array([np.sin(self.facing), 0.0, np.cos(self.facing)])
         turned = gaze.add(self.parents, rotations[None], np.ones(1))[0]
-        moved = skeleton.translations(self.bones, root[None])[0]
-        places, _ = skeleton.forward_kinematics(self.parents, turned, moved)
-        _, turns = skeleton.forward_kinematics(self.parents, rotations, moved)
-        away = point - places[head]
+        translations = skeleton.translations(self.bones, root[None])[0]
+        positions, _ = skeleton.forward_kinematics(self.parents, turned, translations)
+        _, turns = skeleton.forward_kinematics(self.parents, rotations, translations)
+        away = point - positions[head]
         distance = float(np.linalg.norm(away))
         if distance < NEAREST:
             raise InvalidField(
                 "look_at", f"{distance:.3g} m from the head, expected at least {NEAREST:g} m"
             )
         within = self._within(turns, away / distance)
-        turn = quat.log(two_bone.shortest_turn(quat.rotate(turns[head], ahead), within))
-        beside = np.linalg.norm(quat.cross(within, away)), within @ away
-        return Gaze(gaze.shares, turn, float(np.arctan2(*beside)))
+        turn = quat.log(two_bone.shortest_turn(quat.rotate(turns[head], forward), within))
+        sine_and_cosine = np.linalg.norm(quat.cross(within, away)), within @ away
+        return Gaze(gaze.shares, turn, float(np.arctan2(*sine_and_cosine)))
 
     def _within(self, turns: JointRotations, direction: Vector) -> Vector:
         """Return the direction (3,), at most `LARGEST` aside and up from the trunk's facing."""
         trunk = next((self.joints[role] for role in TRUNK[::-1] if role in self.joints), 0)
         frame = quat.mul(turns[trunk], quat.from_axis_angle(UP, np.array(self.facing)))
-        left, up, ahead = quat.rotate(quat.conj(frame), direction)
+        left, up, forward = quat.rotate(quat.conj(frame), direction)
         aside, rise = np.clip(
-            [np.arctan2(left, ahead), np.arctan2(up, np.hypot(left, ahead))], -LARGEST, LARGEST
+            [np.arctan2(left, forward), np.arctan2(up, np.hypot(left, forward))], -LARGEST, LARGEST
         )
-        seen = [np.cos(rise) * np.sin(aside), np.sin(rise), np.cos(rise) * np.cos(aside)]
-        found: Vector = quat.rotate(frame, np.array(seen))
-        return found
+        direction_in_trunk = [
+            np.cos(rise) * np.sin(aside),
+            np.sin(rise),
+            np.cos(rise) * np.cos(aside),
+        ]
+        limited: Vector = quat.rotate(frame, np.array(direction_in_trunk))
+        return limited
 
 
 STREAM = 4
@@ -177,16 +181,16 @@ def add_sway(
 
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
-    found = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
+    sway = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
     swayed = roots.copy()
-    swayed[:, [2, 0]] += ROOT_SWAY * found[:, :2]
-    vectors = found[:, 2:].reshape(len(roots), -1, 3)
-    moved = rotations.copy()
-    for place, role in enumerate(ANGLES):
+    swayed[:, [2, 0]] += ROOT_SWAY * sway[:, :2]
+    vectors = sway[:, 2:].reshape(len(roots), -1, 3)
+    turned = rotations.copy()
+    for number, role in enumerate(ANGLES):
         if role in joints:
-            turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, place])
-            moved[:, joints[role]] = quat.mul(moved[:, joints[role]], turn)
-    return moved, swayed
+            turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, number])
+            turned[:, joints[role]] = quat.mul(turned[:, joints[role]], turn)
+    return turned, swayed
 
 
 def waves(
@@ -198,8 +202,8 @@ def waves(
     """
     angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * np.array(FREQUENCIES)
     basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.sqrt(len(FREQUENCIES))
-    found: Floats = basis @ random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
-    return found
+    numbers: Floats = basis @ random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
+    return numbers
 
 
 REST_FRAMES = 16
@@ -229,11 +233,11 @@ def come_to_rest(before: Passage) -> Passage:
     The last frames are shown in twice their time, `REST_FRAMES` at most, with the speed of time
     1 - 3 u^2 + 2 u^3 over them, so that each joint keeps its path.
     """
-    places = _slowed_places(len(before))
-    if not len(places):
+    sample_frames = _slowed_places(len(before))
+    if not len(sample_frames):
         return before
-    begin = len(before) - 1 - len(places) // 2
-    return concatenate(before.part(0, begin + 1), at_frames(before, places))
+    begin = len(before) - 1 - len(sample_frames) // 2
+    return concatenate(before.part(0, begin + 1), at_frames(before, sample_frames))
 
 
 def rest_frame(frames: int, frame: int) -> int:
@@ -241,22 +245,22 @@ def rest_frame(frames: int, frame: int) -> int:
 
     frames: number of frames of the original passage.
     """
-    places = _slowed_places(frames)
-    begin = frames - 1 - len(places) // 2
+    sample_frames = _slowed_places(frames)
+    begin = frames - 1 - len(sample_frames) // 2
     if frame <= begin:
         return frame
-    return begin + 1 + int(np.argmin(np.abs(places - frame)))
+    return begin + 1 + int(np.argmin(np.abs(sample_frames - frame)))
 
 
 def _slowed_places(frames: int) -> Frames:
     """Return the fractional frames (S,) at which a passage of F frames is sampled as it slows."""
-    shown = min(REST_FRAMES // 2, frames - 1)
-    if not shown:
+    count = min(REST_FRAMES // 2, frames - 1)
+    if not count:
         return np.zeros(0)
-    share = np.arange(1, 2 * shown + 1) / (2 * shown)
-    gone = 2.0 * shown * (share - share**3 + 0.5 * share**4)
-    found: Frames = frames - 1 - shown + np.minimum(gone, shown)
-    return found
+    share = np.arange(1, 2 * count + 1) / (2 * count)
+    gone = 2.0 * count * (share - share**3 + 0.5 * share**4)
+    sample_frames: Frames = frames - 1 - count + np.minimum(gone, count)
+    return sample_frames
 
 
 def hold_passage(
@@ -289,7 +293,10 @@ def hold_passage(
     miss = 0.0
     if look_at is not None:
         point = np.array(
-            [motion_question.check_number(f"look_at/{i}", own) for i, own in enumerate(look_at)]
+            [
+                motion_question.check_number(f"look_at/{axis}", value)
+                for axis, value in enumerate(look_at)
+            ]
         )
         gaze = body.look_at(before.rotations[-1], before.roots[-1], point)
         # A head cannot turn to a point and back in no time: a short hold turns it by a part.
@@ -300,43 +307,45 @@ def hold_passage(
     if limb is not None:
         rotations, roots = _keep(body, limb, before, rotations, roots)
     last = before.part(len(before) - 1, len(before))
-    contacts, sigmas = (np.repeat(own, count, axis=0) for own in (last.contacts, last.sigmas))
+    contacts, sigmas = (np.repeat(values, count, axis=0) for values in (last.contacts, last.sigmas))
     return Passage(rotations, roots, contacts, sigmas), miss
 
 
-def at_frames(own: Passage, places: Frames) -> Passage:
+def at_frames(passage: Passage, sample_frames: Frames) -> Passage:
     """Return a passage at fractional frames (S,), by cubics through the nearest ones."""
-    size = min(WINDOW, len(own))
-    first = np.clip(places.astype(int) - 1, 0, len(own) - size)
+    size = min(WINDOW, len(passage))
+    first = np.clip(sample_frames.astype(int) - 1, 0, len(passage) - size)
     rows = first[:, None] + np.arange(size)
-    weights = _lagrange(places - first, size)
-    nearest = own.rotations[rows[:, 0]]
-    apart = quat.log(quat.mul(quat.conj(nearest)[:, None], own.rotations[rows]))
-    turned = quat.mul(nearest, quat.exp(np.einsum("sk,skjc->sjc", weights, apart)))
-    roots = np.einsum("sk,skc->sc", weights, own.roots[rows])
-    before = np.clip(places.astype(int), 0, len(own) - 1)
-    after = np.minimum(before + 1, len(own) - 1)
-    share = places - before
-    contacts = own.contacts[before] + share[:, None] * (own.contacts[after] - own.contacts[before])
-    sigmas = own.sigmas[before] + share * (own.sigmas[after] - own.sigmas[before])
+    weights = _lagrange(sample_frames - first, size)
+    nearest = passage.rotations[rows[:, 0]]
+    offsets = quat.log(quat.mul(quat.conj(nearest)[:, None], passage.rotations[rows]))
+    turned = quat.mul(nearest, quat.exp(np.einsum("sk,skjc->sjc", weights, offsets)))
+    roots = np.einsum("sk,skc->sc", weights, passage.roots[rows])
+    before = np.clip(sample_frames.astype(int), 0, len(passage) - 1)
+    after = np.minimum(before + 1, len(passage) - 1)
+    share = sample_frames - before
+    contacts = passage.contacts[before] + share[:, None] * (
+        passage.contacts[after] - passage.contacts[before]
+    )
+    sigmas = passage.sigmas[before] + share * (passage.sigmas[after] - passage.sigmas[before])
     return Passage(turned, roots, contacts, sigmas)
 
 
-def _lagrange(places: Frames, size: int) -> np.ndarray:
+def _lagrange(points: Frames, size: int) -> np.ndarray:
     """Return the weights (S, size) of points 0, 1, ... for the polynomial through them."""
-    found = np.ones((len(places), size))
+    weights = np.ones((len(points), size))
     for point in range(size):
         for other in range(size):
             if other != point:
-                found[:, point] *= (places - other) / (point - other)
-    return found
+                weights[:, point] *= (points - other) / (point - other)
+    return weights
 
 
 def _envelope(count: int, ramp: float) -> Frames:
     """Return a weight (F,) that grows from 0 to 1 and falls to 0 in the last frame."""
     times = np.arange(1, count + 1) / RATE
-    whole = count / RATE
-    share = np.clip(np.minimum(times, whole - times) / min(ramp, 0.5 * whole), 0.0, 1.0)
+    seconds = count / RATE
+    share = np.clip(np.minimum(times, seconds - times) / min(ramp, 0.5 * seconds), 0.0, 1.0)
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
@@ -345,12 +354,12 @@ def _limb(body: HeldBody, name: str | None) -> Limb | None:
     if name is None:
         return None
     if name not in body.names:
-        known = ", ".join(body.names)
-        raise InvalidField("joint", f"{name!r}{did_you_mean(name, body.names)}, expected {known}")
-    found = limbs.find_kept_limb(body.parents, body.bones, body.names.index(name))
-    if found is None:
+        names = ", ".join(body.names)
+        raise InvalidField("joint", f"{name!r}{did_you_mean(name, body.names)}, expected {names}")
+    limb = limbs.find_kept_limb(body.parents, body.bones, body.names.index(name))
+    if limb is None:
         raise InvalidField("joint", f"{name!r}, expected a joint that an arm or a leg leads to")
-    return found
+    return limb
 
 
 def _keep(
@@ -364,16 +373,16 @@ def _keep(
         body.parents, body.bones, [limb], before.rotations[-1:], before.roots[-1:]
     )
     poses = limbs.evaluate_poses(body.parents, body.bones, [limb], rotations, roots)
-    apart = last.position(limb.lower) - poses.position(limb.upper)
-    distance = np.linalg.norm(apart, axis=-1)
+    offset = last.position(limb.lower) - poses.position(limb.upper)
+    distance = np.linalg.norm(offset, axis=-1)
     beyond = np.maximum(distance - two_bone.firm_reach(last, limb), 0.0)
-    shift = (beyond / distance)[:, None] * apart
-    turns = two_bone.solve(poses, limb, apart - shift)
+    shift = (beyond / distance)[:, None] * offset
+    turns = two_bone.solve(poses, limb, offset - shift)
     # The hand keeps its orientation while the body above it sways.
-    kept = quat.mul(quat.conj(poses.orientation(limb.lower)), last.orientation(limb.lower))
-    found = rotations.copy()
-    replace(turns, lower=quat.mul(turns.lower, kept)).apply(limb, found)
-    return found, roots + shift
+    turn_back = quat.mul(quat.conj(poses.orientation(limb.lower)), last.orientation(limb.lower))
+    turned = rotations.copy()
+    replace(turns, lower=quat.mul(turns.lower, turn_back)).apply(limb, turned)
+    return turned, roots + shift
 
 
 LOOKS_ASIDE = np.radians(2.0)
@@ -386,16 +395,16 @@ def add_hold(timeline: Timeline, script: Script, index: int) -> None:
     Raises InvalidField for a joint that cannot be held, for a point that cannot be looked at, and
     for an act before it that has a target after its event.
     """
-    own = script.segments[index]
-    if not isinstance(own, Hold):
+    hold = script.segments[index]
+    if not isinstance(hold, Hold):
         raise TypeError(f"segment {index}, expected a hold")
     _come_to_rest(timeline)
     before = timeline.done
-    joint = own.joint or _held_joint(timeline, script)
-    who = script.character
-    body = body_of(who.skeleton, who.roles, who.bones, who.facing)
+    joint = hold.joint or _held_joint(timeline, script)
+    character = script.character
+    body = body_of(character.skeleton, character.roles, character.bones, character.facing)
     passage, miss = hold_passage(
-        before, body, own.seconds, joint, own.look_at, script.question.take
+        before, body, hold.seconds, joint, hold.look_at, script.question.take
     )
     if miss > LOOKS_ASIDE:
         timeline.warn(
@@ -410,7 +419,7 @@ def add_hold(timeline: Timeline, script: Script, index: int) -> None:
     # A target that holds at the begin of a hold holds until its end.
     last = len(timeline.done) - 1
     timeline.targets = [
-        replace(each, end=last) if each.end == begin else each for each in timeline.targets
+        replace(target, end=last) if target.end == begin else target for target in timeline.targets
     ]
     timeline.targets += _held_place(timeline, script, joint, range(begin, last + 1), index)
     timeline.exits = range(last, last + 1)
@@ -426,19 +435,19 @@ def _held_place(
     body, character = script.character.body, script.character
     if joint is None:
         return []
-    own = character.skeleton.names.index(joint)
-    above = skeleton.joint_chain(body.parents, own)
+    index_of_joint = character.skeleton.names.index(joint)
+    above = skeleton.joint_chain(body.parents, index_of_joint)
     standing = timeline.done.contacts[frames.start] > STANDING
     legs = zip(body.legs, standing.tolist(), strict=True)
-    known = [each for each in timeline.targets if each.end == frames[-1]]
-    if any(down and leg.lower in above for leg, down in legs) or own in {
-        each.joint for each in known
+    targets = [target for target in timeline.targets if target.end == frames[-1]]
+    if any(down and leg.lower in above for leg, down in legs) or index_of_joint in {
+        target.joint for target in targets
     }:
         return []
     pose = timeline.done.part(frames.start, frames.start + 1)
-    moved = skeleton.translations(body.bones, pose.roots)
-    place = skeleton.positions(body.parents, pose.rotations, moved)[0, own]
-    return [WorldTarget(own, place, frames[0], frames[-1], f"/segments/{index}")]
+    translations = skeleton.translations(body.bones, pose.roots)
+    position = skeleton.positions(body.parents, pose.rotations, translations)[0, index_of_joint]
+    return [WorldTarget(index_of_joint, position, frames[0], frames[-1], f"/segments/{index}")]
 
 
 def _come_to_rest(timeline: Timeline) -> None:
@@ -447,7 +456,7 @@ def _come_to_rest(timeline: Timeline) -> None:
     if span is not None and span.kind == "hold":
         return
     last = len(done) - 1 if span is None or span.event is None else span.event
-    late = next((own for own in timeline.targets if own.begin > last), None)
+    late = next((target for target in timeline.targets if target.begin > last), None)
     if late is not None:
         raise InvalidField(
             "",
@@ -461,11 +470,11 @@ def _come_to_rest(timeline: Timeline) -> None:
         timeline.spans[-1] = replace(span, event=later)
     timeline.targets = [
         replace(
-            own,
-            begin=rest_frame(last + 1, own.begin),
-            end=rest_frame(last + 1, own.end),
+            target,
+            begin=rest_frame(last + 1, target.begin),
+            end=rest_frame(last + 1, target.end),
         )
-        for own in timeline.targets
+        for target in timeline.targets
     ]
 
 

@@ -99,9 +99,16 @@ def usual_acceleration(character: Character, passages: Sequence[Passage]) -> flo
 
     The passages are as their models made them: without joins.
     """
-    found = [accelerations(character, passage, 0, len(passage)) for passage in passages]
+    accelerations_of_passages = [
+        accelerations(character, passage, 0, len(passage)) for passage in passages
+    ]
     return max(
-        (float(np.percentile(own, USUAL_PERCENTILE)) for own in found if len(own)), default=0.0
+        (
+            float(np.percentile(values, USUAL_PERCENTILE))
+            for values in accelerations_of_passages
+            if len(values)
+        ),
+        default=0.0,
     )
 
 
@@ -112,32 +119,34 @@ def judge(
     return [replace(join, peak=_peak(character, motion, join.frame - begin)) for join in joins]
 
 
-def judge_act(character: Character, sent: Passage, frames: tuple[int, int], captured: float) -> str:
+def judge_act(
+    character: Character, motion: Passage, frames: tuple[int, int], captured: float
+) -> str:
     """Return a warning about an act that is faster than captured clips of its model; else "".
 
-    sent: all frames of the performance, at `RATE`. frames: of the act, from its begin until before
-    its end; those near joins count as the joins'. captured: 99th percentile of the accelerations
-    of captured clips, m/s².
+    motion: all frames of the performance, at `RATE`. frames: of the act, from its begin until
+    before its end; those near joins count as the joins'. captured: 99th percentile of the
+    accelerations of captured clips, m/s².
     """
     # The first and the last one of these frames have no acceleration of their own.
     begin = frames[0] + round(AFTER * RATE) if frames[0] else 0
-    end = frames[1] - round(BEFORE * RATE) + 1 if frames[1] < len(sent.roots) else frames[1]
-    found = accelerations(character, sent, begin + 1, max(end, begin) - 1)
-    peak = float(found.max(initial=0.0))
+    end = frames[1] - round(BEFORE * RATE) + 1 if frames[1] < len(motion.roots) else frames[1]
+    values = accelerations(character, motion, begin + 1, max(end, begin) - 1)
+    peak = float(values.max(initial=0.0))
     if peak <= MOST_PEAK * captured:
         return ""
-    time = (begin + 1 + int(np.argmax(found))) / RATE
+    time = (begin + 1 + int(np.argmax(values))) / RATE
     return (
         f"joints accelerate by {peak:.0f} m/s2 at {time:.2f} s, expected at most {MOST_PEAK:g}"
         f" times the {captured:.1f} m/s2 of captured clips of the model"
     )
 
 
-def _peak(character: Character, sent: Passage, frame: int) -> float:
+def _peak(character: Character, motion: Passage, frame: int) -> float:
     """Return the largest acceleration near a frame, m/s², as `JoinFacts.peak` is."""
     first = max(frame - round(BEFORE * RATE) - 1, 0)
-    found = accelerations(character, sent, first + 1, frame + round(AFTER * RATE) + 1)
-    return float(found.max(initial=0.0))
+    values = accelerations(character, motion, first + 1, frame + round(AFTER * RATE) + 1)
+    return float(values.max(initial=0.0))
 
 
 FARTHEST = 0.05
@@ -175,9 +184,9 @@ def on_floor(
     heights = _balls(character, passage) @ UP
     down = np.round(passage.contacts, DECIMALS) > STANDING
     above = [
-        float(np.median(ball[own])) - foot.height - floor
-        for ball, foot, own in zip(heights.T, contacts, down.T, strict=True)
-        if own.any()
+        float(np.median(ball[standing])) - foot.height - floor
+        for ball, foot, standing in zip(heights.T, contacts, down.T, strict=True)
+        if standing.any()
     ]
     raised = -float(np.mean(above)) if above else 0.0
     return replace(passage, roots=passage.roots + raised * UP), raised
@@ -198,10 +207,14 @@ def add_steps(
         before.part(cut.exit, cut.exit + 1),
         after.part(cut.entry, cut.entry + end - cut.exit),
     )
-    made = joined.part(cut.exit, cut.exit + len(right))
+    blended = joined.part(cut.exit, cut.exit + len(right))
     # All at once: for so few poses each call takes longer than the poses.
-    every = _balls(character, concatenate(left, right, made))
-    own, there, shown = every[0], every[1 : 1 + len(right)], every[1 + len(right) :]
+    balls = _balls(character, concatenate(left, right, blended))
+    ball_before, balls_after, balls_blended = (
+        balls[0],
+        balls[1 : 1 + len(right)],
+        balls[1 + len(right) :],
+    )
     stands = [
         np.round(side.contacts[at], DECIMALS) > STANDING
         for side, at in ((before, cut.exit), (after, cut.entry))
@@ -209,16 +222,16 @@ def add_steps(
     contacts = joined.contacts.copy()
     landed = cut.exit
     for foot in np.flatnonzero(~stands[0] & stands[1]).tolist():
-        last = cut.exit + _landing(shown[:, foot], there[:, foot])
+        last = cut.exit + _landing(balls_blended[:, foot], balls_after[:, foot])
         contacts[cut.exit : last, foot] = 0.0
         landed = max(landed, last)
-    apart = _apart(own, there[0])
-    must = np.flatnonzero(stands[0] & stands[1] & (np.round(apart, DECIMALS) > FARTHEST))
+    distances = _apart(ball_before, balls_after[0])
+    must = np.flatnonzero(stands[0] & stands[1] & (np.round(distances, DECIMALS) > FARTHEST))
     steps = []
     for foot in sorted(
-        must.tolist(), key=lambda foot: (-round(float(apart[foot]), DECIMALS), foot)
+        must.tolist(), key=lambda foot: (-round(float(distances[foot]), DECIMALS), foot)
     ):
-        step = JoinStep(foot, landed, landed + round(SWING * RATE), float(apart[foot]))
+        step = JoinStep(foot, landed, landed + round(SWING * RATE), float(distances[foot]))
         _swing(contacts, step)
         steps.append(step)
         landed = step.end + round(SUPPORT * RATE)
@@ -236,22 +249,26 @@ def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames 
 
 
 def _apart(
-    own: Annotated[Floats, "*#batch 3"], other: Annotated[Floats, "*#batch 3"]
+    points: Annotated[Floats, "*#batch 3"], other_points: Annotated[Floats, "*#batch 3"]
 ) -> Annotated[Floats, "*batch"]:
     """Return distances over the floor, m."""
-    found: Floats = np.abs(floor_plane.project(own) - floor_plane.project(other))
-    return found
+    distances: Floats = np.abs(floor_plane.project(points) - floor_plane.project(other_points))
+    return distances
 
 
-def _landing(shown: Annotated[Floats, "frames 3"], there: Annotated[Floats, "frames 3"]) -> int:
+def _landing(
+    path: Annotated[Floats, "frames 3"], target_path: Annotated[Floats, "frames 3"]
+) -> int:
     """Return the number of frames from a cut to the landing of a foot.
 
     It lands once its shown path is within 5 cm of the place where it stands after the join, and
     nearly as low; at `LANDING` at the latest.
     """
-    count = min(len(shown), len(there), round(LANDING * RATE))
-    own, other = shown[:count], there[:count]
-    near = (_apart(own, other) <= FARTHEST) & (np.abs(own[:, 1] - other[:, 1]) <= LOW)
+    count = min(len(path), len(target_path), round(LANDING * RATE))
+    points, target_points = path[:count], target_path[:count]
+    near = (_apart(points, target_points) <= FARTHEST) & (
+        np.abs(points[:, 1] - target_points[:, 1]) <= LOW
+    )
     return int(np.argmax(near)) if near.any() else count
 
 

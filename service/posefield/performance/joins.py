@@ -96,17 +96,17 @@ def find_cut(
     left, right = _poses(character, before, exits), _poses(character, after, entries)
     sums = _sums(left, right)
     if motion is None:
-        found = sums.products - sums.left * np.conj(sums.right) / sums.weights
-        size = np.abs(found)
-        turns = np.where(size > 0.0, found / np.maximum(size, 1e-300), 1.0)
+        products = sums.products - sums.left * np.conj(sums.right) / sums.weights
+        size = np.abs(products)
+        turns = np.where(size > 0.0, products / np.maximum(size, 1e-300), 1.0)
         gaps = (sums.left - turns * sums.right) / sums.weights
     else:
-        given = np.exp(1j * motion.turn)
-        gaps = (given * right.roots + motion.shift)[None] - left.roots[:, None]
-        turns = np.full(gaps.shape, given)
+        factor = np.exp(1j * motion.turn)
+        gaps = (factor * right.roots + motion.shift)[None] - left.roots[:, None]
+        turns = np.full(gaps.shape, factor)
     costs = _costs(sums, turns, gaps) / left.floor.shape[1]
-    place = int(np.argmin(np.round(costs / GRAIN)))
-    row, column = divmod(place, len(entries))
+    best = int(np.argmin(np.round(costs / GRAIN)))
+    row, column = divmod(best, len(entries))
     turn, gap = complex(turns[row, column]), complex(gaps[row, column])
     if motion is None:
         # The gap is that of the roots; the shift also undoes what the turn does to the root.
@@ -122,35 +122,35 @@ def positions(
     character: Character, passage: Passage, begin: int, end: int
 ) -> Annotated[Floats, "frames joints 3"]:
     """Return the joint positions (F, J, 3), m, of frames `begin` until before `end`."""
-    moved = skeleton.translations(character.bones, passage.roots[begin:end])
-    return skeleton.positions(character.parents, passage.rotations[begin:end], moved)
+    translations = skeleton.translations(character.bones, passage.roots[begin:end])
+    return skeleton.positions(character.parents, passage.rotations[begin:end], translations)
 
 
 def _poses(character: Character, passage: Passage, frames: range) -> _Poses:
     """Return the poses of frames with their velocities: central differences, or of one side."""
     begin, end = max(frames[0] - 1, 0), min(frames[-1] + 2, len(passage))
-    found = positions(character, passage, begin, end)
-    own = np.array(frames) - begin
-    earlier, later = np.maximum(own - 1, 0), np.minimum(own + 1, end - begin - 1)
+    points = positions(character, passage, begin, end)
+    rows = np.array(frames) - begin
+    earlier, later = np.maximum(rows - 1, 0), np.minimum(rows + 1, end - begin - 1)
     time = np.maximum(later - earlier, 1)[:, None, None] / RATE
-    velocities = (found[later] - found[earlier]) / time * VELOCITY_TIME
-    places = found[own]
-    floor, roots = floor_plane.project(places), floor_plane.project(passage.roots[frames])
+    velocities = (points[later] - points[earlier]) / time * VELOCITY_TIME
+    centres = points[rows]
+    floor, roots = floor_plane.project(centres), floor_plane.project(passage.roots[frames])
     extra = np.zeros(floor.shape)
     standing = np.round(passage.contacts[frames], DECIMALS) > STANDING
     for leg, stands in zip(character.legs, standing.T, strict=True):
         extra[:, leg.tip] = np.sqrt(FOOT_WEIGHT - 1.0) * stands
     flow, climb = floor_plane.project(velocities), velocities @ UP
-    return _Poses(roots, floor - roots[:, None], places @ UP, flow, climb, extra)
+    return _Poses(roots, floor - roots[:, None], centres @ UP, flow, climb, extra)
 
 
 def _costs(sums: "_Sums", turns: PairVectors, gaps: PairVectors) -> PairValues:
     """Return the costs (E, B), m², of pairs under floor motions, summed over the joints."""
-    apart = sums.squares - 2.0 * (np.conj(turns) * sums.products).real
-    apart += sums.weights * np.square(np.abs(gaps))
-    apart -= 2.0 * (np.conj(gaps) * (sums.left - turns * sums.right)).real
-    found: Floats = np.maximum(apart, 0.0)
-    return found
+    squares = sums.squares - 2.0 * (np.conj(turns) * sums.products).real
+    squares += sums.weights * np.square(np.abs(gaps))
+    squares -= 2.0 * (np.conj(gaps) * (sums.left - turns * sums.right)).real
+    costs: Floats = np.maximum(squares, 0.0)
+    return costs
 
 
 @dataclass(frozen=True)
@@ -174,12 +174,17 @@ def _sums(left: _Poses, right: _Poses) -> _Sums:
     # Heights and climbs do not depend on the motion: their products belong to the squares.
     upright = left.weigh(left.heights) @ right.weigh(right.heights).T
     upright += left.climb @ right.climb.T
-    own, other = (np.square(np.abs(side.floor)) + np.square(side.heights) for side in (left, right))
+    left_squares, right_squares = (
+        np.square(np.abs(side.floor)) + np.square(side.heights) for side in (left, right)
+    )
     moving = [
         np.sum(np.square(np.abs(side.flow)) + np.square(side.climb), axis=1)
         for side in (left, right)
     ]
-    squares = left.weigh(own) @ right.weigh(ones[1]).T + left.weigh(ones[0]) @ right.weigh(other).T
+    squares = (
+        left.weigh(left_squares) @ right.weigh(ones[1]).T
+        + left.weigh(ones[0]) @ right.weigh(right_squares).T
+    )
     products = left.weigh(left.floor) @ right.weigh(right.floor).conj().T
     return _Sums(
         left.weigh(ones[0]) @ right.weigh(ones[1]).T,
@@ -220,23 +225,25 @@ def entered(
     of the passage after. Variances are mixed, with the distance at the cut:
     s² = s_A² (1 - a) + s_B² a + d² a (1 - a), where a is the share of the passage after.
     """
-    found = after.part(cut.entry, len(after))
+    passage = after.part(cut.entry, len(after))
     seconds = SECONDS[kind] if seconds is None else seconds
-    frames = min(round(seconds * RATE), len(found) - 1)
+    frames = min(round(seconds * RATE), len(passage) - 1)
     if kind == "cut" or frames < 1:
-        return found
+        return passage
     times = np.arange(frames) / RATE
     shares = smoothstep(times * RATE / frames)
     fade = _dead if kind == "dead" else _hermite
-    own, other = _moments(before, cut.exit), _moments(after, cut.entry)
-    turns = found.rotations[:frames]
-    rotations, roots = found.rotations.copy(), found.roots.copy()
-    rotations[:frames], roots[:frames] = fade(own, other, times, shares, turns, roots[:frames])
+    moment_before, moment_after = _moments(before, cut.exit), _moments(after, cut.entry)
+    turns = passage.rotations[:frames]
+    rotations, roots = passage.rotations.copy(), passage.roots.copy()
+    rotations[:frames], roots[:frames] = fade(
+        moment_before, moment_after, times, shares, turns, roots[:frames]
+    )
     variance = np.square(before.sigmas[cut.exit]) * (1.0 - shares)
-    variance = variance + np.square(found.sigmas[:frames]) * shares
+    variance = variance + np.square(passage.sigmas[:frames]) * shares
     variance = variance + cut.distance**2 * shares * (1.0 - shares)
-    sigmas = np.concatenate([np.sqrt(variance), found.sigmas[frames:]])
-    return replace(found, rotations=rotations, roots=roots, sigmas=sigmas)
+    sigmas = np.concatenate([np.sqrt(variance), passage.sigmas[frames:]])
+    return replace(passage, rotations=rotations, roots=roots, sigmas=sigmas)
 
 
 @dataclass(frozen=True)
@@ -262,12 +269,19 @@ def _moments(passage: Passage, frame: int) -> _Moment:
     earlier, later = max(frame - 1, 0), min(frame + 1, len(passage) - 1)
     time = max(later - earlier, 1) / RATE
     turned = quat.mul(passage.rotations[later], quat.conj(passage.rotations[earlier]))
-    way = (passage.roots[later] - passage.roots[earlier]) / time
-    return _Moment(passage.rotations[frame], quat.log(turned) / time, passage.roots[frame], way)
+    velocity = (passage.roots[later] - passage.roots[earlier]) / time
+    return _Moment(
+        passage.rotations[frame], quat.log(turned) / time, passage.roots[frame], velocity
+    )
 
 
 def _dead(
-    own: _Moment, other: _Moment, times: Frames, shares: Frames, turns: Turns, roots: Any
+    source_moment: _Moment,
+    target_moment: _Moment,
+    times: Frames,
+    shares: Frames,
+    turns: Turns,
+    roots: Any,
 ) -> tuple[Turns, Annotated[Floats, "frames 3"]]:
     """Return the frames of a dead blend: the passage before, that fades into the one after.
 
@@ -276,30 +290,36 @@ def _dead(
     """
     rate = np.log(2.0) / HALF_LIFE
     gone = -np.expm1(-rate * times) / rate
-    source = quat.mul(quat.exp(gone[:, None, None] * own.spins), own.turns)
+    source = quat.mul(quat.exp(gone[:, None, None] * source_moment.spins), source_moment.turns)
     offsets = _continuous_log(quat.mul(source, quat.conj(turns)))
     left = (1.0 - shares)[:, None]
-    path = roots + left * (own.root + gone[:, None] * own.way - roots)
+    path = roots + left * (source_moment.root + gone[:, None] * source_moment.way - roots)
     return quat.mul(quat.exp(left[..., None] * offsets), turns), path
 
 
 def _hermite(
-    own: _Moment, other: _Moment, times: Frames, shares: Frames, turns: Turns, roots: Any
+    source_moment: _Moment,
+    target_moment: _Moment,
+    times: Frames,
+    shares: Frames,
+    turns: Turns,
+    roots: Any,
 ) -> tuple[Turns, Annotated[Floats, "frames 3"]]:
     """Return the frames of a Hermite blend: an offset that fades from its place and velocity."""
-    whole = len(times) / RATE
-    share = times / whole
-    place = 1.0 - smoothstep(share)
-    slope = whole * share * np.square(1.0 - share)
+    seconds = len(times) / RATE
+    share = times / seconds
+    fade = 1.0 - smoothstep(share)
+    slope = seconds * share * np.square(1.0 - share)
     step = 1.0 / RATE
     around = [
-        quat.mul(own.at(time)[0], quat.conj(other.at(time)[0])) for time in (-step, 0.0, step)
+        quat.mul(source_moment.at(time)[0], quat.conj(target_moment.at(time)[0]))
+        for time in (-step, 0.0, step)
     ]
     first, offset, last = _continuous_log(np.stack(around), start=1)
     speed = (last - first) / (2.0 * step)
-    turned = place[:, None, None] * offset + slope[:, None, None] * speed
-    path = roots + place[:, None] * (own.root - other.root)
-    path = path + slope[:, None] * (own.way - other.way)
+    turned = fade[:, None, None] * offset + slope[:, None, None] * speed
+    path = roots + fade[:, None] * (source_moment.root - target_moment.root)
+    path = path + slope[:, None] * (source_moment.way - target_moment.way)
     return quat.mul(quat.exp(turned), turns), path
 
 

@@ -47,8 +47,8 @@ class WorldTarget:
 def find_limbs(character: Character, targets: Sequence[WorldTarget]) -> dict[int, Limb | None]:
     """Return the limb that moves each joint with a target; None for a joint of the trunk."""
     return {
-        own.joint: limbs.find_kept_limb(character.parents, character.bones, own.joint)
-        for own in targets
+        target.joint: limbs.find_kept_limb(character.parents, character.bones, target.joint)
+        for target in targets
     }
 
 
@@ -60,17 +60,18 @@ def meet_targets(
     A target out of reach is approached as far as its limb extends. A joint of the trunk stays where
     it is.
     """
-    found = find_limbs(character, targets)
-    for own in targets:
-        limb = found[own.joint]
+    limb_of_joint = find_limbs(character, targets)
+    for target in targets:
+        limb = limb_of_joint[target.joint]
         if limb is not None:
-            others = [
-                each
-                for each in targets
-                if (other := found[each.joint]) and set(_chain(other)).intersection(_chain(limb))
+            same_limb = [
+                other_target
+                for other_target in targets
+                if (other := limb_of_joint[other_target.joint])
+                and set(_chain(other)).intersection(_chain(limb))
             ]
-            passage = _moved(character, passage, limb, own, others)
-    return passage, tuple(_miss(character, passage, own) for own in targets)
+            passage = _moved(character, passage, limb, target, same_limb)
+    return passage, tuple(_miss(character, passage, target) for target in targets)
 
 
 def find_leads(
@@ -86,11 +87,14 @@ def find_leads(
     count, around = len(frames), EASING * RATE
     feet, root = np.zeros((len(character.legs), count), bool), np.zeros(count, bool)
     arms: dict[Limb, Frames] = {}
-    found = find_limbs(character, targets)
+    limb_of_joint = find_limbs(character, targets)
     used = {joint for leg in character.legs for joint in _chain(leg)}
-    for own in targets:
-        limb, share = found[own.joint], _share(np.array(frames, float), own, around, around)
-        above = skeleton.joint_chain(character.parents, own.joint)
+    for target in targets:
+        limb, share = (
+            limb_of_joint[target.joint],
+            _share(np.array(frames, float), target, around, around),
+        )
+        above = skeleton.joint_chain(character.parents, target.joint)
         legs = [leg.lower in above for leg in character.legs]
         if limb is not None and (limb in arms or not used.intersection(_chain(limb))):
             arms[limb] = np.maximum(arms.get(limb, 0.0), share)
@@ -112,49 +116,55 @@ def _moved(
     character: Character,
     passage: Passage,
     limb: Limb,
-    own: WorldTarget,
-    others: Sequence[WorldTarget],
+    target: WorldTarget,
+    same_limb: Sequence[WorldTarget],
 ) -> Passage:
     """Return the passage with one limb bent so that its tip meets a target.
 
-    others: targets of joints of the same limb, at which this one does not act.
+    same_limb: targets of joints of the same limb, at which this one does not act.
     """
-    way, held = _hold(_poses(character, passage, limb, range(own.begin, own.end + 1)), limb, own)
+    distance, target_turns = _hold(
+        _poses(character, passage, limb, range(target.begin, target.end + 1)), limb, target
+    )
     # A cosine over a time T has the acceleration 0.5 (pi / T)^2 times the way.
-    around = float(np.sqrt(0.5 * np.pi**2 * way / GENTLE))
+    around = float(np.sqrt(0.5 * np.pi**2 * distance / GENTLE))
     frames = round(float(np.clip(around, EASING, LONGEST_EASING)) * RATE)
-    before = min([frames, *(own.begin - each.end for each in others if each.end < own.begin)])
-    after = min([frames, *(each.begin - own.end for each in others if each.begin > own.end)])
-    rows = range(max(own.begin - before, 0), min(own.end + after + 1, len(passage)))
-    share = _share(np.array(rows, float), own, before, after)
+    before = min(
+        [frames, *(target.begin - other.end for other in same_limb if other.end < target.begin)]
+    )
+    after = min(
+        [frames, *(other.begin - target.end for other in same_limb if other.begin > target.end)]
+    )
+    rows = range(max(target.begin - before, 0), min(target.end + after + 1, len(passage)))
+    share = _share(np.array(rows, float), target, before, after)
     poses = _poses(character, passage, limb, rows)
     rotations = passage.rotations.copy()
-    _eased(poses, limb, held, share, own.begin - rows.start).apply(
+    _eased(poses, limb, target_turns, share, target.begin - rows.start).apply(
         limb, rotations[rows.start : rows.stop]
     )
     return replace(passage, rotations=rotations)
 
 
 def _poses(character: Character, passage: Passage, limb: Limb, rows: range) -> LimbPoses:
-    own = slice(rows.start, rows.stop)
+    frames = slice(rows.start, rows.stop)
     return limbs.evaluate_poses(
-        character.parents, character.bones, [limb], passage.rotations[own], passage.roots[own]
+        character.parents, character.bones, [limb], passage.rotations[frames], passage.roots[frames]
     )
 
 
-def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> tuple[float, LimbTurns]:
+def _hold(poses: LimbPoses, limb: Limb, target: WorldTarget) -> tuple[float, LimbTurns]:
     """Return the turns of a limb, while a target holds, with its tip there or nearest to it.
 
     First is the way along which its end goes there, m, as an arc.
     """
     upper, lower = poses.position(limb.upper), poses.position(limb.lower)
-    wanted = own.position - poses.position(limb.tip) + lower
-    goal = wanted + _shortfall(poses, limb, upper, wanted)
+    target_end = target.position - poses.position(limb.tip) + lower
+    goal = target_end + _shortfall(poses, limb, upper, target_end)
     end = goal - upper
     distance = np.linalg.norm(end, axis=-1)
     above, below = poses.length(limb.middle), poses.length(limb.lower)
-    least = np.maximum(distance, 1.001 * np.abs(above - below) + 1e-6)
-    end = end * (least / np.maximum(distance, 1e-9))[:, None]
+    length = np.maximum(distance, 1.001 * np.abs(above - below) + 1e-6)
+    end = end * (length / np.maximum(distance, 1e-9))[:, None]
     before = (lower - upper)[:1]
     sine, cosine = np.linalg.norm(quat.cross(before, end[:1])), np.sum(before * end[:1])
     arc = float(np.arctan2(sine, cosine) * np.linalg.norm(end[0]))
@@ -162,17 +172,17 @@ def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> tuple[float, LimbTu
     return float(np.hypot(arc, stretch)), two_bone.solve(poses, limb, end)
 
 
-def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) -> Vector:
+def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, target_end: RootPath) -> Vector:
     """Return by how much the end of a limb stays away from where it is wanted (3,), m.
 
     It is the same in all frames, so that what is held stays still while the body sways.
     """
     firm = two_bone.firm_reach(poses, limb)
-    if (np.linalg.norm(wanted - upper, axis=-1) <= firm + 1e-9).all():
+    if (np.linalg.norm(target_end - upper, axis=-1) <= firm + 1e-9).all():
         return np.zeros(3)
     centre = upper.mean(axis=0)
     spread = float(np.linalg.norm(upper - centre, axis=-1).max())
-    away = wanted.mean(axis=0) - centre
+    away = target_end.mean(axis=0) - centre
     distance = max(float(np.linalg.norm(away)), 1e-9)
     length = float((poses.length(limb.middle) + poses.length(limb.lower))[0])
     reached = float(two_bone.soften(np.array([distance + spread]), firm[:1], length)[0]) - spread
@@ -182,22 +192,24 @@ def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) 
     return shortfall
 
 
-def _eased(poses: LimbPoses, limb: Limb, held: LimbTurns, share: Frames, first: int) -> LimbTurns:
+def _eased(
+    poses: LimbPoses, limb: Limb, target_turns: LimbTurns, share: Frames, first: int
+) -> LimbTurns:
     """Return the turns of a limb's joints on the way to a target, while it holds, and after it.
 
     share: of the turns that the target needs (F,). first: frame from which on it holds. The
     orientation of the limb's end is kept.
     """
-    count = len(held.upper)
+    count = len(target_turns.upper)
     near = np.clip(np.arange(len(share)) - first, 0, count - 1)
     above = poses.parent_orientation(limb.upper)
-    own = [
+    predicted = [
         quat.mul(quat.conj(above), poses.orientation(limb.upper)),
         quat.mul(quat.conj(poses.orientation(limb.upper)), poses.orientation(limb.middle)),
     ]
     upper, middle = (
         _turned(before, after, share, near, first)
-        for before, after in zip(own, (held.upper, held.middle), strict=True)
+        for before, after in zip(predicted, (target_turns.upper, target_turns.middle), strict=True)
     )
     turned = quat.mul(above, quat.mul(upper, middle))
     return LimbTurns(upper, middle, quat.mul(quat.conj(turned), poses.orientation(limb.lower)))
@@ -205,7 +217,7 @@ def _eased(poses: LimbPoses, limb: Limb, held: LimbTurns, share: Frames, first: 
 
 def _turned(
     before: Turns,
-    held: Annotated[Floats, "held 4"],
+    target_turns: Annotated[Floats, "held 4"],
     share: Frames,
     near: Annotated[Indices, "frames"],
     first: int,
@@ -214,24 +226,28 @@ def _turned(
 
     near: for each frame, that of the held ones (H, 4) that is nearest to it.
     """
-    apart = quat.mul(held, quat.conj(before[first : first + len(held)]))
-    apart = apart * np.where(apart[:, :1] < 0.0, -1.0, 1.0)
-    return quat.mul(quat.exp(share[:, None] * quat.log(apart)[near]), before)
+    difference = quat.mul(target_turns, quat.conj(before[first : first + len(target_turns)]))
+    difference = difference * np.where(difference[:, :1] < 0.0, -1.0, 1.0)
+    return quat.mul(quat.exp(share[:, None] * quat.log(difference)[near]), before)
 
 
-def _share(frames: Frames, own: WorldTarget, before: float, after: float) -> Frames:
+def _share(frames: Frames, target: WorldTarget, before: float, after: float) -> Frames:
     """Return the share (F,) of a target: 1 while it holds, 0 some frames `before` and `after`."""
-    early, late = (own.begin - frames) / before, (frames - own.end) / after
+    early, late = (target.begin - frames) / before, (frames - target.end) / after
     away = np.clip(np.maximum(early, late), 0.0, 1.0)
-    found: Frames = 0.5 + 0.5 * np.cos(np.pi * away)
-    return found
+    share: Frames = 0.5 + 0.5 * np.cos(np.pi * away)
+    return share
 
 
-def _miss(character: Character, passage: Passage, own: WorldTarget) -> float:
+def _miss(character: Character, passage: Passage, target: WorldTarget) -> float:
     """Return the largest distance of a joint from its target while it holds, m."""
-    part = passage.part(own.begin, min(own.end + 1, len(passage)))
+    target_frames = passage.part(target.begin, min(target.end + 1, len(passage)))
     placed = limbs.evaluate_joints(
-        character.parents, character.bones, [own.joint], part.rotations, part.roots
+        character.parents,
+        character.bones,
+        [target.joint],
+        target_frames.rotations,
+        target_frames.roots,
     )
-    found = placed.position(own.joint)
-    return float(np.linalg.norm(found - own.position, axis=-1).max())
+    path = placed.position(target.joint)
+    return float(np.linalg.norm(path - target.position, axis=-1).max())

@@ -31,8 +31,8 @@ class FloorMotion:
 
     def place(self, points: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch 3"]:
         """Return the moved points (..., 3), m."""
-        found = floor_plane.project(points) * np.exp(1j * self.turn) + self.shift
-        return floor_plane.at_height(found, points[..., 1])
+        floor = floor_plane.project(points) * np.exp(1j * self.turn) + self.shift
+        return floor_plane.at_height(floor, points[..., 1])
 
     def after(self, first: "FloorMotion") -> "FloorMotion":
         """Return the motion that is `first`, then this one."""
@@ -82,15 +82,15 @@ class Passage:
         )
 
 
-def concatenate(*parts: Passage) -> Passage:
+def concatenate(*passages: Passage) -> Passage:
     """Return passages one after another; with phases if all have them."""
-    phases = [part.phases for part in parts if part.phases is not None]
+    phases = [passage.phases for passage in passages if passage.phases is not None]
     return Passage(
-        np.concatenate([part.rotations for part in parts]),
-        np.concatenate([part.roots for part in parts]),
-        np.concatenate([part.contacts for part in parts]),
-        np.concatenate([part.sigmas for part in parts]),
-        np.concatenate(phases) if len(phases) == len(parts) else None,
+        np.concatenate([passage.rotations for passage in passages]),
+        np.concatenate([passage.roots for passage in passages]),
+        np.concatenate([passage.contacts for passage in passages]),
+        np.concatenate([passage.sigmas for passage in passages]),
+        np.concatenate(phases) if len(phases) == len(passages) else None,
     )
 
 
@@ -133,10 +133,10 @@ class SkeletonMatch:
         """Return local rotations (..., J, 4) of the target whose bones point as in the source."""
         if self.is_identity:
             return source
-        own = quat.mul(source, self.turns)
+        turned = quat.mul(source, self.turns)
         above = self.turns[list(self.parents[1:])]
-        rest = quat.mul(quat.conj(above), own[..., 1:, :])
-        return np.concatenate([own[..., :1, :], rest], axis=-2)
+        rest = quat.mul(quat.conj(above), turned[..., 1:, :])
+        return np.concatenate([turned[..., :1, :], rest], axis=-2)
 
 
 def match_skeletons(source: Skeleton, target: Skeleton, feet: Sequence[int] = ()) -> SkeletonMatch:
@@ -154,36 +154,36 @@ def match_skeletons(source: Skeleton, target: Skeleton, feet: Sequence[int] = ()
 _matches: ValueCache[Hashable, SkeletonMatch] = ValueCache(KEPT_MATCHES)
 
 
-def _value(own: Skeleton) -> Hashable:
+def _value(joints_of: Skeleton) -> Hashable:
     """Return what two equal skeletons have in common."""
-    numbers = own.offsets.tobytes(), own.tip_offsets.tobytes()
-    return own.names, own.parents, own.tip_joints, numbers
+    numbers = joints_of.offsets.tobytes(), joints_of.tip_offsets.tobytes()
+    return joints_of.names, joints_of.parents, joints_of.tip_joints, numbers
 
 
 def _match(source: Skeleton, target: Skeleton, feet: Sequence[int]) -> SkeletonMatch:
     _expect_one_tree(source, target)
     turns = np.tile(quat.IDENTITY, (len(source), 1))
     flat = _soles(target, feet)
-    apart = np.zeros(len(source))
+    angles = np.zeros(len(source))
     for joint, parent in enumerate(source.parents):
-        arms = [_directions(each, joint, source, target) for each in (source, target)]
+        arms = [_directions(side, joint, source, target) for side in (source, target)]
         if not len(arms[0]):
             # A joint without bones turns with its parent.
             turns[joint] = turns[parent] if joint and joint not in flat else quat.IDENTITY
             continue
         across = np.linalg.norm(np.cross(arms[0], arms[1]), axis=-1)
-        apart[joint] = np.arctan2(across, np.sum(arms[0] * arms[1], axis=-1)).max()
-        if apart[joint] > LEAST_ANGLE and joint not in flat:
+        angles[joint] = np.arctan2(across, np.sum(arms[0] * arms[1], axis=-1)).max()
+        if angles[joint] > LEAST_ANGLE and joint not in flat:
             turns[joint] = _turn(*arms)
-    _expect_near(source, target, apart)
+    _expect_near(source, target, angles)
     turns.flags.writeable = False
-    return SkeletonMatch(source.parents, turns, tuple(_notes(source, target, apart)))
+    return SkeletonMatch(source.parents, turns, tuple(_notes(source, target, angles)))
 
 
 def scale_heights(roots: RootPath, share: float) -> RootPath:
     """Return roots (F, 3), m, at heights times the share of leg lengths; paths stay as they are."""
-    found: RootPath = roots * np.array([1.0, share, 1.0])
-    return found
+    scaled: RootPath = roots * np.array([1.0, share, 1.0])
+    return scaled
 
 
 def leg_share(parents: tuple[int, ...], source: Bones, target: Bones, feet: Sequence[int]) -> float:
@@ -195,76 +195,81 @@ def leg_share(parents: tuple[int, ...], source: Bones, target: Bones, feet: Sequ
         return 1.0
     chains = [skeleton.joint_chain(parents, foot)[1:] for foot in feet]
     long = [
-        sum(float(np.linalg.norm(bones[list(own)], axis=-1).sum()) for own in chains)
+        sum(float(np.linalg.norm(bones[list(chain)], axis=-1).sum()) for chain in chains)
         for bones in (target, source)
     ]
     return long[0] / long[1]
 
 
-def _soles(own: Skeleton, feet: Sequence[int]) -> set[int]:
+def _soles(target: Skeleton, feet: Sequence[int]) -> set[int]:
     """Return the joints of feet: the ends of the legs, and what they carry."""
-    below = skeleton.descendant_matrix(own.parents)
-    found: set[int] = set()
+    below = skeleton.descendant_matrix(target.parents)
+    joints: set[int] = set()
     for foot in feet:
-        leg = limbs.find_limb(own.parents, own.offsets, foot)
-        found.update(np.flatnonzero(below[foot if leg is None else leg.lower]).tolist())
-    return found
+        leg = limbs.find_limb(target.parents, target.offsets, foot)
+        joints.update(np.flatnonzero(below[foot if leg is None else leg.lower]).tolist())
+    return joints
 
 
 def _expect_one_tree(source: Skeleton, target: Skeleton) -> None:
     if len(source) != len(target):
         raise SkeletonsDiffer(f"{len(source)} joints, expected {len(target)}")
-    for joint, (own, expected) in enumerate(zip(source.parents, target.parents, strict=True)):
-        if own != expected:
+    for joint, (parent, expected) in enumerate(zip(source.parents, target.parents, strict=True)):
+        if parent != expected:
             raise SkeletonsDiffer(
                 f"joint {joint}, {source.names[joint]!r}, is a child of "
-                f"{source.names[own]!r}, expected as {target.names[joint]!r} of "
+                f"{source.names[parent]!r}, expected as {target.names[joint]!r} of "
                 f"{target.names[expected]!r}: joint {expected}"
             )
 
 
-def _expect_near(source: Skeleton, target: Skeleton, apart: Annotated[Floats, "joints"]) -> None:
-    joint = int(np.argmax(apart))
-    if apart[joint] > MOST_APART:
+def _expect_near(source: Skeleton, target: Skeleton, angles: Annotated[Floats, "joints"]) -> None:
+    joint = int(np.argmax(angles))
+    if angles[joint] > MOST_APART:
         raise SkeletonsDiffer(
             f"a bone at joint {joint}, {source.names[joint]!r}, points"
-            f" {np.degrees(apart[joint]):.0f} degrees away from that at {target.names[joint]!r} in"
+            f" {np.degrees(angles[joint]):.0f} degrees away from that at {target.names[joint]!r} in"
             f" the rest poses, expected at most {np.degrees(MOST_APART):.0f}"
         )
 
 
-def _notes(source: Skeleton, target: Skeleton, apart: Annotated[Floats, "joints"]) -> Iterator[str]:
+def _notes(
+    source: Skeleton, target: Skeleton, angles: Annotated[Floats, "joints"]
+) -> Iterator[str]:
     pairs = [pair for pair in zip(source.names, target.names, strict=True) if pair[0] != pair[1]]
     if pairs:
         yield (
             f"{len(pairs)} of {len(source)} joints have other names, such as {pairs[0][0]!r} for"
             f" {pairs[0][1]!r}: joints are matched by their place in the tree"
         )
-    if apart.max() > LEAST_ANGLE:
+    if angles.max() > LEAST_ANGLE:
         yield (
-            f"the rest poses differ by {np.degrees(apart.max()):.1f} degrees at most: bones point"
+            f"the rest poses differ by {np.degrees(angles.max()):.1f} degrees at most: bones point"
             " as in the source, but for those of feet, which are flat where they are in the source"
         )
 
 
 def _directions(
-    own: Skeleton, joint: int, source: Skeleton, target: Skeleton
+    side: Skeleton, joint: int, source: Skeleton, target: Skeleton
 ) -> Annotated[Floats, "bones 3"]:
     """Return the bones of a joint (B, 3), m, that have a length in both skeletons.
 
     They lead to its children, or to its end sites where these are as many in both.
     """
-    children = [child for child, parent in enumerate(own.parents) if parent == joint]
-    both = [np.linalg.norm(each.offsets[children], axis=-1) for each in (source, target)]
-    arms: Floats = own.offsets[children][np.min(both, axis=0) > SHORTEST_BONE]
+    children = [child for child, parent in enumerate(side.parents) if parent == joint]
+    both = [np.linalg.norm(compared.offsets[children], axis=-1) for compared in (source, target)]
+    arms: Floats = side.offsets[children][np.min(both, axis=0) > SHORTEST_BONE]
     if len(arms):
         return arms
-    tips = [each.tip_offsets[np.array(each.tip_joints) == joint] for each in (source, target)]
+    tips = [
+        compared.tip_offsets[np.array(compared.tip_joints) == joint]
+        for compared in (source, target)
+    ]
     if len(tips[0]) != len(tips[1]) or not len(tips[0]):
         return np.zeros((0, 3))
-    long = np.min([np.linalg.norm(each, axis=-1) for each in tips], axis=0) > SHORTEST_BONE
-    found: Floats = own.tip_offsets[np.array(own.tip_joints) == joint][long]
-    return found
+    long = np.min([np.linalg.norm(compared, axis=-1) for compared in tips], axis=0) > SHORTEST_BONE
+    directions: Floats = side.tip_offsets[np.array(side.tip_joints) == joint][long]
+    return directions
 
 
 def _turn(

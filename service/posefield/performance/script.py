@@ -71,48 +71,48 @@ def _numbers(question: PerformanceQuestion) -> Iterator[Bounded]:
     for index, disc in enumerate(question.obstacles):
         yield from _places(f"obstacles/{index}/position", disc.position)
         yield f"obstacles/{index}/radius", disc.radius, -MOST_RADIUS, MOST_RADIUS, "m"
-    for index, own in enumerate(question.segments):
-        yield from _of_segment(f"segments/{index}", own)
+    for index, segment in enumerate(question.segments):
+        yield from _of_segment(f"segments/{index}", segment)
 
 
 def _positive(question: PerformanceQuestion) -> Iterator[tuple[str, float, str]]:
     """Yield field, value and unit of what is more than 0."""
     for index, disc in enumerate(question.obstacles):
         yield f"obstacles/{index}/radius", disc.radius, "m"
-    for index, own in enumerate(question.segments):
-        if not isinstance(own, Hold):
-            field, join = f"segments/{index}/join", own.join
+    for index, segment in enumerate(question.segments):
+        if not isinstance(segment, Hold):
+            field, join = f"segments/{index}/join", segment.join
             yield f"{field}/seconds", math.inf if join.seconds is None else join.seconds, "s"
             yield f"{field}/most", math.inf if join.most is None else join.most, "m"
 
 
-def _of_segment(field: str, own: Segment) -> Iterator[Bounded]:
-    if not isinstance(own, Act) and own.seconds is not None:
-        yield f"{field}/seconds", own.seconds, MIN_SECONDS, MAX_SECONDS, "s"
-    if not isinstance(own, Hold) and own.join.seconds is not None:
-        yield f"{field}/join/seconds", own.join.seconds, -MAX_BLEND, MAX_BLEND, "s"
-    if not isinstance(own, Hold) and own.join.most is not None:
-        yield f"{field}/join/most", own.join.most, -MOST_PLACE, MOST_PLACE, "m"
-    if isinstance(own, Walk):
-        yield from _curve(f"{field}/turn", own.turn, "rad/s")
-        yield from _curve(f"{field}/speed", own.speed, "m/s")
-        for index, point in enumerate(own.along or ()):
+def _of_segment(field: str, segment: Segment) -> Iterator[Bounded]:
+    if not isinstance(segment, Act) and segment.seconds is not None:
+        yield f"{field}/seconds", segment.seconds, MIN_SECONDS, MAX_SECONDS, "s"
+    if not isinstance(segment, Hold) and segment.join.seconds is not None:
+        yield f"{field}/join/seconds", segment.join.seconds, -MAX_BLEND, MAX_BLEND, "s"
+    if not isinstance(segment, Hold) and segment.join.most is not None:
+        yield f"{field}/join/most", segment.join.most, -MOST_PLACE, MOST_PLACE, "m"
+    if isinstance(segment, Walk):
+        yield from _curve(f"{field}/turn", segment.turn, "rad/s")
+        yield from _curve(f"{field}/speed", segment.speed, "m/s")
+        for index, point in enumerate(segment.along or ()):
             yield from _places(f"{field}/along/{index}", point)
-        yield from _places(f"{field}/to", own.to or ())
-    if isinstance(own, Act):
-        yield from _places(f"{field}/at", own.at or ())
-        if own.facing is not None:
-            yield f"{field}/facing", own.facing, -MOST_ANGLE, MOST_ANGLE, "rad"
-    if isinstance(own, Hold):
-        yield from _places(f"{field}/look_at", own.look_at or ())
+        yield from _places(f"{field}/to", segment.to or ())
+    if isinstance(segment, Act):
+        yield from _places(f"{field}/at", segment.at or ())
+        if segment.facing is not None:
+            yield f"{field}/facing", segment.facing, -MOST_ANGLE, MOST_ANGLE, "rad"
+    if isinstance(segment, Hold):
+        yield from _places(f"{field}/look_at", segment.look_at or ())
 
 
 def _curve(field: str, curve: float | Curve | None, unit: str) -> Iterator[Bounded]:
     if isinstance(curve, int | float):
         yield field, curve, -MOST_RATE, MOST_RATE, unit
         return
-    for index, (place, value) in enumerate(curve or ()):
-        yield f"{field}/{index}/0", place, -MOST_PLACE, MOST_PLACE, ""
+    for index, (knot, value) in enumerate(curve or ()):
+        yield f"{field}/{index}/0", knot, -MOST_PLACE, MOST_PLACE, ""
         yield f"{field}/{index}/1", value, -MOST_RATE, MOST_RATE, unit
 
 
@@ -153,9 +153,9 @@ class Source:
     def contacts(self) -> tuple[FootContact | None, ...]:
         """Contacts of the character's feet in captured clips of the model; None for unknown."""
         card = self.model.session.card
-        known = {own.joint: own for own in walking_feet.foot_contacts(card)}
-        joints = list(known) if card.cyclic else list(card.feet)
-        return tuple(known.get(joints[column]) for column in self.feet)
+        contacts = {contact.joint: contact for contact in walking_feet.foot_contacts(card)}
+        joints = list(contacts) if card.cyclic else list(card.feet)
+        return tuple(contacts.get(joints[column]) for column in self.feet)
 
     def adapted(self, passage: Passage) -> Passage:
         """Return a passage of the model as one of the character."""
@@ -203,10 +203,10 @@ class Script:
 
     def adapted(self, segment: int, passage: Passage) -> Passage:
         """Return the motion of a segment's model as one of the character, on the floor."""
-        source, own = self.sources[segment], self.character
+        source, character = self.sources[segment], self.character
         if source is None:
             return passage
-        return join_quality.on_floor(own.body, source.adapted(passage), own.contacts)[0]
+        return join_quality.on_floor(character.body, source.adapted(passage), character.contacts)[0]
 
     @property
     def contacts(self) -> tuple[FootContact, ...]:
@@ -215,23 +215,25 @@ class Script:
         They are as long as in the model with the longest, and lifted by no more than 1.5 times as
         much as in the walks: a character that hops does not walk as it hops.
         """
-        return tuple(self._contact(foot, own) for foot, own in enumerate(self.character.contacts))
+        return tuple(
+            self._contact(foot, contact) for foot, contact in enumerate(self.character.contacts)
+        )
 
-    def _contact(self, foot: int, own: FootContact) -> FootContact:
+    def _contact(self, foot: int, captured: FootContact) -> FootContact:
         pairs = [(source.contacts[foot], source.own_gait) for source in self.sources if source]
-        known = [found for found, _ in pairs if found is not None] or [own]
-        walks = [found.clearance for found, gait in pairs if found is not None and gait]
+        contacts = [contact for contact, _ in pairs if contact is not None] or [captured]
+        walks = [contact.clearance for contact, gait in pairs if contact is not None and gait]
         return replace(
-            own,
-            swing=max(found.swing for found in known),
-            longest_swing=max(found.longest_swing for found in known),
-            clearance=min(own.clearance, HIGHEST_LIFT * max(walks, default=np.inf)),
+            captured,
+            swing=max(contact.swing for contact in contacts),
+            longest_swing=max(contact.longest_swing for contact in contacts),
+            clearance=min(captured.clearance, HIGHEST_LIFT * max(walks, default=np.inf)),
         )
 
     @property
     def identities(self) -> tuple[str, ...]:
         """Identities of the models, each once, in the order of the script."""
-        return tuple(dict.fromkeys(own.model.identity for own in self.sources if own))
+        return tuple(dict.fromkeys(source.model.identity for source in self.sources if source))
 
 
 @contextmanager
@@ -244,8 +246,8 @@ def errors_under(*path: str | int) -> Iterator[None]:
         # The end of a walk to an act is no field of the script.
         inner = "" if inner == "end" else inner
         # Obstacles are those of the whole script.
-        whole = () if inner.startswith("obstacles") else path
-        field = "/".join(str(part) for part in (*whole, inner) if part != "")
+        outer = () if inner.startswith("obstacles") else path
+        field = "/".join(str(name) for name in (*outer, inner) if name != "")
         raise type(fault)(field, fault.message) from fault
 
 
@@ -257,12 +259,12 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
     for numbers out of range.
     """
     check_bounds(question)
-    models = [_model(index, own, find) for index, own in enumerate(question.segments)]
-    for card in (own.session.card for own in models if own is not None):
+    models = [_model(index, model, find) for index, model in enumerate(question.segments)]
+    for card in (model.session.card for model in models if model is not None):
         if not 0 <= question.level < len(card.levels):
-            most = len(card.levels) - 1
+            coarsest = len(card.levels) - 1
             raise InvalidField(
-                "level", f"{question.level}, expected 0 to {most}, as {card.name} has"
+                "level", f"{question.level}, expected 0 to {coarsest}, as {card.name} has"
             )
     character = _character(question, models, find)
     # Refused here, as a plan refuses what its performance would.
@@ -270,18 +272,18 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
     return Script(question, tuple(_sources(question, models, character)), character)
 
 
-def _model(index: int, own: Segment, find: Callable[[str], Synthesizer]) -> Synthesizer | None:
+def _model(index: int, segment: Segment, find: Callable[[str], Synthesizer]) -> Synthesizer | None:
     """Return the model of a segment; None for a hold."""
-    if isinstance(own, Hold):
+    if isinstance(segment, Hold):
         return None
     with errors_under("segments", index):
-        model = find(own.model)
+        model = find(segment.model)
         card = model.session.card
-        if isinstance(own, Act) and card.cyclic:
+        if isinstance(segment, Act) and card.cyclic:
             raise InvalidField(
                 "model", f"{card.name} is a cycle, expected an act of another motion"
             )
-        if isinstance(own, Walk) and not (card.cyclic and card.root == "travelling"):
+        if isinstance(segment, Walk) and not (card.cyclic and card.root == "travelling"):
             raise InvalidField("model", f"{card.name} does not walk, expected a cycle that travels")
         return model
 
@@ -301,13 +303,13 @@ def _character(
             return _script_character(
                 find(chosen.model), chosen.controls, chosen.performer, chosen.labels
             )
-    every = list(enumerate(question.segments))
+    segments = list(enumerate(question.segments))
     for kind in (Act, Walk):
-        for index, own in every:
+        for index, segment in segments:
             model = models[index]
-            if isinstance(own, kind) and model is not None:
+            if isinstance(segment, kind) and model is not None:
                 with errors_under("segments", index):
-                    return _script_character(model, {}, own.performer, own.labels)
+                    return _script_character(model, {}, segment.performer, segment.labels)
     raise InvalidField("character", "none, expected one: no segment has a model")
 
 
@@ -319,26 +321,28 @@ def _script_character(
 ) -> ScriptCharacter:
     card = model.session.card
     bones = _bones(model, MotionQuestion(controls=controls, performer=performer, labels=labels))
-    known = [own for own in card.contacts if own.joint in card.feet]
-    choice = footsteps.choose_limbs(card.skeleton.parents, bones, [own.joint for own in known], ())
-    contacts = tuple(known[place] for place in choice.feet)
-    feet = tuple(own.joint for own in contacts)
+    foot_contacts = [contact for contact in card.contacts if contact.joint in card.feet]
+    choice = footsteps.choose_limbs(
+        card.skeleton.parents, bones, [contact.joint for contact in foot_contacts], ()
+    )
+    contacts = tuple(foot_contacts[index] for index in choice.feet)
+    feet = tuple(contact.joint for contact in contacts)
     facing = math.radians(card.making.facing or 0.0)
     return ScriptCharacter(
         model.identity, card.skeleton, card.roles, facing, bones, choice.character, feet, contacts
     )
 
 
-def _bones(model: Synthesizer, asked: MotionQuestion) -> Bones:
+def _bones(model: Synthesizer, body_question: MotionQuestion) -> Bones:
     """Return bone offsets (J, 3), m, at the controls and labels of a question."""
 
     def evaluated() -> Bones:
-        question = model.question(asked)
-        found = stride.bones(model.session, question.point, question.labels)[0].astype(float)
-        found.flags.writeable = False
-        return np.asarray(found)
+        question = model.question(body_question)
+        offsets = stride.bones(model.session, question.point, question.labels)[0].astype(float)
+        offsets.flags.writeable = False
+        return np.asarray(offsets)
 
-    return _kept_bones.find((model.session.digest, msgspec.json.encode(asked)), evaluated)
+    return _kept_bones.find((model.session.digest, msgspec.json.encode(body_question)), evaluated)
 
 
 _kept_bones: ValueCache[tuple[str, bytes], Bones] = ValueCache(KEPT_BONES)
@@ -350,15 +354,15 @@ def _sources(
     character: ScriptCharacter,
 ) -> Iterator[Source | None]:
     """Yield the sources of the segments; those of equal walkers are made once."""
-    made: dict[tuple[str, str | None, bytes], Source] = {}
-    for index, (own, model) in enumerate(zip(question.segments, models, strict=True)):
-        if model is None or isinstance(own, Hold):
+    sources: dict[tuple[str, str | None, bytes], Source] = {}
+    for index, (segment, model) in enumerate(zip(question.segments, models, strict=True)):
+        if model is None or isinstance(segment, Hold):
             yield None
             continue
-        key = (model.identity, own.performer, msgspec.json.encode(own.labels))
-        if key not in made:
-            made[key] = _source(index, own, model, character)
-        yield made[key]
+        key = (model.identity, segment.performer, msgspec.json.encode(segment.labels))
+        if key not in sources:
+            sources[key] = _source(index, segment, model, character)
+        yield sources[key]
 
 
 def _source(
@@ -374,8 +378,8 @@ def _source(
         ) from fault
     feet = _feet(field, card, character)
     whose = MotionQuestion(controls={}, performer=segment.performer, labels=segment.labels)
-    own = _bones(model, whose)
-    share = leg_share(card.skeleton.parents, own, character.bones, character.feet)
+    model_bones = _bones(model, whose)
+    share = leg_share(card.skeleton.parents, model_bones, character.bones, character.feet)
     with errors_under("segments", index):
         walks = model.gait if card.cyclic else None
     return Source(model, match, share, feet, walks)
@@ -384,8 +388,8 @@ def _source(
 def _feet(field: str, card: ModelCard, character: ScriptCharacter) -> tuple[int, ...]:
     """Return the columns of the character's feet in the contacts of a model's passages."""
     # Walks have the contacts that the model knows; acts detect those that it does not.
-    known = [own.joint for own in walking_feet.foot_contacts(card)]
-    columns = known if card.cyclic else list(card.feet)
+    contact_joints = [contact.joint for contact in walking_feet.foot_contacts(card)]
+    columns = contact_joints if card.cyclic else list(card.feet)
     absent = [joint for joint in character.feet if joint not in columns]
     if absent:
         raise InvalidField(

@@ -81,11 +81,13 @@ class StandingPose:
     @property
     def phases(self) -> Annotated[Floats, "2"]:
         """Return the phases at which a foot passes the other one."""
-        return np.array([own.phase for own in self.passings])
+        return np.array([passing.phase for passing in self.passings])
 
     def passing_at(self, phase: float) -> FootPassing:
         """Return the passing that is nearest to a phase."""
-        return min(self.passings, key=lambda own: abs((own.phase - phase + 0.5) % 1.0 - 0.5))
+        return min(
+            self.passings, key=lambda passing: abs((passing.phase - phase + 0.5) % 1.0 - 0.5)
+        )
 
 
 def find_standing_pose(walker: Walker) -> StandingPose | None:
@@ -103,7 +105,7 @@ def _made(walker: Walker) -> StandingPose | None:
     parents = walker.card.skeleton.parents
     session, controls = walker.gait.session, walker.slowest
     bones = stride.bones(session, controls, walker.labels(1))[0].astype(np.float64)
-    legs = [limbs.find_limb(parents, bones, own.joint) for own in contacts]
+    legs = [limbs.find_limb(parents, bones, contact.joint) for contact in contacts]
     phases = np.arange(PHASES) / PHASES
     rows = np.repeat(controls, PHASES, axis=0)
     posed = stride.synthesize_poses(session, rows, walker.labels(PHASES), phases)
@@ -123,9 +125,9 @@ def path_start(walker: Walker, pose: StandingPose) -> tuple[FloorMotion, float]:
     travels.
     """
     first = pose.passings[0]
-    place = complex(walker.mean_offsets(walker.slowest)[0]) - pose.gaps[1 - first.swinging]
+    root = complex(walker.mean_offsets(walker.slowest)[0]) - pose.gaps[1 - first.swinging]
     drift = float(walker.strides(walker.slowest).drifts[0])
-    return FloorMotion(drift, complex(place)), first.phase
+    return FloorMotion(drift, complex(root)), first.phase
 
 
 @dataclass(frozen=True)
@@ -156,8 +158,8 @@ def _passings(
     cycle: _Cycle, supports: Annotated[Floats, "some"]
 ) -> tuple[FootPassing, FootPassing] | None:
     """Return the moments at which the feet pass each other; None if they do not do so twice."""
-    ahead = [floor_plane.project(cycle.poses.position(leg.tip)).real for leg in cycle.legs]
-    gap = ahead[0] - ahead[1]
+    forward = [floor_plane.project(cycle.poses.position(leg.tip)).real for leg in cycle.legs]
+    gap = forward[0] - forward[1]
     later = np.roll(gap, -1)
     rows = np.flatnonzero((gap < 0.0) != (later < 0.0))
     if len(rows) != 2 or len(supports) != 2:
@@ -197,17 +199,17 @@ class _StandingLeg:
 
     def ankle(self, ball: complex) -> Vector:
         """Return the place (3,), m, of the leg's end with the ball of the foot at a floor point."""
-        found: Vector = (
+        ankle: Vector = (
             floor_plane.at_height(np.array([ball]), np.array([self.level]))[0] - self.arm
         )
-        return found
+        return ankle
 
 
 def _standing_leg(
     cycle: _Cycle, leg: int, passings: tuple[FootPassing, FootPassing]
 ) -> _StandingLeg:
     """Return a leg at the moment at which the other foot passes it."""
-    (phase,) = (own.phase for own in passings if own.swinging != leg)
+    (phase,) = (passing.phase for passing in passings if passing.swinging != leg)
     at = phase * PHASES
     rows = np.array([int(at), int(at) + 1]) % PHASES
     share = np.array([at - int(at)])
@@ -216,7 +218,7 @@ def _standing_leg(
     roots = (1.0 - share) * cycle.roots[rows[:1]] + share * cycle.roots[rows[1:]]
     poses, limb = cycle.evaluate(rotations, roots), cycle.legs[leg]
     chords = cycle.poses.position(limb.lower) - cycle.poses.position(limb.upper)
-    hip, end, ball = (poses.position(own)[0] for own in (limb.upper, limb.lower, limb.tip))
+    hip, end, ball = (poses.position(passing)[0] for passing in (limb.upper, limb.lower, limb.tip))
     return _StandingLeg(
         rotations[0, _below(cycle.parents, limb)],
         poses.orientation(limb.lower)[0],
@@ -240,26 +242,26 @@ def _stand(
     """Return the pose in which both feet stand, beside each other."""
     stood = [_standing_leg(cycle, leg, passings) for leg in range(2)]
     rotations = quat.mean(cycle.posed.rotations)
-    for leg, own in zip(cycle.legs, stood, strict=True):
-        rotations[_below(cycle.parents, leg)] = own.rotations
-    place = complex(cycle.posed.places.mean())
-    root = np.array([place.imag, 0.0, place.real])
+    for leg, standing in zip(cycle.legs, stood, strict=True):
+        rotations[_below(cycle.parents, leg)] = standing.rotations
+    root_place = complex(cycle.posed.places.mean())
+    root = np.array([root_place.imag, 0.0, root_place.real])
     poses = cycle.evaluate(rotations[None], root[None])
-    stances = np.array([own.ball for own in stood])
+    stances = np.array([standing.ball for standing in stood])
     balls = stances.real.mean() + 1j * _sides(poses, cycle.legs, stances.imag)
-    ankles = [own.ankle(complex(ball)) for own, ball in zip(stood, balls, strict=True)]
+    ankles = [standing.ankle(complex(ball)) for standing, ball in zip(stood, balls, strict=True)]
     heights = [
-        _root_height(poses.position(leg.upper)[0], ankle, own.chord)
-        for leg, ankle, own in zip(cycle.legs, ankles, stood, strict=True)
+        _root_height(poses.position(leg.upper)[0], ankle, standing.chord)
+        for leg, ankle, standing in zip(cycle.legs, ankles, stood, strict=True)
     ]
     poses = cycle.evaluate(rotations[None], (root + min(heights) * UP)[None])
-    for leg, ankle, own in zip(cycle.legs, ankles, stood, strict=True):
+    for leg, ankle, standing in zip(cycle.legs, ankles, stood, strict=True):
         turns = two_bone.solve(poses, leg, ankle - poses.position(leg.upper))
-        turned = quat.mul(quat.conj(poses.orientation(leg.lower)), own.foot)
+        turned = quat.mul(quat.conj(poses.orientation(leg.lower)), standing.foot)
         rotations[leg.upper], rotations[leg.middle] = turns.upper[0], turns.middle[0]
         rotations[leg.lower] = quat.mul(turns.lower, turned)[0]
-    levels = np.array([own.level for own in stood])
-    pose = rotations, min(heights), place
+    levels = np.array([standing.level for standing in stood])
+    pose = rotations, min(heights), root_place
     feet = balls, levels, stances - balls
     return StandingPose(cycle.parents, cycle.bones, cycle.legs, contacts, passings, *pose, *feet)
 
@@ -274,8 +276,8 @@ def _sides(
     """
     hips = np.array([poses.position(leg.upper)[0] @ LEFT for leg in legs])
     width = 0.5 * (hips[0] - hips[1] + walked[0] - walked[1])
-    found: Floats = np.array([0.5, -0.5]) * width + float(poses.position(0)[0] @ LEFT)
-    return found
+    sides: Floats = np.array([0.5, -0.5]) * width + float(poses.position(0)[0] @ LEFT)
+    return sides
 
 
 def _root_height(hip: Vector, ankle: Vector, chord: float) -> float:

@@ -69,45 +69,51 @@ def _enough(frames: int, phases: Frames) -> int:
 
 def add_standing_ends(
     walked: Passage,
-    places: Annotated[FloorVectors, "frames"],
+    origins: Annotated[FloorVectors, "frames"],
     headings: Frames,
     phases: Frames,
-    ends: StandingEnds,
+    steps: StandingEnds,
 ) -> Passage:
     """Return a walk of F frames whose first and last ones are its opening and closing steps.
 
     places, headings, phases: (F,), of the plan of the walk.
     """
     count = len(walked)
-    if ends.opening:
-        rows = slice(ends.opening - 1, None, -1)
-        part = _part(walked, rows)
+    if steps.opening:
+        rows = slice(steps.opening - 1, None, -1)
+        opening = _part(walked, rows)
         # The foot of an opening step is on the floor from the double support on: contacts are
         # likely from the landing of the heel on, and a ball that is put down then turns the knee.
-        part = replace(part, contacts=np.zeros_like(part.contacts))
+        opening = replace(opening, contacts=np.zeros_like(opening.contacts))
         walked = _replaced(
-            walked, rows, _close(ends.pose, part, places[rows], headings[rows], phases[rows])
+            walked, rows, _close(steps.pose, opening, origins[rows], headings[rows], phases[rows])
         )
-    if ends.closing:
-        rows = slice(count - ends.closing, count)
+    if steps.closing:
+        rows = slice(count - steps.closing, count)
         walked = _replaced(
             walked,
             rows,
-            _close(ends.pose, _part(walked, rows), places[rows], headings[rows], phases[rows]),
+            _close(steps.pose, _part(walked, rows), origins[rows], headings[rows], phases[rows]),
         )
     return walked
 
 
-def _part(own: Passage, rows: slice) -> Passage:
+def _part(passage: Passage, rows: slice) -> Passage:
     """Return some frames of a passage, which may be in the other order."""
-    return Passage(own.rotations[rows], own.roots[rows], own.contacts[rows], own.sigmas[rows])
+    return Passage(
+        passage.rotations[rows], passage.roots[rows], passage.contacts[rows], passage.sigmas[rows]
+    )
 
 
-def _replaced(own: Passage, rows: slice, step: Passage) -> Passage:
+def _replaced(passage: Passage, rows: slice, step: Passage) -> Passage:
     """Return a passage with the frames of a step."""
-    rotations, roots, contacts = own.rotations.copy(), own.roots.copy(), own.contacts.copy()
+    rotations, roots, contacts = (
+        passage.rotations.copy(),
+        passage.roots.copy(),
+        passage.contacts.copy(),
+    )
     rotations[rows], roots[rows], contacts[rows] = step.rotations, step.roots, step.contacts
-    return replace(own, rotations=rotations, roots=roots, contacts=contacts)
+    return replace(passage, rotations=rotations, roots=roots, contacts=contacts)
 
 
 @dataclass(frozen=True)
@@ -128,7 +134,7 @@ class _Course:
 def _close(
     pose: StandingPose,
     walked: Passage,
-    places: Annotated[FloorVectors, "frames"],
+    origins: Annotated[FloorVectors, "frames"],
     headings: Frames,
     phases: Frames,
 ) -> Passage:
@@ -137,18 +143,18 @@ def _close(
     poses = _poses(pose, walked.rotations, walked.roots)
     balls = np.stack([poses.position(leg.tip) for leg in pose.legs], axis=1)
     towards = complex(np.exp(1j * headings[-1]))
-    shift, stood = _stand(pose, complex(places[-1]), towards, balls, course.swinging)
-    count = len(places)
+    shift, stood = _stand(pose, complex(origins[-1]), towards, balls, course.swinging)
+    count = len(origins)
     turned = np.broadcast_to(pose.rotations, (count, *pose.rotations.shape))
     standing = floor_plane.turn_roots(turned, headings)
-    floor = places + np.exp(1j * headings) * (pose.place + shift)
-    ends = floor_plane.at_height(floor, np.full(count, pose.height))
+    floor = origins + np.exp(1j * headings) * (pose.place + shift)
+    standing_roots = floor_plane.at_height(floor, np.full(count, pose.height))
     rotations = quat.nlerp(walked.rotations, standing, course.pose)
-    roots = quat.lerp(walked.roots, ends, course.pose)
+    roots = quat.lerp(walked.roots, standing_roots, course.pose)
     poses = _poses(pose, rotations, roots)
-    for place, leg in enumerate(pose.legs):
-        share = course.swing if place == course.swinging else course.pose
-        ball = quat.lerp(balls[:, place], np.broadcast_to(stood[place], roots.shape), share)
+    for index, leg in enumerate(pose.legs):
+        share = course.swing if index == course.swinging else course.pose
+        ball = quat.lerp(balls[:, index], np.broadcast_to(stood[index], roots.shape), share)
         ankle = ball - (poses.position(leg.tip) - poses.position(leg.lower))
         end = two_bone.reach(poses, leg, np.zeros_like(ankle), ankle)
         turns = two_bone.solve(poses, leg, end)
@@ -173,9 +179,9 @@ def _course(pose: StandingPose, walked: Passage, phase: float) -> _Course:
 
 def _eased(share: Frames) -> Frames:
     """Return shares from 0 to 1 whose first and second derivatives are zero at both ends."""
-    part = np.clip(share, 0.0, 1.0)
-    found: Frames = part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
-    return found
+    clipped = np.clip(share, 0.0, 1.0)
+    eased: Frames = clipped**3 * (10.0 - 15.0 * clipped + 6.0 * clipped**2)
+    return eased
 
 
 def _stand(
@@ -193,14 +199,14 @@ def _stand(
     as far to the other side, so that the root is between them. root, towards: where the walk ends,
     and its direction there.
     """
-    own = root + towards * pose.balls
+    standing_balls = root + towards * pose.balls
     foot = 1 - swinging
     stood = complex(floor_plane.project(balls[:, foot]).mean())
-    off = complex((stood - own[foot]) / towards)
-    beside = float(np.clip(off.real, -MOST_BESIDE, MOST_BESIDE))
-    places = own + towards * complex(2.0 * beside - off.real, off.imag)
-    places[foot] = stood
-    return complex(beside, off.imag), floor_plane.at_height(places, pose.levels)
+    off = complex((stood - standing_balls[foot]) / towards)
+    forward = float(np.clip(off.real, -MOST_BESIDE, MOST_BESIDE))
+    balls_on_floor = standing_balls + towards * complex(2.0 * forward - off.real, off.imag)
+    balls_on_floor[foot] = stood
+    return complex(forward, off.imag), floor_plane.at_height(balls_on_floor, pose.levels)
 
 
 def _poses(pose: StandingPose, rotations: Rotations, roots: RootPath) -> LimbPoses:

@@ -95,9 +95,9 @@ class Timeline:
 
     def warn(self, pointer: str, message: str) -> None:
         """Add a warning, once."""
-        found = ScriptWarning(pointer, message)
-        if found not in self.warnings:
-            self.warnings.append(found)
+        warning = ScriptWarning(pointer, message)
+        if warning not in self.warnings:
+            self.warnings.append(warning)
 
     def begin_with(self, passage: Passage) -> None:
         """Make a placed passage the beginning of the motion."""
@@ -123,8 +123,8 @@ class Timeline:
         """
         last = len(self.done) - 1
         cut = Cut(last, 0, FloorMotion(), 0.0, 0.0)
-        own = self._usual(placed)
-        self.motion, self.usual = joins.join(self.done, placed, cut, "hermite"), own
+        acceleration = self._usual(placed)
+        self.motion, self.usual = joins.join(self.done, placed, cut, "hermite"), acceleration
         return last
 
     def join(self, segment: int, placed: Passage, cut: Cut, kind: Blend, seconds: float) -> int:
@@ -133,20 +133,20 @@ class Timeline:
         fits = min(seconds, max(len(placed) - 1 - cut.entry, 0) / RATE)
         joined = joins.join(before, placed, cut, kind, fits)
         self.motion, _ = join_quality.add_steps(body, before, placed, cut, joined)
-        usual = self._usual(placed)
+        acceleration = self._usual(placed)
         self.joins.append(
             JoinFacts(
                 cut.distance,
                 abs(float(before.roots[cut.exit, 1] - placed.roots[cut.entry, 1])),
                 kind,
-                max(self.usual, usual),
+                max(self.usual, acceleration),
                 "captured" if self.captured else "synthesised",
                 segment,
                 cut.exit,
                 fits,
             )
         )
-        self.usual = usual
+        self.usual = acceleration
         return cut.exit - cut.entry
 
     def check_duration(self) -> None:
@@ -166,8 +166,8 @@ def choose_blend(join: Join, gaits: tuple[bool, bool]) -> tuple[Blend, float]:
     kind: Blend = ("hermite" if gaits[1] else "dead") if join.blend == "auto" else join.blend
     if kind == "cut":
         return kind, 0.0
-    usual = joins.SECONDS["hermite"] if all(gaits) else joins.SECONDS["dead"]
-    return kind, usual if join.seconds is None else join.seconds
+    default_seconds = joins.SECONDS["hermite"] if all(gaits) else joins.SECONDS["dead"]
+    return kind, default_seconds if join.seconds is None else join.seconds
 
 
 def check_distance(join: Join, cut: Cut) -> None:
@@ -185,21 +185,21 @@ def from_poses(poses: Sequence[GivenPose], fps: float, character: ScriptCharacte
     Raises InvalidField for poses of another number of joints and for rotations of no length.
     """
     joints = len(character.skeleton)
-    for index, own in enumerate(poses):
-        if len(own.rotations) != joints:
+    for index, pose in enumerate(poses):
+        if len(pose.rotations) != joints:
             raise InvalidField(
                 f"start/poses/{index}/rotations",
-                f"{len(own.rotations)} rotations, expected {joints}, one for each joint of "
+                f"{len(pose.rotations)} rotations, expected {joints}, one for each joint of "
                 f"{character.identity}",
             )
-    turns = np.array([own.rotations for own in poses], dtype=np.float64)
+    turns = np.array([pose.rotations for pose in poses], dtype=np.float64)
     sizes = np.linalg.norm(turns, axis=-1)
     if not (np.abs(sizes - 1.0) < 0.01).all():
         index = int(np.argmax(np.abs(sizes - 1.0).max(axis=1)))
         raise InvalidField(
             f"start/poses/{index}/rotations", "not of length 1, expected unit quaternions w x y z"
         )
-    roots = np.array([own.root_position for own in poses], dtype=np.float64)
+    roots = np.array([pose.root_position for pose in poses], dtype=np.float64)
     if not (np.isfinite(roots).all() and (np.abs(roots) < 1e5).all()):
         raise InvalidField("start/poses", "root positions beyond 100 km, expected nearer ones")
     seconds = (len(poses) - 1) / fps

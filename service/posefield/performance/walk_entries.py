@@ -42,10 +42,10 @@ def walk_passage(
     phases = plan.phases % 1.0
     done = plan.walker.strides(plan.controls, level)
     posed = _poses(model, plan.walker, plan.controls, done, phases, level, take)
-    places = plan.places + posed.places * np.exp(1j * plan.headings)
+    roots = plan.places + posed.places * np.exp(1j * plan.headings)
     walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
-        floor_plane.at_height(places, posed.heights),
+        floor_plane.at_height(roots, posed.heights),
         _contacts(model, plan.walker, plan.controls, done, phases, level),
         _sigmas(model, plan.walker, plan.controls),
         phases,
@@ -71,15 +71,15 @@ def cycle_passage(
     """
     rows = np.repeat(controls[None], frames, axis=0)
     phases = np.arange(frames) / frames
-    own = walker.strides(controls[None], level)
+    cycle = walker.strides(controls[None], level)
     done = walker.strides(rows, level)
     posed = _poses(model, walker, rows, done, phases, level, take)
-    turned = phases * own.turns
-    places = floor_plane.arc_displacement(phases * own.travels, turned)
-    places = places + posed.places * np.exp(1j * turned)
+    turned = phases * cycle.turns
+    roots = floor_plane.arc_displacement(phases * cycle.travels, turned)
+    roots = roots + posed.places * np.exp(1j * turned)
     return Passage(
         floor_plane.turn_roots(posed.rotations, turned),
-        floor_plane.at_height(places, posed.heights),
+        floor_plane.at_height(roots, posed.heights),
         _contacts(model, walker, rows, done, phases, level),
         _sigmas(model, walker, rows),
         phases,
@@ -101,7 +101,7 @@ def _poses(
     model: Synthesizer,
     walker: Walker,
     controls: PointControls,
-    own: Strides,
+    cycles: Strides,
     phases: PerPoint,
     level: int,
     take: TakeSettings | None,
@@ -109,21 +109,21 @@ def _poses(
     """Return the poses (F) at controls (F, d), whose strides are known, and at phases (F,)."""
     labels = walker.labels(len(controls))
     if take is None:
-        return stride.poses_of_strides(model.session, (controls, labels), own, phases, level)
+        return stride.poses_of_strides(model.session, (controls, labels), cycles, phases, level)
     count = len(controls)
     takes = CharacterTakes(
         np.full(count, take.seed), np.full(count, take.variety), np.full(count, take.detail)
     )
-    times = (phases * own.durations)[:, None]
+    times = (phases * cycles.durations)[:, None]
     turned, path, _ = crowd_synthesis.pose_takes(model, takes, controls, times, labels, level)
-    return stride.relative_poses(own, phases, turned, path)
+    return stride.relative_poses(cycles, phases, turned, path)
 
 
 def _contacts(
     model: Synthesizer,
     walker: Walker,
     controls: PointControls,
-    own: Strides,
+    cycles: Strides,
     phases: PerPoint,
     level: int,
 ) -> Annotated[Floats, "frames feet"]:
@@ -133,10 +133,10 @@ def _contacts(
     if not feet:
         return np.zeros((len(controls), 0))
     labels = walker.labels(len(controls))
-    found = stride.contact_probabilities(
-        model.session, controls, labels, phases, level, own.durations
+    probabilities = stride.contact_probabilities(
+        model.session, controls, labels, phases, level, cycles.durations
     )
-    return np.clip(found[:, [card.contacts.index(own) for own in feet]], 0.0, 1.0)
+    return np.clip(probabilities[:, [card.contacts.index(cycles) for cycles in feet]], 0.0, 1.0)
 
 
 def _sigmas(
@@ -144,8 +144,8 @@ def _sigmas(
 ) -> Annotated[Floats, "frames"]:
     frames = len(controls)
     rows = np.unique(np.append(np.arange(0, frames, SIGMA_STEP), frames - 1))
-    found = model.session.sigmas(controls[rows], walker.labels(len(rows))).astype(float)
-    return np.asarray(np.interp(np.arange(frames), rows, found))
+    sigmas = model.session.sigmas(controls[rows], walker.labels(len(rows))).astype(float)
+    return np.asarray(np.interp(np.arange(frames), rows, sigmas))
 
 
 # Cycles by walker, speed and take, of 80 kB each: an edited script has the same walkers again.
@@ -175,31 +175,31 @@ def take_settings(question: PerformanceQuestion) -> TakeSettings | None:
 
 def walk_of(script: Script, index: int) -> tuple[Walk, Source]:
     """Return a walk of a script and its source."""
-    own, source = script.segments[index], script.sources[index]
-    if not isinstance(own, Walk) or source is None:
+    walk, source = script.segments[index], script.sources[index]
+    if not isinstance(walk, Walk) or source is None:
         raise TypeError(f"segment {index}, expected a walk")
-    return own, source
+    return walk, source
 
 
-def request_of(script: Script, own: Walk, source: Source) -> WalkRequest:
+def request_of(script: Script, walk: Walk, source: Source) -> WalkRequest:
     """Return the walk that a segment asks for."""
-    usual = float(source.gait.rates[:, 0].mean())
-    names = {PERFORMER: own.performer} if own.performer is not None else {}
+    mean_speed = float(source.gait.rates[:, 0].mean())
+    names = {PERFORMER: walk.performer} if walk.performer is not None else {}
     discs = tuple(Disc(*disc.position, disc.radius) for disc in script.question.obstacles)
-    along = None if own.along is None else np.array(own.along, dtype=np.float64)
+    along = None if walk.along is None else np.array(walk.along, dtype=np.float64)
     return WalkRequest(
-        usual if own.speed is None else own.speed,
+        mean_speed if walk.speed is None else walk.speed,
         along=along,
-        to=own.to,
-        seconds=own.seconds,
-        turn=own.turn,
-        speed_over=own.speed_over,
-        labels={**own.labels, **names},
-        controls=own.controls,
-        start=own.start,
-        stop=own.stop,
+        to=walk.to,
+        seconds=walk.seconds,
+        turn=walk.turn,
+        speed_over=walk.speed_over,
+        labels={**walk.labels, **names},
+        controls=walk.controls,
+        start=walk.start,
+        stop=walk.stop,
         obstacles=discs,
-        detour=bool(discs) and own.along is None and own.seconds is None,
+        detour=bool(discs) and walk.along is None and walk.seconds is None,
     )
 
 
@@ -214,12 +214,12 @@ def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> Walk
         return None
     low, high = source.gait.region.speeds
     speed, turn = plan.exit_rates
-    own = replace(
+    rolling_request = replace(
         request,
         entry_speed=float(np.clip(speed, low, high)),
         entry_turn=turn if request.seconds is not None else None,
     )
-    return WalkEntry(own, plan.end, float(plan.phases[-1] % 1.0), continues=True)
+    return WalkEntry(rolling_request, plan.end, float(plan.phases[-1] % 1.0), continues=True)
 
 
 SteadyCycle = tuple[Strides, Passage, complex]
@@ -232,39 +232,40 @@ _cycles: ValueCache[tuple[WalkerKey, float, int, TakeSettings | None], SteadyCyc
 
 
 def _cycle(
-    source: Source, who: Walker, speed: float, level: int, take: TakeSettings | None
+    source: Source, walking: Walker, speed: float, level: int, take: TakeSettings | None
 ) -> SteadyCycle:
-    controls = who.controls(np.clip([speed], *source.gait.region.speeds), np.zeros(1))
-    stride = who.strides(controls)
+    controls = walking.controls(np.clip([speed], *source.gait.region.speeds), np.zeros(1))
+    stride = walking.strides(controls)
     frames = max(round(float(stride.durations[0]) * RATE), 8)
-    poses = cycle_passage(source.model, who, controls[0], frames, level, take)
-    return stride, poses, complex(who.mean_offsets(controls)[0])
+    poses = cycle_passage(source.model, walking, controls[0], frames, level, take)
+    return stride, poses, complex(walking.mean_offsets(controls)[0])
 
 
 def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
     """Return how a walk begins: at the start of the script, or at the phase most like the exit."""
-    own, source = walk_of(script, index)
-    request = request_of(script, own, source)
+    walk, source = walk_of(script, index)
+    request = request_of(script, walk, source)
     if timeline.motion is None:
-        begun = script.question.start
-        x, z = begun.position
-        return WalkEntry(request, FloorMotion(begun.heading, complex(z, x)), 0.0)
+        beginning = script.question.start
+        x, z = beginning.position
+        return WalkEntry(request, FloorMotion(beginning.heading, complex(z, x)), 0.0)
     continued = _continued(timeline, source, request)
     if continued is not None:
         return continued
-    if own.join.cut == "end":
+    if walk.join.cut == "end":
         timeline.exits = timeline.exits[-1:]
-    who = walker.find_walker(source.gait, request.labels, request.controls)
-    pose = standing_pose.find_standing_pose(who) if request.start == "standing" else None
+    walking = walker.find_walker(source.gait, request.labels, request.controls)
+    pose = standing_pose.find_standing_pose(walking) if request.start == "standing" else None
     if pose is not None:
         cut = timeline.find_cut(script.adapted(index, still(pose)), range(1))
-        begin, first = standing_pose.path_start(who, pose)
+        begin, first = standing_pose.path_start(walking, pose)
         at_rest = replace(cut, motion=FloorMotion())
         return WalkEntry(request, cut.motion.after(begin), first, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
     level, take = script.question.level, take_settings(script.question)
     stride, poses, offset = _cycles.find(
-        (who.key, float(speed), level, take), lambda: _cycle(source, who, speed, level, take)
+        (walking.key, float(speed), level, take),
+        lambda: _cycle(source, walking, speed, level, take),
     )
     frames = len(poses)
     cut = timeline.find_cut(script.adapted(index, poses), range(frames))
@@ -272,6 +273,6 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
     turned = phase * float(stride.turns[0])
     travelled = floor_plane.arc_displacement(phase * stride.travels[0], np.array(turned))
     # The path of a walk is that of the mean root, and runs the way it travels.
-    place = complex(travelled + np.exp(1j * turned) * offset)
-    local = FloorMotion(turned + float(stride.drifts[0]), place)
+    root = complex(travelled + np.exp(1j * turned) * offset)
+    local = FloorMotion(turned + float(stride.drifts[0]), root)
     return WalkEntry(request, cut.motion.after(local), phase, replace(cut, motion=FloorMotion()))

@@ -141,54 +141,54 @@ class _Curve:
         return abs(first * self.word.first), self.line, abs(last * self.word.last)
 
 
-def connect(start: FloorMotion, place: complex, heading: float | None, radii: Radii) -> FloorPath:
+def connect(start: FloorMotion, goal: complex, heading: float | None, radii: Radii) -> FloorPath:
     """Return the path from a start to a place, with a heading there, rad, or None for any.
 
     Raises ValueError if there is no room for a curve of these radii.
     """
-    window = min(WINDOW, WINDOW_SHARE * abs(place - start.shift))
-    found: list[_Curve] = []
-    every: list[_Curve] = []
+    window = min(WINDOW, WINDOW_SHARE * abs(goal - start.shift))
+    shortest_curves: list[_Curve] = []
+    candidates: list[_Curve] = []
     for factor in GENTLENESS:
         wider = Radii(radii.left * factor, radii.right * factor)
-        curves = sorted(_curves(start, place, heading, wider), key=lambda curve: sum(curve.lengths))
-        found, every = found + curves[:1], every + curves
-    shortest = min(sum(curve.lengths) for curve in found)
-    for curve in found:
+        curves = sorted(_curves(start, goal, heading, wider), key=lambda curve: sum(curve.lengths))
+        shortest_curves, candidates = shortest_curves + curves[:1], candidates + curves
+    shortest = min(sum(curve.lengths) for curve in shortest_curves)
+    for curve in shortest_curves:
         if sum(curve.lengths) <= DETOUR * shortest:
-            path = _averaged(start, place, heading, curve.word, window)
+            path = _averaged(start, goal, heading, curve.word, window)
             if path is not None:
                 return path
     # Where averaged headings turn a short arc into its other way round, another curve has none.
-    most = LONGEST * shortest
+    limit = LONGEST * shortest
     for share in SMALLER:
-        for curve in (own for own in every if sum(own.lengths) <= most):
-            path = _averaged(start, place, heading, curve.word, share * window)
+        for curve in (candidate for candidate in candidates if sum(candidate.lengths) <= limit):
+            path = _averaged(start, goal, heading, curve.word, share * window)
             if path is not None:
                 return path
     raise ValueError("no curve")
 
 
 def _curves(
-    start: FloorMotion, place: complex, heading: float | None, radii: Radii
+    start: FloorMotion, goal: complex, heading: float | None, radii: Radii
 ) -> Iterator[_Curve]:
     for first in (radii.left, -radii.right):
         for last in (0.0,) if heading is None else (radii.left, -radii.right):
-            curve = _curve(start, place, heading, _Word(first, last))
+            curve = _curve(start, goal, heading, _Word(first, last))
             if curve is not None:
                 yield curve
 
 
-def _curve(start: FloorMotion, place: complex, heading: float | None, word: _Word) -> _Curve | None:
+def _curve(start: FloorMotion, goal: complex, heading: float | None, word: _Word) -> _Curve | None:
     """Return the curve of a word, None if its circles have no common tangent of that kind."""
     # A circle's centre is to the left of the heading; its signed radius is negative to the right.
     begin = start.shift + 1j * word.first * np.exp(1j * start.turn)
-    end = place if heading is None else place + 1j * word.last * np.exp(1j * heading)
-    apart, gap = end - begin, word.last - word.first
-    if abs(apart) < abs(gap):
+    end = goal if heading is None else goal + 1j * word.last * np.exp(1j * heading)
+    line_of_centres, gap = end - begin, word.last - word.first
+    if abs(line_of_centres) < abs(gap):
         return None
-    line = float(np.sqrt(abs(apart) ** 2 - gap**2))
-    along = float(np.angle(apart) - np.angle(line + 1j * gap))
+    line = float(np.sqrt(abs(line_of_centres) ** 2 - gap**2))
+    along = float(np.angle(line_of_centres) - np.angle(line + 1j * gap))
     first = _turn(along - start.turn, word.first)
     last = 0.0 if heading is None else _turn(heading - along, word.last)
     return _Curve((first, last), line, word)
@@ -201,19 +201,19 @@ def _turn(angle: float, radius: float) -> float:
 
 
 def _averaged(
-    start: FloorMotion, place: complex, heading: float | None, word: _Word, window: float
+    start: FloorMotion, goal: complex, heading: float | None, word: _Word, window: float
 ) -> FloorPath | None:
     """Return the path of a word with averaged headings; None if it does not end at the place."""
     lead = 0.5 * window
     inner = replace(start, shift=start.shift + lead * np.exp(1j * start.turn))
-    aim = place if heading is None else place - lead * np.exp(1j * heading)
+    aim = goal if heading is None else goal - lead * np.exp(1j * heading)
     tail = 0.0 if heading is None else lead
     for _ in range(ITERATIONS):
         curve = _curve(inner, aim, heading, word)
         if curve is None:
             return None
         path = _path(start, curve, (lead, tail), window)
-        miss = place - path.end
+        miss = goal - path.end
         if abs(miss) < 1e-9:
             break
         aim += miss
@@ -298,7 +298,7 @@ def to_place(start: FloorMotion, goal: Destination, radii: Radii) -> FloorPath:
 
 def along_corners(start: FloorMotion, corners: Sequence[complex], goal: Destination) -> FloorPath:
     """Return the spline from a start along corners to a place."""
-    points = np.array([_plain(each) for each in (start.shift, *corners, goal.place)])
+    points = np.array([_plain(point) for point in (start.shift, *corners, goal.place)])
     end = None if goal.heading is None else FloorMotion(goal.heading, goal.place)
     return _spline_path(points, (_slope(start), _slope(end)))
 
@@ -316,8 +316,8 @@ def _slope(at: FloorMotion | None) -> Annotated[Floats, "2"] | None:
     return None if at is None else _plain(np.exp(1j * at.turn))
 
 
-def _plain(place: complex) -> Annotated[Floats, "2"]:
-    return np.array([place.imag, place.real])
+def _plain(point: complex) -> Annotated[Floats, "2"]:
+    return np.array([point.imag, point.real])
 
 
 def _check_waypoints(points: Floats) -> None:
@@ -348,5 +348,5 @@ def _check_gaps(points: Floats, before: int) -> None:
 
 def nearest_waypoint(path: FloorPath, waypoints: Floats, gone: float) -> int:
     """Return the index of the waypoint (P, 2) nearest to the place after some metres."""
-    place = path.at(np.array([gone]))[0][0]
-    return int(np.argmin(np.abs(floor_plane.project(np.insert(waypoints, 1, 0.0, axis=1)) - place)))
+    point = path.at(np.array([gone]))[0][0]
+    return int(np.argmin(np.abs(floor_plane.project(np.insert(waypoints, 1, 0.0, axis=1)) - point)))

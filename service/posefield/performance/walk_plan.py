@@ -38,36 +38,42 @@ SYNTHESISED = "synthesised"
 
 
 def plan_phases(
-    walker: Walker, distances: Frames, ways: Frames, phase: float, ends: tuple[str, str]
+    walker: Walker, distances: Frames, ways: Frames, phase: float, end_kinds: tuple[str, str]
 ) -> tuple[Frames, StandingEnds | None, list[WalkNote]]:
     """Return the phases (F,) of a walk, without wrapping, steps at its standing ends, and notes.
 
     The steps are None for a walk without any. distances: (F,), m. ways: lengths of the stride (F,),
-    m. phase: at the first frame. ends: whether the walk begins and ends "standing". A walk that is
-    too short for an opening or a closing step begins or ends in double support.
+    m. phase: at the first frame. end_kinds: whether the walk begins and ends "standing". A walk
+    that is too short for an opening or a closing step begins or ends in double support.
     """
     steps = np.diff(distances) * 0.5 * (1.0 / ways[1:] + 1.0 / ways[:-1])
     gone = np.pad(np.cumsum(steps), (1, 0))
-    begin, stop = (end == "standing" for end in ends)
+    begin, stop = (end == "standing" for end in end_kinds)
     if not (begin or stop):
         return phase + gone, None, []
     pose = standing_pose.find_standing_pose(walker)
-    wanted = begin and pose is not None, stop and pose is not None
+    steps_wanted = begin and pose is not None, stop and pose is not None
     # Without room for a step, the phases are planned once more for a walk without it.
-    for _ in range(2 if any(wanted) else 1):
-        quiet = [pose.phases if pose and own else walker.double_supports for own in wanted]
+    for _ in range(2 if any(steps_wanted) else 1):
+        quiet = [
+            pose.phases if pose and with_step else walker.double_supports
+            for with_step in steps_wanted
+        ]
         first = phase + _to_nearest(phase, quiet[0]) if begin else phase
         phases, left = first + gone, 0.0
         if stop:
             phases, left = _scaled(phases, _to_nearest(float(phases[-1]), quiet[1]))
-        closing = standing_steps.closing_frames(pose, phases) if pose and wanted[1] else 0
-        opening = standing_steps.opening_frames(pose, phases) if pose and wanted[0] else 0
+        closing = standing_steps.closing_frames(pose, phases) if pose and steps_wanted[1] else 0
+        opening = standing_steps.opening_frames(pose, phases) if pose and steps_wanted[0] else 0
         opening = opening if opening + closing <= len(phases) else 0
-        if (opening > 0, closing > 0) == wanted:
+        if (opening > 0, closing > 0) == steps_wanted:
             break
-        wanted = opening > 0, closing > 0
-    standing = StandingEnds(pose, opening, closing) if pose and any(wanted) else None
-    notes = [*_standing_notes(ends, wanted), *_left_notes(left, float(ways[-1]), wanted[1])]
+        steps_wanted = opening > 0, closing > 0
+    standing = StandingEnds(pose, opening, closing) if pose and any(steps_wanted) else None
+    notes = [
+        *_standing_notes(end_kinds, steps_wanted),
+        *_left_notes(left, float(ways[-1]), steps_wanted[1]),
+    ]
     return phases, standing, notes
 
 
@@ -89,35 +95,38 @@ def _scaled(phases: Frames, missing: float) -> tuple[Frames, float]:
     cycles = min(max(SCALED_CYCLES, abs(missing) / mean), float(phases[-1] - phases[0]))
     if cycles <= 0.0:
         return phases, missing
-    most = SHORT_SCALING * 2.0 / np.pi * cycles
-    done = float(np.clip(missing, -most, most))
-    part = np.clip((phases - phases[-1]) / cycles + 1.0, 0.0, 1.0)
-    return phases + done * 0.5 * (1.0 - np.cos(np.pi * part)), missing - done
+    limit = SHORT_SCALING * 2.0 / np.pi * cycles
+    done = float(np.clip(missing, -limit, limit))
+    progress = np.clip((phases - phases[-1]) / cycles + 1.0, 0.0, 1.0)
+    return phases + done * 0.5 * (1.0 - np.cos(np.pi * progress)), missing - done
 
 
-def _standing_notes(ends: tuple[str, str], steps: tuple[bool, bool]) -> Iterator[WalkNote]:
+def _standing_notes(end_kinds: tuple[str, str], steps: tuple[bool, bool]) -> Iterator[WalkNote]:
     names = ("start", "begins", "an opening step"), ("stop", "ends", "a closing step")
-    for (field, word, step), end, made in zip(names, ends, steps, strict=True):
+    for (field, word, step), end, has_step in zip(names, end_kinds, steps, strict=True):
         if end != "standing":
             continue
-        way = f"with {step}" if made else "by slowing down its slowest stride"
-        message = f"the walk {word} standing {way}, which is synthesised: none was captured"
+        manner = f"with {step}" if has_step else "by slowing down its slowest stride"
+        message = f"the walk {word} standing {manner}, which is synthesised: none was captured"
         yield WalkNote(f"{SYNTHESISED}-{field}", field, message)
-        if not made:
+        if not has_step:
             message = f"there is no room for {step}: the walk {word} with one foot ahead"
             yield WalkNote("feet-apart", field, message)
 
 
-def _left_notes(left: float, way: float, closed: bool) -> Iterator[WalkNote]:
-    """Yield a note on a stop that strides could not be scaled for. way: of a stride, m."""
-    if closed and 2.0 * (abs(left) * way - MOST_BESIDE) > MOST_BESIDE:
-        apart = 200.0 * (abs(left) * way - MOST_BESIDE)
-        said = f"bring the feet beside each other: one stands {apart:.0f} cm ahead"
+def _left_notes(left: float, stride_length: float, closed: bool) -> Iterator[WalkNote]:
+    """Yield a note on a stop that strides could not be scaled for.
+
+    stride_length: of a stride, m.
+    """
+    if closed and 2.0 * (abs(left) * stride_length - MOST_BESIDE) > MOST_BESIDE:
+        distance = 200.0 * (abs(left) * stride_length - MOST_BESIDE)
+        aim = f"bring the feet beside each other: one stands {distance:.0f} cm ahead"
     elif not closed and abs(left) > 0.01:
-        said = f"stop in double support: {100.0 * abs(left):.0f} % of a cycle are left"
+        aim = f"stop in double support: {100.0 * abs(left):.0f} % of a cycle are left"
     else:
         return
-    message = f"the walk is too short to {said}; a path longer by a quarter of a stride mends it"
+    message = f"the walk is too short to {aim}; a path longer by a quarter of a stride mends it"
     yield WalkNote("stops-in-mid-stride", "stop", message)
 
 
@@ -164,9 +173,9 @@ class WalkPlan:
     def part(self, begin: int, end: int) -> "WalkPlan":
         """Return the frames from `begin` until before `end`, on the same path."""
         names = ("distances", "places", "headings", "phases", "controls", "speeds")
-        found = {name: getattr(self, name)[begin:end] for name in names}
+        arrays = {name: getattr(self, name)[begin:end] for name in names}
         standing = self.standing and self.standing.part(len(self), begin, end)
-        return replace(self, **found, standing=standing)
+        return replace(self, **arrays, standing=standing)
 
     @property
     def closes(self) -> bool:
@@ -202,18 +211,18 @@ def plan_walk(
     speeds = np.gradient(distances, 1.0 / RATE)
     knots = np.unique(np.append(np.arange(0, len(distances), STEP), len(distances) - 1))
     rates, pivots = _rates(gait, request, path, distances[knots], speeds[knots])
-    own = walker.controls(*rates)
-    controls = _between(len(distances), knots, own)
-    done = walker.strides(own)
+    knot_controls = walker.controls(*rates)
+    controls = _between(len(distances), knots, knot_controls)
+    done = walker.strides(knot_controls)
     ways = _between(len(distances), knots, np.abs(done.travels))
-    ends = (request.start, request.stop)
-    phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, ends)
+    end_kinds = (request.start, request.stop)
+    phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, end_kinds)
     centres, tangents = path.at(distances)
     headings = tangents - _between(len(distances), knots, done.drifts)
-    places = centres - np.exp(1j * headings) * _offsets(walker, controls)
-    fields = walker, path, distances, places, headings, phases, controls, speeds
-    said = *notes, *pivots, *phase_notes
-    return WalkPlan(*fields, said, request.stop == "standing", standing)
+    origins = centres - np.exp(1j * headings) * _offsets(walker, controls)
+    fields = walker, path, distances, origins, headings, phases, controls, speeds
+    all_notes = *notes, *pivots, *phase_notes
+    return WalkPlan(*fields, all_notes, request.stop == "standing", standing)
 
 
 def _route(
@@ -312,10 +321,11 @@ def _destination(request: WalkRequest) -> Destination:
 
 def _radii(gait: Gait, speeds: PerPoint) -> Radii:
     """Return the smallest radii, m, of curves at all of the speeds (K,) of a curve."""
-    every = np.linspace(speeds.min(), speeds.max(), 9)
-    right, left = _turning_limits(gait, every)
+    curve_speeds = np.linspace(speeds.min(), speeds.max(), 9)
+    right, left = _turning_limits(gait, curve_speeds)
     return Radii(
-        float((every / left).max()) / RADIUS_SHARE, float((every / -right).max()) / RADIUS_SHARE
+        float((curve_speeds / left).max()) / RADIUS_SHARE,
+        float((curve_speeds / -right).max()) / RADIUS_SHARE,
     )
 
 
@@ -338,15 +348,15 @@ def _rates(
     beyond = np.maximum(turning - left, right - turning)
     if beyond.max() > 0.0:
         at = int(np.argmax(beyond))
-        place = path.at(gone[at : at + 1])[0][0]
+        point = path.at(gone[at : at + 1])[0][0]
         raise InvalidField(
             _field(request, path, float(gone[at])),
-            f"at x {place.imag:.2f} m, z {place.real:.2f} m it turns by {turning[at]:.2f} rad/s, "
+            f"at x {point.imag:.2f} m, z {point.real:.2f} m it turns by {turning[at]:.2f} rad/s, "
             f"expected {right[at]:.2f} to {left[at]:.2f} rad/s at {paced[at]:.2f} m/s; positive is "
             "left. A wider turn or a lower speed mends it",
         )
-    own_right, own_left = gait.region.turning(paced)
-    walked = np.clip(turning, own_right, own_left)
+    walked_right, walked_left = gait.region.turning(paced)
+    walked = np.clip(turning, walked_right, walked_left)
     return (paced, walked), _notes(request, path, gone, turning - walked)
 
 
@@ -375,15 +385,15 @@ def _field(request: WalkRequest, path: FloorPath, gone: float) -> str:
 
 def _between(frames: int, knots: Floats, values: Floats) -> Floats:
     """Return values (K, ...) of frames `knots` at all frames, by linear interpolation."""
-    every = np.arange(frames)
+    all_frames = np.arange(frames)
     if values.ndim == 1:
-        return np.interp(every, knots, values)
-    return np.column_stack([np.interp(every, knots, column) for column in values.T])
+        return np.interp(all_frames, knots, values)
+    return np.column_stack([np.interp(all_frames, knots, column) for column in values.T])
 
 
 def _offsets(walker: Walker, controls: PointControls) -> Annotated[FloorVectors, "frames"]:
     """Return the mean offsets (F,) of the root over a cycle at controls (F, d)."""
     frames = len(controls)
     rows = np.unique(np.linspace(0, frames - 1, min(frames, OFFSET_POINTS)).round().astype(int))
-    found = walker.mean_offsets(controls[rows])
-    return np.asarray(np.interp(np.arange(frames), rows, found))
+    offsets = walker.mean_offsets(controls[rows])
+    return np.asarray(np.interp(np.arange(frames), rows, offsets))

@@ -173,8 +173,8 @@ def _frames(
     """
     gone = _integral(times, _eased(speeds, ramps))
     count = max(round(times[-1] * RATE), 1) + 1
-    found = np.interp(np.linspace(0.0, times[-1], count), times, gone)
-    return found if length is None else found * (length / found[-1])
+    distances = np.interp(np.linspace(0.0, times[-1], count), times, gone)
+    return distances if length is None else distances * (length / distances[-1])
 
 
 def _eased(speeds: Floats, ramps: SpeedRamps) -> Floats:
@@ -207,22 +207,22 @@ class Disc:
 
 def check_clear(path: FloorPath, obstacles: Sequence[Disc]) -> None:
     """Raise InvalidField, with the place, if a path crosses a disc."""
-    places = path.places if obstacles else np.zeros(0, complex)
+    points = path.places if obstacles else np.zeros(0, complex)
     for index, disc in enumerate(obstacles):
-        apart = np.abs(places - complex(disc.z, disc.x))
-        at = int(np.argmin(apart))
-        if apart[at] < disc.radius:
+        distances = np.abs(points - complex(disc.z, disc.x))
+        at = int(np.argmin(distances))
+        if distances[at] < disc.radius:
             raise InvalidField(
                 f"obstacles/{index}",
-                f"the path leads within {apart[at]:.2f} m of its centre at x {places[at].imag:.2f} "
-                f"m, z {places[at].real:.2f} m, expected {disc.radius:.2f} m or more",
+                f"the path leads within {distances[at]:.2f} m of its centre at x "
+                f"{points[at].imag:.2f} m, z {points[at].real:.2f} m, expected {disc.radius:.2f} m or more",
             )
 
 
 def is_clear(path: FloorPath, obstacles: Sequence[Disc]) -> bool:
     """Return whether a path crosses no disc."""
-    places = path.places
-    return all(np.abs(places - complex(disc.z, disc.x)).min() >= disc.radius for disc in obstacles)
+    points = path.places
+    return all(np.abs(points - complex(disc.z, disc.x)).min() >= disc.radius for disc in obstacles)
 
 
 def way_around(
@@ -253,9 +253,9 @@ def _visible(
     lengths = np.maximum(np.abs(lines), 1e-12)
     visible = np.ones(lines.shape, dtype=bool)
     for centre, radius in zip(centres, radii, strict=True):
-        own = (centre - points)[:, None] * np.conj(lines / lengths)
-        beside = own - np.clip(own.real, 0.0, lengths)
-        visible &= np.abs(beside) >= radius
+        centre_along = (centre - points)[:, None] * np.conj(lines / lengths)
+        offset = centre_along - np.clip(centre_along.real, 0.0, lengths)
+        visible &= np.abs(offset) >= radius
     return visible
 
 
@@ -264,7 +264,7 @@ def _shortest(
     visible: Annotated[npt.NDArray[np.bool_], "points points"],
 ) -> list[complex] | None:
     """Return the corners between the first and the second of the points on the shortest way."""
-    found, before = {0: 0.0}, {0: 0}
+    lengths, before = {0: 0.0}, {0: 0}
     queue, done = [(0.0, 0)], set[int]()
     while queue:
         gone, here = heapq.heappop(queue)
@@ -275,15 +275,15 @@ def _shortest(
         done.add(here)
         for there in np.flatnonzero(visible[here]).tolist():
             length = gone + float(abs(points[there] - points[here]))
-            if length < found.get(there, np.inf):
-                found[there], before[there] = length, here
+            if length < lengths.get(there, np.inf):
+                lengths[there], before[there] = length, here
                 heapq.heappush(queue, (length, there))
-    if 1 not in found:
+    if 1 not in lengths:
         return None
-    way = [before[1]]
-    while way[-1] != 0:
-        way.append(before[way[-1]])
-    return [complex(points[place]) for place in way[-2::-1]]
+    corners = [before[1]]
+    while corners[-1] != 0:
+        corners.append(before[corners[-1]])
+    return [complex(points[corner]) for corner in corners[-2::-1]]
 
 
 Motion = Literal["rolling", "standing"]
@@ -333,14 +333,14 @@ class WalkNote:
 
 def check_fields(request: WalkRequest) -> None:
     """Raise InvalidField for fields that exclude each other or that go only with others."""
-    given = [name for name in ("along", "to", "seconds") if getattr(request, name) is not None]
-    if len(given) > 1 or not (given or request.end):
+    goals = [name for name in ("along", "to", "seconds") if getattr(request, name) is not None]
+    if len(goals) > 1 or not (goals or request.end):
         raise InvalidField(
-            given[-1] if given else "along",
-            f"{' and '.join(given) or 'none'} given, expected one of along, to and seconds",
+            goals[-1] if goals else "along",
+            f"{' and '.join(goals) or 'none'} given, expected one of along, to and seconds",
         )
-    if request.end and given not in ([], ["along"]):
-        raise InvalidField("end", f"given with {given[0]}, expected alone or with along")
+    if request.end and goals not in ([], ["along"]):
+        raise InvalidField("end", f"given with {goals[0]}, expected alone or with along")
     if request.turn is not None and request.seconds is None:
         raise InvalidField("turn", "given without seconds, expected only with seconds")
     if request.entry_turn is not None and request.seconds is None:
@@ -350,8 +350,8 @@ def check_fields(request: WalkRequest) -> None:
     if request.detour and (request.along is not None or request.seconds is not None):
         raise InvalidField("detour", "given with along or seconds, expected only with to or end")
     if request.detour and len(request.obstacles) > MAX_DISCS:
-        found = len(request.obstacles)
-        raise InvalidField("obstacles", f"{found}, expected at most {MAX_DISCS} with a detour")
+        count = len(request.obstacles)
+        raise InvalidField("obstacles", f"{count}, expected at most {MAX_DISCS} with a detour")
     for index, disc in enumerate(request.obstacles):
         for name in ("x", "z", "radius"):
             check_number(f"obstacles/{index}/{name}", getattr(disc, name))

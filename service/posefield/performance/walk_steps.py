@@ -59,11 +59,11 @@ class LastCycle:
 
     def find_cut(self, runs: Sequence[range]) -> Cut:
         """Return the best cut from frames of the cycle; of equal ones the first."""
-        found = [
+        cuts = [
             joins.find_cut(self.character, self.poses, self.act, exits, self.entries)
             for exits in runs
         ]
-        return min(found, key=lambda own: round(own.cost / joins.GRAIN))
+        return min(cuts, key=lambda cut: round(cut.cost / joins.GRAIN))
 
     def lies(self, cut: Cut) -> FloorMotion:
         """Return where the act lies in the frame that travels with the walker at the exit."""
@@ -72,10 +72,10 @@ class LastCycle:
     def reachable(self, plan: WalkPlan, free: bool) -> list[range]:
         """Return the frames in whose phases another plan can end, in runs; the nearest if none."""
         gaps = np.abs(_gaps(self.plan.phases, plan))
-        most = np.inf if free else MOST_CHANGED * float(plan.phases[-1] - plan.phases[0])
-        near = gaps <= max(most, float(gaps.min()))
+        limit = np.inf if free else MOST_CHANGED * float(plan.phases[-1] - plan.phases[0])
+        near = gaps <= max(limit, float(gaps.min()))
         edges = np.flatnonzero(np.diff(near, prepend=False, append=False)).tolist()
-        return [range(*own) for own in zip(edges[::2], edges[1::2], strict=True)]
+        return [range(*edge) for edge in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def lead_to(
@@ -107,11 +107,11 @@ def lead_to(
             # Where a walk stands depends on the foot that closes.
             cycle = _last_cycle(script, index, plan, (act, entries))
         runs = [cycle.exits] if plan.closes else cycle.reachable(plan, free)
-        if plan.closes or not any(cut.exit in own for own in runs):
+        if plan.closes or not any(cut.exit in run for run in runs):
             cut = cycle.find_cut(runs)
-        shown = _travelling(plan, -1).after(cycle.lies(cut))
-        by = staged.by or staged.facing(staged.act.heading + shown.turn)
-        away = by.after(shown.inverse())
+        act_place = _travelling(plan, -1).after(cycle.lies(cut))
+        by = staged.by or staged.facing(staged.act.heading + act_place.turn)
+        away = by.after(act_place.inverse())
         if abs(away.shift) < NEAR and abs(away.turn) < STRAIGHT:
             break
     if not plan.closes:
@@ -143,8 +143,8 @@ def _plan_to(
     """Return the plan of a walk to a place; with the heading there of an act that has one."""
     _, source = walk_of(script, index)
     goal = {"end": end} if staged.by else {"to": (end.shift.imag, end.shift.real)}
-    asked = replace(entry.request, **goal)
-    return walk_plan.plan_walk(source.gait, asked, entry.start, entry.phase)
+    request = replace(entry.request, **goal)
+    return walk_plan.plan_walk(source.gait, request, entry.start, entry.phase)
 
 
 def _last_cycle(
@@ -170,8 +170,8 @@ def _travelling(plan: WalkPlan, frame: int) -> FloorMotion:
 
 def _gaps(phases: Annotated[Floats, "frames"], plan: WalkPlan) -> Annotated[Floats, "frames"]:
     """Return signed differences (F,) of phases from that in which a plan ends, in cycles."""
-    found: Floats = (phases - plan.phases[-1] + 0.5) % 1.0 - 0.5
-    return found
+    gaps: Floats = (phases - plan.phases[-1] + 0.5) % 1.0 - 0.5
+    return gaps
 
 
 def entry_range(frames: int, event: int | None) -> range:
@@ -188,23 +188,23 @@ def entries_of(script: Script, staged: StagedAct, frames: int) -> range:
 
 def target_frames(script: Script, staged: StagedAct) -> list[int]:
     """Return the frames of an act at which its targets hold; none for a motion without targets."""
-    own, source = script.segments[staged.segment], script.sources[staged.segment]
-    if not isinstance(own, Act) or source is None:
+    act, source = script.segments[staged.segment], script.sources[staged.segment]
+    if not isinstance(act, Act) or source is None:
         return []
     skeleton = source.model.session.card.skeleton
     return [
-        staged.act.frame_of(each.when, skeleton.parents, skeleton.names.index(each.joint))
-        for each in own.targets
+        staged.act.frame_of(target.when, skeleton.parents, skeleton.names.index(target.joint))
+        for target in act.targets
     ]
 
 
 def _arrival(act: Passage) -> FloorMotion:
     """Return where a walk should end for an act: at its first root, the way it moves."""
     frames = min(round(ENTRY_SECONDS * RATE), len(act) - 1)
-    places = floor_plane.project(act.roots[[0, frames]])
-    moved = complex(places[1] - places[0])
-    turned = float(np.angle(moved)) if abs(moved) > MOVING else act.heading(0)
-    return FloorMotion(turned, complex(places[0]))
+    roots = floor_plane.project(act.roots[[0, frames]])
+    direction = complex(roots[1] - roots[0])
+    turned = float(np.angle(direction)) if abs(direction) > MOVING else act.heading(0)
+    return FloorMotion(turned, complex(roots[0]))
 
 
 def _ending_in(plan: WalkPlan, phase: float, free: bool) -> WalkPlan:
@@ -215,25 +215,25 @@ def _ending_in(plan: WalkPlan, phase: float, free: bool) -> WalkPlan:
     gap = float(_gaps(np.array([phase]), plan)[0])
     if free:
         return replace(plan, phases=plan.phases + gap)
-    whole = float(plan.phases[-1] - plan.phases[0])
-    share = float(np.clip(gap / max(whole, 1e-9), -MOST_CHANGED, MOST_CHANGED))
+    cycles = float(plan.phases[-1] - plan.phases[0])
+    share = float(np.clip(gap / max(cycles, 1e-9), -MOST_CHANGED, MOST_CHANGED))
     return replace(plan, phases=plan.phases[0] + (plan.phases - plan.phases[0]) * (1.0 + share))
 
 
 def add_walk(
-    timeline: Timeline, script: Script, index: int, ahead: StagedAct | None
+    timeline: Timeline, script: Script, index: int, staged: StagedAct | None
 ) -> StagedAct | None:
     """Go on with a walk; return the act that it leads to with its place, if there is one.
 
-    ahead: act that a walk without an end of its own leads to. Raises InvalidField for a walk that
+    staged: act that a walk without an end of its own leads to. Raises InvalidField for a walk that
     the model cannot do.
     """
     entry = find_entry(timeline, script, index)
-    own, source = walk_of(script, index)
-    if ahead is None:
+    walk, source = walk_of(script, index)
+    if staged is None:
         plan = walk_plan.plan_walk(source.gait, entry.request, entry.start, entry.phase)
     else:
-        plan, ahead = lead_to(timeline, script, index, entry, ahead)
+        plan, staged = lead_to(timeline, script, index, entry, staged)
     passage = script.adapted(index, _walked(script, index, plan))
     first = 0
     if entry.continues:
@@ -241,17 +241,17 @@ def add_walk(
     elif entry.cut is None:
         timeline.begin_with(passage)
     else:
-        check_distance(own.join, entry.cut)
+        check_distance(walk.join, entry.cut)
         gaits = timeline.spans[-1].kind == "walk" if timeline.spans else False, True
-        kind, seconds = choose_blend(own.join, gaits)
+        kind, seconds = choose_blend(walk.join, gaits)
         first = timeline.join(index, passage, replace(entry.cut, entry=0), kind, seconds)
     _record(timeline, script, plan, index, first)
-    return ahead
+    return staged
 
 
 def _record(timeline: Timeline, script: Script, plan: WalkPlan, index: int, first: int) -> None:
     """Add the span of a walk; first: the frame of its first one."""
-    own, source = walk_of(script, index)
+    walk, source = walk_of(script, index)
     card, notes = source.model.session.card, [note.message for note in plan.notes]
     for note in plan.notes:
         # How a step is made is told by the notes of the segment alone.
@@ -279,7 +279,7 @@ def _record(timeline: Timeline, script: Script, plan: WalkPlan, index: int, firs
             notes=tuple(notes),
         )
     )
-    whole = plan.phases >= plan.phases[-1] - 1.0
-    earliest = first + int(np.argmax(whole))
+    last_cycle = plan.phases >= plan.phases[-1] - 1.0
+    earliest = first + int(np.argmax(last_cycle))
     # A walk that stops is left where it stands.
-    timeline.exits = range(len(done) - 1 if own.stop == "standing" else earliest, len(done))
+    timeline.exits = range(len(done) - 1 if walk.stop == "standing" else earliest, len(done))

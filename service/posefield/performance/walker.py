@@ -49,8 +49,8 @@ class Walker:
     @property
     def key(self) -> WalkerKey:
         """Key of values that follow from the walker alone."""
-        given = tuple(sorted(self.given.items()))
-        return self.gait.session.digest, self.weights.tobytes(), self.offset.tobytes(), given
+        controls = tuple(sorted(self.given.items()))
+        return self.gait.session.digest, self.weights.tobytes(), self.offset.tobytes(), controls
 
     def is_same(self, other: "Walker") -> bool:
         """Return whether another walker has the same labels and given controls."""
@@ -74,26 +74,26 @@ class Walker:
         for _ in range(ITERATIONS):
             done = self.strides(self._mean_controls(speed, turn))
             speed, turn = speed + speeds - done.speeds, turn + turning - done.turning
-        found = self._mean_controls(speed, turn)
+        controls = self._mean_controls(speed, turn)
         if self.given:
-            self._check_speeds(speeds, found)
-        return found
+            self._check_speeds(speeds, controls)
+        return controls
 
     def _mean_controls(self, speeds: PerPoint, turning: PerPoint) -> PointControls:
         unseen = np.full(len(speeds), -1)
-        found = self.gait.mean_controls(speeds, turning, unseen) + self.offset
+        controls = self.gait.mean_controls(speeds, turning, unseen) + self.offset
         for column, value in self.given.items():
-            found[:, column] = value
-        return found
+            controls[:, column] = value
+        return controls
 
-    def _check_speeds(self, wanted: PerPoint, controls: PointControls) -> None:
+    def _check_speeds(self, expected: PerPoint, controls: PointControls) -> None:
         speeds = self.strides(controls).speeds
-        at = int(np.argmax(np.abs(speeds - wanted)))
-        if abs(speeds[at] - wanted[at]) > SPEED_TOLERANCE * wanted[at]:
+        at = int(np.argmax(np.abs(speeds - expected)))
+        if abs(speeds[at] - expected[at]) > SPEED_TOLERANCE * expected[at]:
             names = [self.card.controls[column].name for column in self.given]
             raise InvalidField(
                 f"controls/{names[0]}",
-                f"with it the model walks at {speeds[at]:.2f} m/s where {wanted[at]:.2f} m/s is "
+                f"with it the model walks at {speeds[at]:.2f} m/s where {expected[at]:.2f} m/s is "
                 "asked for; expected other controls than those of speed and turning",
             )
 
@@ -101,8 +101,8 @@ class Walker:
         """Return the mean places (B,) of the root over a cycle, in the frame that travels."""
         phases = np.arange(AVERAGED_PHASES) / AVERAGED_PHASES
         labels = self.labels(len(controls))
-        places = stride.root_places(self.gait.session, controls, labels, phases)
-        return np.asarray(places.mean(axis=1))
+        roots = stride.root_places(self.gait.session, controls, labels, phases)
+        return np.asarray(roots.mean(axis=1))
 
     @cached_property
     def slowest(self) -> Annotated[Floats, "1 controls"]:
@@ -127,11 +127,13 @@ class Walker:
         self, controls: Annotated[Floats, "1 controls"], phases: Annotated[Floats, "phases"]
     ) -> Annotated[Floats, "phases"]:
         """Return the largest probability (B,) that a foot does not stand, at phases (B,)."""
-        places = [self.card.contacts.index(own) for own in walking_feet.foot_contacts(self.card)]
+        columns = [
+            self.card.contacts.index(contact) for contact in walking_feet.foot_contacts(self.card)
+        ]
         rows, labels = np.repeat(controls, len(phases), axis=0), self.labels(len(phases))
         session = self.gait.session
         likely = stride.contact_probabilities(session, rows, labels, phases)
-        return np.asarray(1.0 - likely[:, places].min(axis=1))
+        return np.asarray(1.0 - likely[:, columns].min(axis=1))
 
     def _paces(
         self, controls: Annotated[Floats, "1 controls"], phases: Annotated[Floats, "phases"]
@@ -140,9 +142,9 @@ class Walker:
         rows, labels = np.repeat(controls, len(phases), axis=0), self.labels(len(phases))
         session, done = self.gait.session, self.strides(controls)
         posed = stride.synthesize_poses(session, rows, labels, phases)
-        places = posed.places + phases * done.travels[0]
+        roots = posed.places + phases * done.travels[0]
         bones = stride.bones(session, controls, self.labels(1)).astype(float)
-        local = skeleton.translations(bones, floor_plane.at_height(places, posed.heights)[None])
+        local = skeleton.translations(bones, floor_plane.at_height(roots, posed.heights)[None])
         joints = skeleton.positions(self.card.skeleton.parents, posed.rotations[None], local)[0]
         feet = floor_plane.project(joints[:, list(self.card.feet)])
         after = np.vstack([feet[1:], feet[:1] + done.travels[0]])
@@ -154,10 +156,10 @@ def _lowest(values: Annotated[Floats, "phases"]) -> Annotated[Indices, "some"]:
     half = len(values) / 2.0
     minima = (values <= np.roll(values, 1)) & (values < np.roll(values, -1))
     chosen: list[int] = []
-    for place in sorted(np.flatnonzero(minima).tolist(), key=lambda place: float(values[place])):
-        apart = [abs((place - one + half) % (2.0 * half) - half) for one in chosen]
-        if len(chosen) < 2 and all(gap > 0.5 * half for gap in apart):
-            chosen.append(place)
+    for index in sorted(np.flatnonzero(minima).tolist(), key=lambda index: float(values[index])):
+        distances = [abs((index - one + half) % (2.0 * half) - half) for one in chosen]
+        if len(chosen) < 2 and all(gap > 0.5 * half for gap in distances):
+            chosen.append(index)
     return np.array(sorted(chosen), dtype=np.int64)
 
 
@@ -171,19 +173,19 @@ def find_walker(
     card = gait.session.card
     weights = label_weights(card, None, labels)
     names = [control.name for control in card.controls]
-    given = {}
+    given_controls = {}
     for name, value in controls.items():
         field = f"controls/{name}"
         if name not in names:
-            found = f"unknown control{did_you_mean(name, names)}"
-            raise InvalidField(field, f"{found}, expected one of {', '.join(names)}")
-        own = card.controls[names.index(name)]
+            problem = f"unknown control{did_you_mean(name, names)}"
+            raise InvalidField(field, f"{problem}, expected one of {', '.join(names)}")
+        bounds = card.controls[names.index(name)]
         number = check_number(field, value)
-        check_range(field, number, own.minimum, own.maximum, own.unit)
-        given[names.index(name)] = number
+        check_range(field, number, bounds.minimum, bounds.maximum, bounds.unit)
+        given_controls[names.index(name)] = number
     # The mean residual of the controls for the labels; zeros for none.
     offset = np.zeros(gait.performer_offsets.shape[1])
     shares = requested_labels(card, labels).shares if labels else None
     if shares is not None and shares.any():
         offset = np.asarray(shares @ gait.performer_offsets[:-1] / max(1.0, shares.sum()))
-    return Walker(gait, weights, offset, given)
+    return Walker(gait, weights, offset, given_controls)
