@@ -215,7 +215,8 @@ def check_clear(path: FloorPath, obstacles: Sequence[Disc]) -> None:
             raise InvalidField(
                 f"obstacles/{index}",
                 f"the path leads within {distances[at]:.2f} m of its centre at x "
-                f"{points[at].imag:.2f} m, z {points[at].real:.2f} m, expected {disc.radius:.2f} m or more",
+                f"{points[at].imag:.2f} m, z {points[at].real:.2f} m, expected "
+                f"{disc.radius:.2f} m or more",
             )
 
 
