@@ -78,22 +78,12 @@ class MotionSummary:
     levels: dict[int, int]
 
 
-@dataclass(frozen=True)
-class MotionSamples:
-    """Samples of one motion and its note.
+def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[tuple[Samples, MotionSummary]]:
+    """Yield samples and summary of each motion in order; at most one batch is in memory at a time.
 
-    samples: translations (F, J, 3), rotations (F, J, 4), real part last, and weights of the curves
-    (F, C) where the crowd has some.
-    """
-
-    samples: Samples
-    summary: MotionSummary
-
-
-def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
-    """Yield the motions in order; at most one batch is in memory at a time.
-
-    Raises ValueError for a number of motions other than the characters play, and for other shapes.
+    Samples are translations (F, J, 3), rotations (F, J, 4), real part last, and weights of the
+    curves (F, C) where the crowd has some. Raises ValueError for a number of motions other than the
+    characters play, and for other shapes.
     """
     count = 0
     # The variable of a for loop would keep each batch in memory while the next is computed.
@@ -110,7 +100,9 @@ def motion_layer(crowd: CrowdClip, rig: CharacterRig, samples: Samples) -> bytes
     return crate_template.usdc(author, LayerContent(samples, {}, {}))
 
 
-def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Iterator[MotionSamples]:
+def _batch_motions(
+    crowd: CrowdClip, rig: CharacterRig, batch: Motions
+) -> Iterator[tuple[Samples, MotionSummary]]:
     expected = (crowd.frames, len(crowd.skeleton), 4)
     if batch.rotations.shape[1:] != expected:
         raise ValueError(f"motions of {batch.rotations.shape[1:]}, expected {expected}")
@@ -121,7 +113,7 @@ def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Itera
         samples = {"translations": motion.translations, "rotations": motion.rotations}
         if weights is not None:
             samples[WEIGHTS] = weights[index]
-        yield MotionSamples(samples, MotionSummary(box, _level_changes(batch.levels[index])))
+        yield samples, MotionSummary(box, _level_changes(batch.levels[index]))
 
 
 def _weights(crowd: CrowdClip, batch: Motions) -> Singles | None:
@@ -243,31 +235,31 @@ LEVEL_ATTRIBUTE = "posefield:level"
 """Level of detail of a motion's frames, with a time sample at each change."""
 
 
-def add_to_references(layer: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+def add_to_references(layer: Any, crowd: CrowdClip, summaries: Sequence[MotionSummary]) -> None:
     """Add extents to a crowd of references to one prototype, and levels to its motions."""
-    _placed_boxes(layer, crowd, notes)
-    boxes = np.array([note.box for note in notes])
+    _placed_boxes(layer, crowd, summaries)
+    boxes = np.array([summary.box for summary in summaries])
     box = np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     with Sdf.ChangeBlock():
         for path in (PROTOTYPE, PROTOTYPE.AppendChild("Body")):
             _set_extent(layer, path, box)
-        for index, note in enumerate(notes):
-            _set_levels(layer, MOTIONS.AppendChild(motion_name(index)), note)
+        for index, summary in enumerate(summaries):
+            _set_levels(layer, MOTIONS.AppendChild(motion_name(index)), summary)
 
 
-def add_to_flat(layer: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+def add_to_flat(layer: Any, crowd: CrowdClip, summaries: Sequence[MotionSummary]) -> None:
     """Add extents and levels to a crowd in which each character has its own body and motion."""
-    _placed_boxes(layer, crowd, notes)
+    _placed_boxes(layer, crowd, summaries)
     for some in character_blocks(crowd):
         with Sdf.ChangeBlock():
             for index, played in zip(some, crowd.motion[some], strict=True):
                 path = character_path(index)
-                _set_extent(layer, path.AppendChild("Body"), notes[played].box)
-                _set_levels(layer, path.AppendChild(character_name(index)), notes[played])
+                _set_extent(layer, path.AppendChild("Body"), summaries[played].box)
+                _set_levels(layer, path.AppendChild(character_name(index)), summaries[played])
 
 
-def _placed_boxes(layer: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
-    boxes = np.array([notes[played].box for played in crowd.motion])
+def _placed_boxes(layer: Any, crowd: CrowdClip, summaries: Sequence[MotionSummary]) -> None:
+    boxes = np.array([summaries[played].box for played in crowd.motion])
     for some in character_blocks(crowd):
         with Sdf.ChangeBlock():
             for index in some:
@@ -285,10 +277,10 @@ def _set_extent(layer: Any, prim: Any, box: Floats) -> None:
     ).default = layers.float3_array(box)
 
 
-def _set_levels(layer: Any, prim: Any, note: MotionSummary) -> None:
+def _set_levels(layer: Any, prim: Any, summary: MotionSummary) -> None:
     path = prim.AppendProperty(LEVEL_ATTRIBUTE)
     _attribute(layer, path, ValueTypes.Int).custom = True
-    for frame, level in note.levels.items():
+    for frame, level in summary.levels.items():
         layer.SetTimeSample(path, frame, level)
 
 
@@ -306,14 +298,14 @@ def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKi
     character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
     prototype.specifier = Sdf.SpecifierClass
     group = layers.prim(root, MOTIONS.name, "Scope")
-    notes = []
-    for index, motion in enumerate(all_motions(crowd, rig)):
+    summaries = []
+    for index, (samples, summary) in enumerate(all_motions(crowd, rig)):
         name = motion_name(index)
         animation = character_prims.animation(group, name, rig.paths, crowd.curves)
-        layers.set_time_samples(animation, motion.samples)
-        notes.append(motion.summary)
+        layers.set_time_samples(animation, samples)
+        summaries.append(summary)
     add_references(layer, crowd, instanced)
-    add_to_references(layer, crowd, notes)
+    add_to_references(layer, crowd, summaries)
     return layer
 
 
@@ -321,11 +313,11 @@ def flat_layer(crowd: CrowdClip, form: str, body: BodyKind) -> Any:
     """Return a layer in which every character has its own data; the caller must hold it."""
     layer, rig = new_layer(crowd, form), character.rig(crowd.skeleton, body)
     _copy_prototype(layer, crowd, rig)
-    notes = []
-    for index, motion in enumerate(all_motions(crowd, rig)):
-        _copy_motion(layer, crowd, index, rig, motion)
-        notes.append(motion.summary)
-    add_to_flat(layer, crowd, notes)
+    summaries = []
+    for index, (samples, summary) in enumerate(all_motions(crowd, rig)):
+        _copy_motion(layer, crowd, index, rig, samples)
+        summaries.append(summary)
+    add_to_flat(layer, crowd, summaries)
     return layer
 
 
@@ -346,7 +338,7 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
 
 
 def _copy_motion(
-    layer: Any, crowd: CrowdClip, played: int, rig: CharacterRig, motion: MotionSamples
+    layer: Any, crowd: CrowdClip, played: int, rig: CharacterRig, samples: Samples
 ) -> None:
     """Give each character that plays a motion, of an index, a copy of it.
 
@@ -359,7 +351,7 @@ def _copy_motion(
         root = layer.GetPrimAtPath(character_path(index))
         skel_animation = character_prims.animation(root, root.name, rig.paths, crowd.curves)
         if first is None:
-            layers.set_time_samples(skel_animation, motion.samples)
+            layers.set_time_samples(skel_animation, samples)
             first = skel_animation.path
         else:
             # Each spec lacks at most one field, so the order of copying does not matter.
@@ -388,20 +380,20 @@ def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
 
 def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each other layer, one at a time."""
-    rig, notes = character.rig(crowd.skeleton, body), []
+    rig, summaries = character.rig(crowd.skeleton, body), list[MotionSummary]()
     standing = _part_layer("Character", crowd)
     prim = character_prims.root(standing, "Character", rig)
     character_prims.add_blend_shapes(prim, rig, crowd.curves)
     character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
     yield CHARACTER_FILE, layers.crate_bytes(standing)
-    for index, motion in enumerate(all_motions(crowd, rig)):
-        notes.append(motion.summary)
+    for index, (samples, summary) in enumerate(all_motions(crowd, rig)):
+        summaries.append(summary)
         yield (
             f"{motion_name(index)}.usdc",
-            motion_layer(crowd, rig, motion.samples),
+            motion_layer(crowd, rig, samples),
         )
     last = _part_layer(ROOT.name, crowd)
-    add_to_references(last, crowd, notes)
+    add_to_references(last, crowd, summaries)
     yield SUMMARY_FILE, layers.crate_bytes(last)
 
 

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, Any
+from typing import IO
 
 from posefield.common import atomic_files
 from posefield.common import cancellation as cancel
@@ -135,12 +135,12 @@ def write(
     ending = path.suffix.removeprefix(".")
     _validate(crowd, ending, FILES, instancing)
     if ending == "usdz":
-        atomic_files.write_chunks(_usdz(crowd, instancing, body), path)
+        atomic_files.write_chunks(encode_here(crowd, ending, instancing, body), path)
     elif ending == "usd" and instancing != "flatten":
         _write_folder(crowd, path, instancing == "scenegraph", body)
     else:
         with atomic_files.replacing(path) as temporary:
-            layers.export_layer(_layer(crowd, _form(ending), instancing, body), temporary)
+            _export(crowd, temporary, instancing, body)
 
 
 def stream(
@@ -173,54 +173,39 @@ def stream(
 def encode_here(
     crowd: CrowdClip, ending: str, instancing: str, body: BodyKind = DEFAULT_BODY
 ) -> Iterator[bytes]:
-    """Return the bytes of a crowd as `stream` does, encoded by this process whatever its size."""
-    if ending == "usdz":
-        return _usdz(crowd, instancing, body)
-    return _single_file(crowd, ending, instancing, body)
+    """Yield the bytes of a crowd as `stream` does, encoded by this process whatever its size."""
+    if ending == "usdz" and instancing != "flatten":
+        yield from archives.zip_chunks(crowd_scene.members(crowd, instancing == "scenegraph", body))
+        return
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "crowd.usda" if ending == "usda" else "crowd.usdc")
+        _export(crowd, path, instancing, body)
+        if ending == "usdz":
+            yield from archives.zip_chunks([archives.member_of_file(path.name, path)])
+        else:
+            yield from atomic_files.read_chunks(path)
+
+
+def _export(crowd: CrowdClip, path: Path, instancing: str, body: BodyKind) -> None:
+    """Write a crowd of one layer: as text if the path ends in .usda, else in binary form."""
+    form = "usda" if path.suffix == ".usda" else "usdc"
+    if instancing == "flatten":
+        layer = crowd_scene.flat_layer(crowd, form, body)
+    else:
+        layer = crowd_scene.referencing_layer(crowd, form, instancing == "scenegraph", body)
+    layers.export_layer(layer, path)
 
 
 def _validate(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancing: str) -> None:
-    _check_choice("format", ending, endings)
-    _check_choice("instancing", instancing, INSTANCING)
+    for field, value, expected in (
+        ("format", ending, endings),
+        ("instancing", instancing, INSTANCING),
+    ):
+        if value not in expected:
+            hint = did_you_mean(value, expected)
+            raise InvalidField(field, f"{value!r}{hint}, expected one of {', '.join(expected)}")
     if ending == "usdz":
         crowd_size.check_archive_size(crowd)
-
-
-def _check_choice(field: str, value: str, expected: tuple[str, ...]) -> None:
-    if value not in expected:
-        hint = did_you_mean(value, expected)
-        raise InvalidField(field, f"{value!r}{hint}, expected one of {', '.join(expected)}")
-
-
-def _form(ending: str) -> str:
-    return "usda" if ending == "usda" else "usdc"
-
-
-def _layer(crowd: CrowdClip, form: str, instancing: str, body: BodyKind) -> Any:
-    if instancing == "flatten":
-        return crowd_scene.flat_layer(crowd, form, body)
-    return crowd_scene.referencing_layer(crowd, form, instancing == "scenegraph", body)
-
-
-def _single_file(crowd: CrowdClip, ending: str, instancing: str, body: BodyKind) -> Iterator[bytes]:
-    with TemporaryDirectory() as name:
-        path = Path(name, f"crowd.{ending}")
-        layers.export_layer(_layer(crowd, _form(ending), instancing, body), path)
-        yield from atomic_files.read_chunks(path)
-
-
-def _usdz(crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
-    if instancing != "flatten":
-        members = crowd_scene.members(crowd, instancing == "scenegraph", body)
-        return archives.zip_chunks(members)
-    return _flat_usdz(crowd, body)
-
-
-def _flat_usdz(crowd: CrowdClip, body: BodyKind) -> Iterator[bytes]:
-    with TemporaryDirectory() as name:
-        path = Path(name, "crowd.usdc")
-        layers.export_layer(crowd_scene.flat_layer(crowd, "usdc", body), path)
-        yield from archives.zip_chunks([archives.member_of_file(path.name, path)])
 
 
 CROWD_LAYER_NAME = re.compile(r"(m\d{5,}|character|summary)\.usdc")
@@ -232,15 +217,10 @@ def _write_folder(crowd: CrowdClip, path: Path, instanced: bool, body: BodyKind)
     Raises FileError if the folder contains other files than a crowd's layers, which would be lost.
     """
     folder = path.with_name(f"{path.stem}_clips")
-    _check_crowd_folder(folder)
+    for file in [folder] if folder.is_file() else sorted(folder.glob("*")):
+        if not CROWD_LAYER_NAME.fullmatch(file.name):
+            raise FileError(file, "in the way; expected nothing here but an earlier crowd's layers")
     with atomic_files.replacing_pair(path, folder) as (entry, inside):
         entry.write_bytes(crowd_scene.root_layer(crowd, instanced, folder.name))
         for name, content in crowd_scene.referenced_layers(crowd, body):
             (inside / name).write_bytes(content)
-
-
-def _check_crowd_folder(folder: Path) -> None:
-    files = [folder] if folder.is_file() else sorted(folder.glob("*"))
-    for path in files:
-        if not CROWD_LAYER_NAME.fullmatch(path.name):
-            raise FileError(path, "in the way; expected nothing here but an earlier crowd's layers")
