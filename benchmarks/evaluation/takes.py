@@ -130,7 +130,7 @@ def _unlimited(model: Synthesizer, asked: ClipQuestion) -> Clip:
     held = variation.vary(bench, bench.predict(state), question, settings)
     times = np.arange(0.0, held.duration, 1.0 / asked.fps)
     trust = structs.replace(model.constrained_trust(asked, question, held), targets=())
-    found = solver.poses_at(question, held, times, trust)
+    (found,) = solver.poses([(question, held, times, trust)])
     return assemble(
         card.skeleton, found.rotations, found.root_position, found.bone_offsets, asked.fps
     )

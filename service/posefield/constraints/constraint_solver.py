@@ -13,7 +13,6 @@ from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import Floats, Frames
 from posefield.common.value_cache import ValueCache
 from posefield.constraints import constrained_motion, constraint
-from posefield.constraints import targets as goals
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.constraint import Constraint, PositionConstraint
 from posefield.constraints.take_variation import TakeVariation
@@ -22,7 +21,6 @@ from posefield.inference.session import PredictionState, Session
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import motion_question
-from posefield.question.motion_question import MotionQuestion
 from posefield.question.results import PoseAnswer, Trust
 from posefield.validation import question_validation
 from posefield.validation.imputation import ControlImputer
@@ -49,16 +47,6 @@ class _CacheKey:
 
 
 @dataclass(frozen=True)
-class MotionTimes:
-    """A motion, predicted or corrected, and times (S,), s, of its poses."""
-
-    question: ValidatedQuestion
-    held: ConstrainedMotion
-    when: Frames
-    trust: Trust
-
-
-@dataclass(frozen=True)
 class _OpenMotion:
     """A motion that is corrected. begun: predicted. held: by the last round."""
 
@@ -77,29 +65,17 @@ class ConstraintSolver:
         self._solved = ValueCache[_CacheKey, ConstrainedMotion | QueryError](CACHE_SIZE)
         self._positions_cached = lru_cache(CACHE_SIZE)(self._captured_positions)
 
-    @cached_property
-    def measures(self) -> bool:
-        """True if a control is measured on the motion."""
-        return any(c.measure for c in self._session.card.controls)
-
-    def constraints(self, question: ValidatedQuestion, asked: MotionQuestion) -> ConstraintSet:
-        """Return the constraints of a question; raises as `goals.from_question` does."""
-        if not asked.has_constraints and not self.measures:
-            return NO_CONSTRAINTS
-        return goals.from_question(self._session.card, question, asked)
-
     def controls(
-        self, question: ValidatedQuestion, asked: MotionQuestion, chooser: ControlImputer
-    ) -> dict[str, float] | None:
-        """Return all controls of a question with open controls and targets, else None.
+        self,
+        question: ValidatedQuestion,
+        targets: tuple[JointTarget, ...],
+        chooser: ControlImputer,
+    ) -> dict[str, float]:
+        """Return all controls of a question with open controls and targets.
 
         The open controls are near those of a captured clip that is typical for the other controls
         and the targets.
         """
-        if not (question.inferred and asked.targets):
-            return None
-        # Validation comes first: the search for controls takes about a second.
-        targets = self.constraints(question, asked).targets
         open_ = set(question.inferred)
         given = {name: v for name, v in question.controls.items() if name not in open_}
         given |= controls_from_targets(self._session.card, given, targets)
@@ -170,28 +146,28 @@ class ConstraintSolver:
         """Return the measured controls of a motion."""
         return self._corrector(question.level).measured(held)
 
-    def poses_at(
-        self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames, trust: Trust
-    ) -> PoseAnswer[np.float64]:
-        """Return the poses of one motion at times (S,), s."""
-        (answer,) = self.poses([MotionTimes(question, held, when, trust)])
-        return answer
+    def poses(
+        self, requests: Sequence[tuple[ValidatedQuestion, ConstrainedMotion, Frames, Trust]]
+    ) -> list[PoseAnswer[np.float64]]:
+        """Return the poses of motions at times (S,), s, with the given trust.
 
-    def poses(self, every: Sequence[MotionTimes]) -> list[PoseAnswer[np.float64]]:
-        """Return the poses of motions at their times; each has the bytes that it has alone."""
-        frames = [self._frames(own.question, own.held, own.when) for own in every]
-        poses = constrained_motion.evaluate_poses([own.held for own in every], frames)
-        named = bool(self._session.card.curves)
+        Each has the bytes that it has alone.
+        """
+        frames = [self._frames(*request[:3]) for request in requests]
+        poses = constrained_motion.evaluate_poses([motion for _, motion, _, _ in requests], frames)
+        with_curves = bool(self._session.card.curves)
         return [
             PoseAnswer(
-                own.when,
+                times,
                 rotations,
                 roots,
-                own.held.state.bones,
-                own.trust,
-                own.held.curve_values(at) if named else None,
+                motion.state.bones,
+                trust,
+                motion.curve_values(at) if with_curves else None,
             )
-            for own, at, (rotations, roots) in zip(every, frames, poses, strict=True)
+            for (_, motion, times, trust), at, (rotations, roots) in zip(
+                requests, frames, poses, strict=True
+            )
         ]
 
     def _captured_positions(

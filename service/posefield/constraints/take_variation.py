@@ -5,7 +5,7 @@ of the controls and labels, which is zero at captured clips up to the nugget.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import groupby
 from typing import Annotated
@@ -13,7 +13,6 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices, PointControls, PointLabels, PointValues, Values
 from posefield.common.value_cache import ValueCache
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
@@ -24,7 +23,7 @@ from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
-from posefield.question.motion_question import MotionQuestion, check_take
+from posefield.question.motion_question import MotionQuestion
 from posefield.validation.question_validation import ValidatedQuestion
 
 FIELD_CACHE, DEVIATION_CACHE = 64, 4096
@@ -235,20 +234,6 @@ def change_coefficients(
     root = bench.spread.coefficients
     # A coarser level has the leading coefficients, and these have the leading part of the root.
     return np.asarray(by[:, : len(root)] @ root.T)
-
-
-def check(card: ModelCard, asked: MotionQuestion) -> None:
-    """Raise InvalidField for a seed or a variety out of range, and for a model without takes."""
-    check_take(asked.take, asked.variety)
-    if asked.take and not random_field.has_features(card.kriging):
-        found = card.kriging.covariance
-        raise InvalidField("take", f"{asked.take}, but no takes can be drawn of {found} kriging")
-
-
-def facts(card: ModelCard, asked: MotionQuestion) -> dict[str, float]:
-    """Return seed, variety and detail of a take for the answer; empty for the prediction."""
-    found = settings(card, asked)
-    return {} if found is None else asdict(found)
 
 
 def settings(card: ModelCard, asked: MotionQuestion) -> TakeSettings | None:

@@ -20,7 +20,7 @@ from posefield.encode.formats import ClipEncoder
 from posefield.http import metrics, worker_threads
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clip_batch, clips, poses
+from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.poses import OutputRow, PreparedPoseQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -65,7 +65,7 @@ class ClipBatcher:
         if encoder.inline_limit:
             answer = clips.synthesize_clip(model, question, longest)
             return EncodedClip(answer, await self.file(encoder, convention, answer))
-        if clip_batch.longest(model, question) > MAX_BATCHED_FRAMES:
+        if clip_draft.largest_frame_count(model, question) > MAX_BATCHED_FRAMES:
             answer = await worker_threads.run_in_thread(
                 clips.synthesize_clip, model, question, longest
             )

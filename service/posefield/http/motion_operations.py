@@ -19,7 +19,7 @@ from posefield.http.request import ServiceRequest
 from posefield.http.worker_threads import POSE_LIMITER, SYNTHESIS_LIMITER, run_in_thread
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer
-from posefield.synthesis import clip_batch, clips, poses
+from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.poses import MAX_POSES, PreparedPoseQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -36,8 +36,8 @@ async def answer_pose(request: ServiceRequest) -> Response:
         prepared = await run_in_thread(poses.prepare, model, question, limiter=POSE_LIMITER)
     else:
         prepared = poses.prepare(model, question)
-    constraints = model.solver.constraints(prepared.question, question)
-    if constraints or len(question.times) > encoder.inline_limit:
+    constraints = model.constraints(prepared.question, question)
+    if constraints is not None or len(question.times) > encoder.inline_limit:
         content = await run_in_thread(
             _encode_poses, model, encoder, prepared, constraints, limiter=POSE_LIMITER
         )
@@ -53,9 +53,9 @@ def _encode_poses(
     model: Synthesizer,
     encoder: TableEncoder[PoseAnswer[Any]],
     prepared: PreparedPoseQuestion,
-    constraints: ConstraintSet,
+    constraints: ConstraintSet | None,
 ) -> bytes:
-    if constraints:
+    if constraints is not None:
         return encoder.encode(poses.synthesize_constrained(model, prepared, constraints))
     (row,) = poses.run_batch(model, [prepared])
     return encoder.encode(poses.build_answer(model, prepared, row))
@@ -70,7 +70,7 @@ async def answer_clip(request: ServiceRequest) -> Response:
     convention = encoder.convention(question.unit, question.up, question.body)
     longest = _frame_limit(request, encoder, 0)
     batcher = request.service.clip_batcher
-    if clip_batch.is_predicted(model, question):
+    if clip_draft.is_predicted(model, question):
         answer, content = await batcher.clip(model, question, longest, encoder, convention)
     else:
         # A correction takes milliseconds, which would block the event loop.

@@ -11,6 +11,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
+from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import RATE32, RATE52, Hyper, KrigingWeights
@@ -108,6 +109,14 @@ FIELD, SIGNS, NUGGETS = range(3)
 def has_features(hyper: Hyper) -> bool:
     """Return whether the covariance has a distribution of frequencies to draw from."""
     return hyper.covariance == "gaussian" or hyper.covariance in SMOOTHNESS
+
+
+def check_features(hyper: Hyper, take: int | str) -> None:
+    """Raise InvalidField for a take of a model of which none can be drawn."""
+    if not has_features(hyper):
+        raise InvalidField(
+            "take", f"{take!r}, but no takes can be drawn of {hyper.covariance} kriging"
+        )
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from posefield.common.units import Vector
 from posefield.constraints import constraint_solver
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import PositionConstraint
-from posefield.constraints.targets import NO_CONSTRAINTS, JointTarget
+from posefield.constraints.targets import NO_CONSTRAINTS, JointTarget, from_question
 from posefield.locomotion import floor_plane
 from posefield.model_file.model_card import ModelCard
 from posefield.performance import act_motion
@@ -139,11 +139,11 @@ def _expected_position(
     """
     without = tuple(target for at, target in enumerate(act_question.targets) if at != index)
     free = replace(act_question, targets=without)
-    goal = model.solver.constraints(model.question(free), act_question).targets[index]
+    goal = from_question(model.session.card, model.question(free), act_question).targets[index]
     heights = _heights(model.session.card, act_question, goal)
     free = replace(free, controls={**act_question.controls, **heights})
     question = model.question(free)
-    motion = model.solver.solve(question, model.solver.constraints(question, free))
+    motion = model.solver.solve(question, from_question(model.session.card, question, free))
     return free, _position(model, question, goal, motion)
 
 
@@ -175,7 +175,7 @@ def _out_of_reach(
 ) -> OutOfReach:
     """Return the error of a target at a height that is out of reach, with those within it."""
     question = model.question(replace(act_question, targets=()))
-    goal = model.solver.constraints(question, act_question).targets[index]
+    goal = from_question(model.session.card, question, act_question).targets[index]
     card, heights = model.session.card, []
     for controls, labels in zip(card.examples, card.clip_labels, strict=True):
         captured = dataclasses.replace(question, point=np.array([controls]), labels=labels[None])

@@ -1,8 +1,7 @@
 """Poses of a model, of one question or of a batch that gives each question the same bytes."""
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,110 +10,14 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Singles
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.onnx_runtime import CURVES
-from posefield.locomotion import floor_plane, stride
-from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
 from posefield.question import motion_question
-from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.question.motion_question import PoseQuestion
 from posefield.question.results import PoseAnswer
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
-FPS_RANGE = (1.0, 1000.0)
 MAX_POSES = 10_000
-
-
-def time_window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
-    """Return frames a second, start (s) and end (s) of a clip of at most `duration` seconds.
-
-    Raises InvalidField for values out of range, and for a loop with a start or an end.
-    """
-    rate = motion_question.check_number("fps", asked.fps)
-    motion_question.check_range("fps", rate, *FPS_RANGE, "frames a second")
-    last = duration
-    if asked.end is not None:
-        end = motion_question.check_number("end", asked.end)
-        last = motion_question.check_rounded_range("end", end, 0.0, duration, "s")
-    start = motion_question.check_number("start", asked.start)
-    start = motion_question.check_rounded_range("start", start, 0.0, last, "s")
-    if asked.loop and (start > 0.0 or asked.end is not None):
-        field, value = ("start", start) if start > 0.0 else ("end", last)
-        raise InvalidField(field, f"{value:g} s with loop, expected none: a loop is a whole cycle")
-    return rate, start, last
-
-
-def sample_times(asked: ClipQuestion, duration: float, most: int = MAX_POSES) -> Floats:
-    """Return the times (F,), s, of the requested frames of a clip that lasts `duration` seconds.
-
-    A loop's times lack the last frame, which equals the first. Raises InvalidField for more frames
-    than `most`.
-    """
-    rate, start, last = time_window(asked, duration)
-    if asked.loop:
-        steps = max(1, round(duration * rate))
-        _check_count(steps + 1, most)
-        return np.arange(steps) * duration / steps
-    # Tolerance of a millionth of a frame for the rounding of duration * rate.
-    frames = math.floor((last - start) * rate + 1e-6) + 1
-    _check_count(frames, most)
-    return np.minimum(start + np.arange(frames) / rate, duration)
-
-
-def remove_travel(answer: PoseAnswer[np.float64], way: Strides) -> PoseAnswer[np.float64]:
-    """Return the poses in the frame that travels along the way, placed at the start of the clip."""
-    poses = stride.relative_poses(
-        way, answer.times / way.durations, answer.rotations, answer.root_position
-    )
-    root = floor_plane.at_height(way.starts + poses.places, poses.heights)
-    return replace(answer, rotations=poses.rotations, root_position=root)
-
-
-def close_loop(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswer[np.float64]:
-    """Return the poses with the first one appended, moved by the cycle's travel if any."""
-    rotations, root = answer.rotations[:1], answer.root_position[:1]
-    if way is not None:
-        rotations = floor_plane.turn_roots(rotations, way.turns)
-        root = root + floor_plane.at_height(
-            floor_plane.arc_displacement(way.travels, way.turns), np.zeros(1)
-        )
-    curves = answer.curves
-    return replace(
-        answer,
-        times=np.append(answer.times, answer.trust.duration),
-        rotations=np.concatenate([answer.rotations, rotations]),
-        root_position=np.concatenate([answer.root_position, root]),
-        curves=None if curves is None else np.concatenate([curves, curves[:1]]),
-    )
-
-
-def join(first: PoseAnswer[np.float64], last: PoseAnswer[np.float64]) -> PoseAnswer[np.float64]:
-    """Return the poses of one motion at the times of two answers, with the trust of the first."""
-    curves = None if first.curves is None else np.concatenate([first.curves, last.curves])
-    return replace(
-        first,
-        times=np.append(first.times, last.times),
-        rotations=np.concatenate([first.rotations, last.rotations]),
-        root_position=np.concatenate([first.root_position, last.root_position]),
-        curves=curves,
-    )
-
-
-def part(answer: PoseAnswer[np.float64], frames: slice) -> PoseAnswer[np.float64]:
-    """Return some of the poses of an answer."""
-    return replace(
-        answer,
-        times=answer.times[frames],
-        rotations=answer.rotations[frames],
-        root_position=answer.root_position[frames],
-        curves=None if answer.curves is None else answer.curves[frames],
-    )
-
-
-def _check_count(frames: int, most: int) -> None:
-    if frames > most:
-        raise InvalidField("fps", f"{frames} frames, expected at most {most}")
-
-
 POSE_OUTPUTS = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 """Outputs that all poses are made of."""
 
@@ -165,9 +68,9 @@ def synthesize_poses(model: Synthesizer, asked: PoseQuestion) -> PoseAnswer[Any]
     for controls without similar captured clips and OutOfReach for a missed target.
     """
     checked = prepare(model, asked)
-    goals = model.solver.constraints(checked.question, asked)
-    if goals:
-        return synthesize_constrained(model, checked, goals)
+    constraints = model.constraints(checked.question, asked)
+    if constraints is not None:
+        return synthesize_constrained(model, checked, constraints)
     return build_answer(model, checked, run_batch(model, [checked])[0])
 
 
@@ -197,7 +100,8 @@ def synthesize_constrained(
     found = model.solve_constraints(question, goals, given.extrapolate)
     when = _check_times(asked, model.check_duration(found.duration))
     trust = model.constrained_trust(given, question, found)
-    return model.solver.poses_at(question, found, when, trust)
+    (answer,) = model.solver.poses([(question, found, when, trust)])
+    return answer
 
 
 def run_batch(model: Synthesizer, asked: Sequence[PreparedPoseQuestion]) -> list[OutputRow]:

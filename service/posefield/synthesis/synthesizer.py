@@ -1,21 +1,22 @@
 """A named model: validation of its questions, and the trust of its answers."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 from msgspec import structs
 
 from posefield.common.errors import OutOfReach, OutsideSamples
 from posefield.common.units import MICROMETRES
-from posefield.constraints import take_variation
+from posefield.constraints import take_variation, targets
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.level_selection import NamedModel
+from posefield.kriging import random_field
 from posefield.locomotion.gait import Gait, fit_gait
 from posefield.model_file.model_card import PERFORMER
-from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
+from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion, check_take
 from posefield.question.results import ConstraintResult, Deviation, Trust, split_results
 from posefield.validation import question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
@@ -49,7 +50,7 @@ class Synthesizer(NamedModel):
 
     @cached_property
     def exact_clip_levels(self) -> dict[int, bool]:
-        """Cache of `clip_batch.is_exact` by level."""
+        """Cache of `clips.is_exact` by level."""
         return {}
 
     @cached_property
@@ -63,14 +64,34 @@ class Synthesizer(NamedModel):
         The means are conditional on the given controls and the targets. Raises InvalidField and
         OutsideSamples as the validation does.
         """
-        take_variation.check(self.session.card, asked)
+        check_take(asked.take, asked.variety)
+        if asked.take:
+            random_field.check_features(self.session.card.kriging, asked.take)
         policy, who, level = asked.extrapolate, asked.performer, asked.level
         given = self.validator.question(asked.controls, policy, who, level, asked.labels)
-        found = self.solver.controls(given, asked, self.validator.imputer)
-        if found is None:
+        if not (given.inferred and asked.targets):
             return given
-        every = self.validator.question(found, policy, who, level, asked.labels)
-        return replace(every, inferred=given.inferred)
+        # Validation comes first: the search for controls takes about a second.
+        constraints = targets.from_question(self.session.card, given, asked)
+        controls = self.solver.controls(given, constraints.targets, self.validator.imputer)
+        complete = self.validator.question(controls, policy, who, level, asked.labels)
+        return replace(complete, inferred=given.inferred)
+
+    @cached_property
+    def measures(self) -> bool:
+        """Whether a control is measured on the motion."""
+        return any(control.measure for control in self.session.card.controls)
+
+    def constraints(
+        self, question: ValidatedQuestion, asked: MotionQuestion
+    ) -> ConstraintSet | None:
+        """Return the constraints of a question, or None for the prediction.
+
+        Raises as `targets.from_question` does.
+        """
+        if not (asked.has_constraints or self.measures):
+            return None
+        return targets.from_question(self.session.card, question, asked) or None
 
     def solve_constraints(
         self, question: ValidatedQuestion, goals: ConstraintSet, extrapolate: ExtrapolationPolicy
@@ -104,6 +125,8 @@ class Synthesizer(NamedModel):
         named = who is not None or PERFORMER in question.named_labels
         seen = named if self.session.card.performers else None
         shares = self.session.card.joint_sigma if asked.joint_sigma else ()
+        varies = asked.take or asked.detail
+        take = take_variation.settings(self.session.card, asked) if varies else None
         return Trust(
             self.identity,
             question.controls,
@@ -118,7 +141,7 @@ class Synthesizer(NamedModel):
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
             deviations=apart,
             labels=question.named_labels,
-            take=take_variation.facts(self.session.card, asked),
+            take={} if take is None else asdict(take),
         )
 
     def constrained_trust(
@@ -126,11 +149,11 @@ class Synthesizer(NamedModel):
     ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
         measured = self.solver.measured(question, held)
-        controls, targets = split_results(held.results, len(asked.targets))
+        controls, reached = split_results(held.results, len(asked.targets))
         apart = self._deviations(question, measured, controls)
         question = replace(question, deviations=apart)
         own = self.trust(asked, question, held.duration, held.state.asked_sigma)
-        said = () if asked.extrapolate == "ok" else miss_warnings(targets)
+        said = () if asked.extrapolate == "ok" else miss_warnings(reached)
         warnings = (*own.warnings, *said)
         return structs.replace(own, warnings=warnings, measured=measured, targets=held.results)
 
@@ -170,9 +193,9 @@ def check_targets(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> None
 
 def _constraint_fields(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> Iterator[str]:
     """Yield the field of each constraint in the question; controls precede targets."""
-    controls, targets = split_results(met, len(goals.targets))
+    controls, reached = split_results(met, len(goals.targets))
     yield from (f"controls/{each.what}" for each in controls)
-    yield from (f"targets/{index}" for index in range(len(targets)))
+    yield from (f"targets/{index}" for index in range(len(reached)))
 
 
 def _miss_warning(met: ConstraintResult) -> str:

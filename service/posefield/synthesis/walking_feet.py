@@ -90,9 +90,8 @@ def of_order(card: ModelCard, order: CrowdOrder) -> WalkerTakes | None:
         raise InvalidField("take", f"{taken}, expected 'index' or 0 to {MAX_TAKE}")
     if not 0.0 <= order.variety <= 1.0:
         raise InvalidField("variety", f"{order.variety:g}, expected 0 to 1")
-    if taken and not random_field.has_features(card.kriging):
-        found = card.kriging.covariance
-        raise InvalidField("take", f"{taken!r}, but no takes can be drawn of {found} kriging")
+    if taken:
+        random_field.check_features(card.kriging, taken)
     detail = order.detail and bool(card.making.detail)
     if not (taken or detail):
         return None

@@ -14,7 +14,7 @@ from posefield.inference import session
 from posefield.question.floor import Floor
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.registry import model_registry
-from posefield.synthesis import clip_batch, clips, poses
+from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
 KINDS = ("shipped", "labelled_path", "walk_path")
@@ -142,17 +142,17 @@ def spread(model, count, **more):
 def test_clips_share_one_call_for_their_durations_and_few_for_their_frames(model_path):
     opened, feeds = recorded.session(session.load(model_path))
     model = Synthesizer("reaching", opened)
-    assert clip_batch.is_exact(model, 0)
+    assert clips.is_exact(model, 0)
     feeds.clear()
     asked = spread(model, 12)
     found = clips.synthesize_clips(model, asked)
     sizes = [len(feed["controls"]) for feed in feeds]
     assert sizes[0] == sum(sizes[1:]) == 12
     padded = [feed["time"].size for feed in feeds[1:]]
-    assert max(padded) <= clip_batch.MAX_FRAMES
+    assert max(padded) <= clips.MAX_FRAMES
     # As few as fit: two neighbours together would exceed the limit.
     frames = sum(len(answer.clip) for answer in found)
-    assert len(padded) == -(-frames // clip_batch.MAX_FRAMES)
+    assert len(padded) == -(-frames // clips.MAX_FRAMES)
 
 
 def test_a_model_whose_clips_depend_on_their_batch_is_asked_one_by_one(model_path, tmp_path):
@@ -164,7 +164,7 @@ def test_a_model_whose_clips_depend_on_their_batch_is_asked_one_by_one(model_pat
     path.write_bytes(written(graph))
     opened, feeds = recorded.session(session.load(path))
     model = Synthesizer("reaching", opened)
-    assert not clip_batch.is_exact(model, 0)
+    assert not clips.is_exact(model, 0)
     feeds.clear()
     asked = spread(model, 3)
     found = clips.synthesize_clips(model, asked)
@@ -177,6 +177,6 @@ def test_the_bound_of_frames_holds_and_is_near(model_path):
     for more in ({}, {"start": 0.3}, {"end": 0.5}, {"start": 0.1, "end": 0.4}):
         for asked in spread(model, 9, **more):
             frames = len(clips.synthesize_clip(model, asked).clip)
-            assert frames <= clip_batch.longest(model, asked)
+            assert frames <= clip_draft.largest_frame_count(model, asked)
             if "end" in more:
-                assert clip_batch.longest(model, asked) < frames + 1.0 + 1e-9
+                assert clip_draft.largest_frame_count(model, asked) < frames + 1.0 + 1e-9

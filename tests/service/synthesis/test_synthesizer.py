@@ -99,7 +99,7 @@ def test_a_rate_out_of_range_is_refused_with_the_range(refused, rate):
 
 def test_too_many_frames_are_refused_before_they_are_made(model):
     with pytest.raises(InvalidField) as caught:
-        clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=1000.0), most=500)
+        clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=1000.0), frame_limit=500)
     assert caught.value.field == "fps"
     assert re.fullmatch(r"\d{4} frames, expected at most 500", caught.value.message)
 

@@ -1,0 +1,173 @@
+"""Drafts of clips: what is known of each before and during its synthesis, and its validation."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from posefield.common.errors import InvalidField, QueryError
+from posefield.common.units import Floats
+from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.targets import ConstraintSet
+from posefield.feet.stance_rows import Cycle
+from posefield.locomotion.stride import Strides
+from posefield.model_file.model_card import ModelCard
+from posefield.motion.skeleton import Skeleton
+from posefield.question import motion_question
+from posefield.question.floor import LEVEL_FLOOR, Floor
+from posefield.question.motion_question import ClipQuestion, check_number, check_range
+from posefield.question.results import PoseAnswer
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.question_validation import ValidatedQuestion
+
+FPS_RANGE = (1.0, 1000.0)
+# Limits of a floor: height, m, which keeps micrometres of single precision in files, and rise for
+# each metre, up to which legs reach the steps of a walk.
+HIGHEST, STEEPEST = 10.0, 0.3
+
+
+@dataclass(eq=False, repr=False)
+class ClipDraft:
+    """A clip in the making; each stage of the synthesis sets what it computes.
+
+    question: as received. frame_limit: largest number of frames. error: that of the first stage
+    that cannot be done. validated, skeleton (with the requested names), constraints and stands
+    (whether feet are placed): of the validation. motion: corrected motion; None for the prediction.
+    times: of the frames (F,), s. strides: cycle or line of the root, where the path of the root is
+    changed or feet stand. answer: the poses of the frames.
+
+    Of the plan of standing feet: its times (G,), s, over the whole motion; rotations (G, J, 4) and
+    root positions (G, 3), m, at them; and the floor motion of a cycle, None for a motion without.
+    """
+
+    question: ClipQuestion
+    frame_limit: int
+    error: QueryError | None = None
+    validated: ValidatedQuestion = field(init=False)
+    skeleton: Skeleton = field(init=False)
+    constraints: ConstraintSet | None = None
+    stands: bool = False
+    motion: ConstrainedMotion | None = None
+    times: Floats = field(init=False)
+    strides: Strides | None = None
+    answer: PoseAnswer[np.float64] = field(init=False)
+    plan_times: Floats = field(default_factory=lambda: np.empty(0))
+    plan_poses: tuple[Floats, Floats] = field(init=False)
+    cycle: Cycle | None = None
+
+    def validate(self, model: Synthesizer) -> None:
+        """Set what is known before the duration of the clip is.
+
+        Raises InvalidField and OutsideSamples as `clips.synthesize_clip` does.
+        """
+        question = self.question
+        self.validated = model.question(question)
+        if question.loop and not model.session.card.cyclic:
+            raise InvalidField(
+                "loop", "true, expected false: this model's last pose does not lead into its first"
+            )
+        self.skeleton = model.skeleton(question.names)
+        self.constraints = model.constraints(self.validated, question)
+        self.stands = wants_standing_feet(model.session.card, question)
+
+    def set_times(self, duration: float) -> None:
+        """Set the times of the frames of a clip that lasts `duration` seconds.
+
+        A loop's times lack the last frame, which equals the first. Raises InvalidField for more
+        frames than the limit.
+        """
+        rate, start, last = time_window(self.question, duration)
+        if self.question.loop:
+            steps = max(1, round(duration * rate))
+            self.times, frames = np.arange(steps) * duration / steps, steps + 1
+        else:
+            # Tolerance of a millionth of a frame for the rounding of duration * rate.
+            frames = math.floor((last - start) * rate + 1e-6) + 1
+            self.times = np.minimum(start + np.arange(frames) / rate, duration)
+        if frames > self.frame_limit:
+            raise InvalidField("fps", f"{frames} frames, expected at most {self.frame_limit}")
+
+
+def time_window(question: ClipQuestion, duration: float) -> tuple[float, float, float]:
+    """Return frames a second, start (s) and end (s) of a clip of at most `duration` seconds.
+
+    Raises InvalidField for values out of range, and for a loop with a start or an end.
+    """
+    rate = check_number("fps", question.fps)
+    check_range("fps", rate, *FPS_RANGE, "frames a second")
+    last = duration
+    if question.end is not None:
+        end = check_number("end", question.end)
+        last = motion_question.check_rounded_range("end", end, 0.0, duration, "s")
+    start = check_number("start", question.start)
+    start = motion_question.check_rounded_range("start", start, 0.0, last, "s")
+    if question.loop and (start > 0.0 or question.end is not None):
+        name, value = ("start", start) if start > 0.0 else ("end", last)
+        raise InvalidField(name, f"{value:g} s with loop, expected none: a loop is a whole cycle")
+    return rate, start, last
+
+
+def largest_frame_count(model: Synthesizer, question: ClipQuestion) -> float:
+    """Return an upper bound of the number of frames of a clip, known before its synthesis.
+
+    NaN where a field of the question is, which the synthesis refuses.
+    """
+    last = model.durations[1] if question.end is None else question.end
+    return (last - question.start) * question.fps + 1.0
+
+
+def is_predicted(model: Synthesizer, question: ClipQuestion) -> bool:
+    """Return whether a clip is the model's prediction, without constraints or standing feet.
+
+    Raises as `wants_standing_feet` does.
+    """
+    stands = wants_standing_feet(model.session.card, question)
+    return not (model.measures or question.has_constraints or stands)
+
+
+def wants_standing_feet(card: ModelCard, question: ClipQuestion) -> bool:
+    """Return whether the feet of a clip are placed.
+
+    Raises InvalidField if they are asked to stand, but the model has no feet on the ground, and for
+    a floor on which they cannot stand.
+    """
+    travels = card.root == "travelling"
+    if question.feet == "stand" and not card.feet:
+        raise InvalidField("feet", "'stand', but this model's recipe names no feet")
+    if question.feet == "stand" and not travels:
+        raise InvalidField("feet", "'stand', but the root of this model's motions stays in place")
+    if question.feet is None:
+        stands = bool(travels and card.feet and card.contacts)
+    else:
+        stands = question.feet == "stand"
+    if question.ground != LEVEL_FLOOR:
+        _check_floor(question, stands)
+    return stands
+
+
+def _check_floor(question: ClipQuestion, stands: bool) -> None:
+    """Raise InvalidField for a floor beyond the limits, and for one without standing feet."""
+    floor = question.ground
+    height = "floor/height" if isinstance(question.floor, Floor) else "floor"
+    check_range(height, check_number(height, floor.height), -HIGHEST, HIGHEST, "m")
+    for name in ("slope_x", "slope_z"):
+        check_number(f"floor/{name}", getattr(floor, name))
+    if not floor.slope <= STEEPEST:
+        raise InvalidField(
+            "floor",
+            f"rises by {floor.slope:g} m for each metre, expected at most {STEEPEST:g}: legs reach "
+            "no further",
+        )
+    if not stands:
+        reason = (
+            "as asked" if question.feet else "as this model's are unless feet=stand is asked for"
+        )
+        raise InvalidField(
+            "floor", f"other than 0, but feet are as predicted, {reason}; expected feet that stand"
+        )
+    if not floor.is_level and (question.loop or question.root == "in_place"):
+        name = "loop" if question.loop else "root=in_place"
+        raise InvalidField(
+            "floor",
+            f"with a slope and {name}, expected a level floor: what climbs ends at another height",
+        )
