@@ -75,7 +75,7 @@ def rows(made: Family) -> list[Row]:
 def _asked(made: Family) -> Asked:
     opened = session.open_bytes(made.exported.content, "reaching.onnx")
     bench, point = constrained_motion.build_corrector(opened, 0), made.examples[4].controls[None]
-    times = np.linspace(0.0, float(opened.durations(point)[0]), FRAMES)
+    times = np.linspace(0.0, float(opened.run(point, None, "duration")[0][0]), FRAMES)
     begun = bench.predict(opened.state(point, times))
     joint, last = opened.card.skeleton.names.index("RightHand"), float(opened.card.frames - 1)
     hand, _ = begun.scene.position_and_gradient(begun.numbers, joint, last)

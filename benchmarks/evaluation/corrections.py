@@ -92,7 +92,7 @@ class _MotionCorrector:
 
     def state(self, controls: Floats, labels: Floats) -> PredictionState:
         """Return the state at even shares of the duration."""
-        durations = self.opened.durations(controls, labels)
+        (durations,) = self.opened.run(controls, None, "duration", labels=labels)
         return self.opened.state(controls, UNIFORM_SHARES * durations, labels)
 
     def held(self, begun: ConstrainedMotion, place: Floats) -> ConstrainedMotion:
@@ -173,7 +173,8 @@ def _run_corrected(
 
 
 def _run_uncorrected(desk: _MotionCorrector, controls: Floats, labels: Floats) -> None:
-    times = UNIFORM_SHARES * desk.opened.durations(controls, labels)[:, None]
+    (durations,) = desk.opened.run(controls, None, "duration", labels=labels)
+    times = UNIFORM_SHARES * durations[:, None]
     desk.opened.run(controls, times, *OUTPUTS, labels=labels)
 
 

@@ -73,7 +73,7 @@ def _question(session: Session) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(7)
     low, high = np.array([[c.minimum, c.maximum] for c in session.card.controls]).T
     points = (low + rng.random((40, len(low))) * (high - low)).astype(np.float32)
-    times = rng.random((40, 3)) * session.durations(points)[:, None]
+    times = rng.random((40, 3)) * session.run(points, None, "duration")[0][:, None]
     return {"controls": points, "time": times.astype(np.float32)}
 
 

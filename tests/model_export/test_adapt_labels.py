@@ -33,7 +33,7 @@ def table(tmp_path):
 def distance(opened, clip, controls, weights):
     """Distance, m, of the root path from a stride's, at shares of their durations."""
     times = np.linspace(0.0, 1.0, 11)
-    seconds = opened.durations(controls, weights)
+    (seconds,) = opened.run(controls, None, "duration", labels=weights)
     (root,) = opened.run(controls, times[None] * seconds[:, None], "root_position", labels=weights)
     true = clip.root_path[np.round(times * (len(clip) - 1)).astype(int)]
     return float(np.sqrt(np.mean(np.sum(np.square(root[0] - true), axis=1))))

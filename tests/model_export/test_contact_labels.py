@@ -123,7 +123,9 @@ def test_adapting_adds_the_contacts_of_the_new_clips(posefield, walk_path, tmp_p
     for controls in newcomers():
         point, who = np.array([controls]), np.array([[0.0, 0.0, 1.0]])
         shares = np.linspace(0.0, 1.0, 50)
-        times = shares[None] * opened.durations(point, who).astype(float)[:, None]
+        times = (
+            shares[None] * opened.run(point, None, "duration", labels=who)[0].astype(float)[:, None]
+        )
         (found,) = opened.run(point, times, CONTACTS, labels=who)
         for foot, (_, landing) in enumerate(sample_walk.SIDES.values()):
             sure, stands = stance(shares, landing)

@@ -21,7 +21,7 @@ from posefield.encode.conventions import Convention
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, left_out
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips, poses
+from posefield.synthesis import clip_draft, clips
 from posefield.synthesis.clips import ClipPreview
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -186,7 +186,7 @@ def _chunk_files(
 
 def _longest(model: Synthesizer, row: CheckedRow) -> float:
     """Return an upper bound of the number of frames of a row's clip."""
-    slowest, fastest = poses.FPS_RANGE
+    slowest, fastest = clip_draft.FPS_RANGE
     if isinstance(row, RowFault) or not slowest <= row.question.fps <= fastest:
         # A rate that is refused has no frames.
         return 0.0

@@ -189,9 +189,10 @@ def contact_probabilities(
         cancellation.check()
         batch_controls, batch_labels = controls[rows], labels[rows]
         if durations is None:
-            times = phases[rows] * session.durations(
-                batch_controls, labels=batch_labels, level=level
+            (seconds,) = session.run(
+                batch_controls, None, "duration", labels=batch_labels, level=level
             )
+            times = phases[rows] * seconds
         else:
             times = phases[rows] * durations[rows]
         (likely,) = session.run(

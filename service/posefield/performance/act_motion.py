@@ -112,7 +112,9 @@ def times_through(moment: float, duration: float) -> tuple[Frames, int]:
 
 def _times(model: Synthesizer, question: ValidatedQuestion) -> tuple[Frames, int]:
     """Return the times (F,), s, of an act's frames, and the frame of the event, or the last."""
-    durations = model.session.durations(question.point, question.labels, question.level)
+    (durations,) = model.session.run(
+        question.point, None, "duration", labels=question.labels, level=question.level
+    )
     duration = model.check_duration(float(durations[0]))
     event, last = model.session.card.event, model.session.card.frames - 1
     if event is None or event.share == 1.0:

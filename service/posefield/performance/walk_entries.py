@@ -144,7 +144,8 @@ def _sigmas(
 ) -> Annotated[Floats, "frames"]:
     frames = len(controls)
     rows = np.unique(np.append(np.arange(0, frames, SIGMA_STEP), frames - 1))
-    sigmas = model.session.sigmas(controls[rows], walker.labels(len(rows))).astype(float)
+    labels = walker.labels(len(rows))
+    sigmas = model.session.run(controls[rows], None, "sigma", labels=labels)[0].astype(float)
     return np.asarray(np.interp(np.arange(frames), rows, sigmas))
 
 

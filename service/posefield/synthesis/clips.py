@@ -152,8 +152,8 @@ def _set_prediction(model: Synthesizer, draft: ClipDraft, row: OutputRow) -> Non
     draft.answer = PoseAnswer(draft.times, rotations, root, offsets, trust, *curves)
     _set_strides(model, draft, trust.duration)
     if draft.stands:
-        ((rotations, root, *_),) = predict_frames(model, [question], [draft.plan_times])
-        draft.plan_poses = rotations.astype(np.float64), root.astype(np.float64)
+        (plan_row,) = predict_frames(model, [question], [draft.plan_times])
+        draft.plan_poses = plan_row[0].astype(np.float64), plan_row[1].astype(np.float64)
 
 
 def _set_strides(model: Synthesizer, draft: ClipDraft, duration: float) -> None:
@@ -253,8 +253,11 @@ def _batches(drafts: Sequence[ClipDraft]) -> Iterator[list[ClipDraft]]:
 def _durations(model: Synthesizer, questions: Sequence[ValidatedQuestion]) -> list[float]:
     points = np.concatenate([question.point for question in questions])
     labels = np.concatenate([question.labels for question in questions])
-    durations: list[float] = model.session.durations(points, labels, questions[0].level).tolist()
-    return durations
+    (durations,) = model.session.run(
+        points, None, "duration", labels=labels, level=questions[0].level
+    )
+    seconds: list[float] = durations.tolist()
+    return seconds
 
 
 def predict_frames(

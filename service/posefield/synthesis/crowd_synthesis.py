@@ -51,7 +51,12 @@ def pose_takes(
     """
     bench = model.solver.corrector(level)
     reduced, (r2, r1, _) = bench.reduced, bench.reduced.core.shape
-    coefficients, frames, travel = model.session.states(controls, times, labels, level)
+    names = (
+        ("coefficients", "frame", "way") if model.session.card.cyclic else ("coefficients", "frame")
+    )
+    arrays = model.session.run(controls, times, *names, labels=labels, level=level)
+    coefficients, frame_column, *ways = (array.astype(float) for array in arrays)
+    frames, travel = frame_column[:, 0], ways[0] if ways else np.zeros((len(controls), 3))
     motions = coefficients @ reduced.core.reshape(r2 * r1, -1).T
     changes = model.solver.variation.changes(bench, controls, labels, takes.seeds)
     motions += takes.variety[:, None] * changes[:, : r2 * r1]

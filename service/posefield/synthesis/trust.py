@@ -311,7 +311,9 @@ def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
     found = []
     for first in range(0, len(points), BATCH):
         cancellation.check()
-        found.append(model.session.sigmas(points[first : first + BATCH], labels))
+        found.append(
+            model.session.run(points[first : first + BATCH], None, "sigma", labels=labels)[0]
+        )
     return np.concatenate(found)
 
 

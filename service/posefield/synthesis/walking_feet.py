@@ -160,8 +160,14 @@ def _relative_poses(
     for part in stride.batches(len(phases)):
         cancellation.check()
         times = (phases[part] * own.durations[part])[:, None]
-        given = plan.controls[pair][part], times, labels[part]
-        coefficients, places, travel = model.session.states(*given, level)
+        given = plan.controls[pair][part], times
+        coefficients, canonical, travel = (
+            array.astype(float)
+            for array in model.session.run(
+                *given, "coefficients", "frame", "way", labels=labels[part], level=level
+            )
+        )
+        places = canonical[:, 0]
         by = found.coefficients[rows[part], pair[1][part]]
         moved = take_variation.change_coefficients(bench, by)
         coefficients[:, : moved.shape[1]] += moved

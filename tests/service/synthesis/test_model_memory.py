@@ -30,8 +30,9 @@ def used():
     for level in range(len(opened.card.levels)):
         opened.run(points, no, *onnx_runtime.all_outputs(opened.card), level=level)
         opened.run(points, no, *onnx_runtime.outputs(opened.card), level=level)
-        opened.durations(points, level=level)
-        opened.states(points, no, labels, level=level)
+        opened.run(points, None, "duration", level=level)
+        inner = ("coefficients", "frame", "way")[: 2 + opened.card.cyclic]
+        opened.run(points, no, *inner, labels=labels, level=level)
         controls = {each.name: each.default for each in opened.card.controls}
         clips.synthesize_clip(made, ClipQuestion(controls=controls, level=level))
     return made

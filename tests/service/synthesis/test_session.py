@@ -65,9 +65,10 @@ def test_durations_alone_are_those_of_the_whole_graph(labelled_path, rng):
     low, high = ([getattr(c, e) for c in opened.card.controls] for e in ("minimum", "maximum"))
     points, times = rng.uniform(low, high, (200, len(low))), np.zeros((1, 1))
     for level, labels in product(range(4), (np.zeros((1, 3)), np.eye(3)[:1])):
-        asked = [(point[None], labels, level) for point in points]
-        alone = np.array([opened.durations(*question)[0] for question in asked])
-        whole = [opened.run(p, times, "duration", labels=w, level=n)[0][0] for p, w, n in asked]
+        inputs = {"labels": labels, "level": level}
+        alone = [opened.run(point[None], None, "duration", **inputs)[0][0] for point in points]
+        outputs = ("rotations", "duration")
+        whole = [opened.run(point[None], times, *outputs, **inputs)[1][0] for point in points]
         assert np.array_equal(alone, whole)
         assert np.ptp(alone) > 0.01
 

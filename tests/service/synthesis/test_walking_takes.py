@@ -122,7 +122,7 @@ def test_a_walker_has_the_poses_of_its_take_in_a_crowd(model, twins):
     found = pose(model.session, twins, rows, frames, 0)
     labels = twins.labels.weights[twins.who]
     controls = twins.controls[:, 11]
-    durations = model.session.durations(controls, labels)
+    (durations,) = model.session.run(controls, None, "duration", labels=labels)
     times = (twins.phases[:, 11] * durations)[:, None]
     own = CharacterTakes(seeds, np.full(3, 0.7), np.full(3, True))
     posed, path, _ = crowd_synthesis.pose_takes(model, own, controls, times, labels, 0)
@@ -172,7 +172,7 @@ def test_variances_of_deviations_are_those_of_kriging(model, twins):
     controls = np.repeat(twins.controls[:1, :1], len(seeds), axis=0)
     labels = np.repeat(twins.labels.weights[twins.who][:1], len(seeds), axis=0)
     found = model.solver.variation.along_paths(controls, labels, seeds)[:, 0]
-    (sigma,) = model.session.sigmas(controls[:1, 0], labels[:1])
+    ((sigma,),) = model.session.run(controls[:1, 0], None, "sigma", labels=labels[:1])
     ranges = model.session.card.sampled_ranges
     assert np.abs(kriging_model.half_ranges(controls[0, 0], *ranges)).max() <= 1.0
     assert found.var() == pytest.approx(float(sigma) ** 2, rel=0.1)
