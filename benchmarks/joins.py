@@ -84,7 +84,7 @@ def takes(name: str, data: Path) -> list[Take]:
     files = ingest.read_files(rows, own.source)
     found = []
     for row in rows:
-        clip = ingest.clip_of_file(files[str(row.place)], own.source)
+        clip = ingest.clip_of_file(files[str(row.file)], own.source)
         if row.last_frame is not None and row.last_frame + round(LEAST * clip.rate) < len(clip):
             found.append(_take(row, clip, own.motion.feet))
     return found

@@ -58,7 +58,7 @@ def recipe_of(name: str, data: Path) -> Recipe:
 def first_clip(name: str, beginning: str, data: Path) -> Clip:
     """Return the whole motion of the first file of a family with a beginning of its name."""
     own = recipe_of(name, data)
-    rows = [row for row in clip_table.read(own, data) if row.place.name.startswith(beginning)]
+    rows = [row for row in clip_table.read(own, data) if row.file.name.startswith(beginning)]
     found = ingest.read_files(rows[:1], own.source)
     (file,) = found.values()
     clip = ingest.clip_of_file(file, own.source)

@@ -205,7 +205,7 @@ def test_known_flips_are_found_cleaned_and_told(made):
     own, examples, trained, exported = made
     names = trained.skeleton.names
     found = {
-        (f.kind, names[f.joint], examples[f.clip].row.place.name, examples[f.clip].row.performer)
+        (f.kind, names[f.joint], examples[f.clip].row.file.name, examples[f.clip].row.performer)
         for f in trained.findings
     }
     notes = exported.card.diagnostics["notes"]

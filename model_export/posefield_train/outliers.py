@@ -436,6 +436,6 @@ def _bones_text(other: ForeignBones, performer: str) -> str:
         else ""
     )
     return (
-        f"its bones differ by {_cm(other.apart)} from those of {performer} elsewhere "
-        f"({other.others} clips){alike}"
+        f"its bones differ by {_cm(other.distance)} from those of {performer} elsewhere "
+        f"({other.clips} clips){alike}"
     )

@@ -77,10 +77,10 @@ def test_reaches_are_converted_with_their_rows_and_hashes(fetch, downloaded, rea
     own = recipe.read(data_folder.RECIPES / "hdm05_grab_high.toml")
     made, notes = ingest.ingest(own, tmp_path / "data")
     given, _ = ingest.ingest(own, real_data)
-    by_file = {example.row.place.name: example for example in given}
+    by_file = {example.row.file.name: example for example in given}
     assert len(made) == 2 and not any("the one that ships" in note for note in notes)
     for example in made:
-        expected = by_file[example.row.place.name].controls
+        expected = by_file[example.row.file.name].controls
         assert np.abs(example.controls - expected).max() < WRITTEN
 
 
@@ -152,7 +152,7 @@ def test_walks_are_recognized_by_their_motion(fetch, acclaim_texts, walks, tmp_p
     )
     own = recipe.read(data_folder.RECIPES / "cmu_walk.toml")
     made, _ = ingest.ingest(own, tmp_path / "data")
-    assert {example.row.place.name for example in made} == {Path(WALK).name, Path(TURN).name}
+    assert {example.row.file.name for example in made} == {Path(WALK).name, Path(TURN).name}
 
 
 def test_another_subject_another_motion_and_two_trials_are_no_match(fetch, acclaim_texts, tmp_path):

@@ -42,7 +42,7 @@ def examples(trained, who, controls):
     row = trained.examples[0].row
     return [
         ingest.Example(
-            replace(row, place=row.place.with_name(f"{who}{value:g}.bvh"), performer=who),
+            replace(row, file=row.file.with_name(f"{who}{value:g}.bvh"), performer=who),
             canonical.canonicalize(newcomers.clip(who, value), False, False)[0],
             np.array([value]),
             (),

@@ -46,12 +46,12 @@ def below_a_dummy(clip):
 
 def test_new_clips_are_turned_and_collapsed_as_the_family_was(family, tmp_path):
     own, examples, model = family
-    wanted = [e for e in examples if e.row.place.name in ("stride_01.bvh", "stride_08.bvh")]
-    for path in [e.row.place for e in wanted]:
+    wanted = [e for e in examples if e.row.file.name in ("stride_01.bvh", "stride_08.bvh")]
+    for path in [e.row.file for e in wanted]:
         clip = ingest.clip_of_file(motion_readers.read(path), own.source)
         content = bvh_writer.dumps(below_a_dummy(clip), metres_per_unit=1.0)
         (tmp_path / path.name).write_bytes(content)
-    paths = [tmp_path / e.row.place.name for e in wanted]
+    paths = [tmp_path / e.row.file.name for e in wanted]
     reopened = model_reconstruction.load(model)
     found, _ = new_clips.examples_of_files(reopened, paths, own.source, WOLF)
     for one, other in zip(wanted, found, strict=True):

@@ -48,8 +48,8 @@ def stance(shares, landing):
 def test_a_walk_in_place_has_the_contacts_of_the_walk(models_trained, strides):
     own = walk_recipe(motion={"root": "in_place"})
     still, _ = ingest.ingest(own, models_trained.strides_folder())
-    order = {example.row.place.name: example for example in still}
-    same = [order[example.row.place.name] for example in strides]
+    order = {example.row.file.name: example for example in still}
+    same = [order[example.row.file.name] for example in strides]
     assert max(np.ptp(example.clip.root_path[:, 2]) for example in same) < 0.2
     agree = [
         np.mean(one.contacts == other.contacts)

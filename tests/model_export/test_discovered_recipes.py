@@ -105,7 +105,7 @@ def test_clips_of_several_skeletons_get_a_recipe_with_one_topology(posefield, re
         assert own.skeleton.is_unified and not own.roles
         assert own.motion.feet == ["leftToes", "rightToes"]
         examples, notes = ingest.ingest(own, folder)
-        assert {"cid_9.bvh"} < {example.row.place.name for example in examples}
+        assert {"cid_9.bvh"} < {example.row.file.name for example in examples}
         assert any("18 joints became 17 by their roles, without Hat;" in note for note in notes)
 
 

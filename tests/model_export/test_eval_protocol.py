@@ -76,7 +76,7 @@ def results(recipe, family):
 def test_every_clip_is_held_out_once_with_all_of_its_take(family):
     files = [replace(e, recording="") for e in family]
     same = [
-        replace(e, row=replace(e.row, place=family[i // 3].row.place)) for i, e in enumerate(files)
+        replace(e, row=replace(e.row, file=family[i // 3].row.file)) for i, e in enumerate(files)
     ]
     stated = [replace(e, recording=f"recording {i // 3}") for i, e in enumerate(family)]
     for examples, parts in ((family, CLIPS), (files, CLIPS), (same, CLIPS // 3)):
@@ -85,7 +85,7 @@ def test_every_clip_is_held_out_once_with_all_of_its_take(family):
         assert len(listed) == parts
         for fold in listed:
             rest, held = fold.split(examples)
-            assert not {e.row.place for e in rest} & {e.row.place for e in held}
+            assert not {e.row.file for e in rest} & {e.row.file for e in held}
     assert [fold.held_out for fold in protocol.clip_folds(stated)] == [
         fold.held_out for fold in protocol.clip_folds(same)
     ]

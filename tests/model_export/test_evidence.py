@@ -48,8 +48,8 @@ def test_bones_of_another_performer_are_named(offsets):
     wrong = offsets.copy()
     wrong[1] = offsets[7]
     found = clip_joints.find_foreign_bones(wrong, WHO, 1)
-    assert (found.nearest_performer, found.others, found.nearest_distance) == ("c", 2, 0.0)
-    assert found.apart > 0.01
+    assert (found.nearest_performer, found.clips, found.nearest_distance) == ("c", 2, 0.0)
+    assert found.distance > 0.01
     assert all(
         clip_joints.find_foreign_bones(wrong, WHO, clip) is None for clip in range(9) if clip != 1
     )

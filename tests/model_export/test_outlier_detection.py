@@ -98,7 +98,7 @@ def planted(recipe, examples, clip):
 
 def only_note(trained, example):
     (note,) = trained.outlier_notes()
-    name = f"line {example.row.line}, {example.row.place.name}: "
+    name = f"line {example.row.line}, {example.row.file.name}: "
     assert note.startswith(name)
     return note.removeprefix(name)
 

@@ -44,7 +44,7 @@ def test_a_row_says_file_controls_and_frames(rows, tmp_path):
         landmarks=["hit"],
         **FRAMES,
     )
-    assert [row.place for row in found] == [tmp_path / "a.bvh", tmp_path / "b.bvh"]
+    assert [row.file for row in found] == [tmp_path / "a.bvh", tmp_path / "b.bvh"]
     assert [row.performer for row in found] == ["ann", "bob"]
     assert [row.controls.tolist() for row in found] == [[1.5], [-20.0]]
     assert [(row.first_frame, row.last_frame) for row in found] == [(2, 9), (0, 5)]
@@ -57,7 +57,7 @@ def test_motion_files_stand_beside_the_table(tmp_path):
     (tmp_path / "set" / "a.bvh").touch()
     (tmp_path / "set" / "clips.csv").write_text("file,v\na.bvh,1\n")
     (row,) = clip_table.read(recipe_with(clips={"table": "set/clips.csv"}), tmp_path)
-    assert row.place == tmp_path / "set" / "a.bvh"
+    assert row.file == tmp_path / "set" / "a.bvh"
 
 
 @pytest.mark.parametrize(

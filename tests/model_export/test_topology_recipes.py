@@ -78,7 +78,7 @@ def predictions(own, folder):
     """Values of the training's tensor in the order of the clips, and left-out errors, m."""
     trained = posefield_train.train(own, folder)
     errors = {
-        example.row.place.name: np.sqrt(error)
+        example.row.file.name: np.sqrt(error)
         for example, error in zip(trained.examples, trained.left_out_errors, strict=True)
     }
     return trained, trained.notes, np.array([errors[name] for name in sorted(errors)])

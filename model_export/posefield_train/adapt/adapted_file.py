@@ -297,7 +297,7 @@ def _provenance(reopened: ReconstructedModel, newcomer: NewPerformer) -> Mapping
         "performer": newcomer.performer,
         "clips": len(newcomer.examples),
         "data_sha256": trained_card.data_digest(
-            {f"{i} {e.row.place.name}": e for i, e in enumerate(newcomer.examples)}
+            {f"{i} {e.row.file.name}": e for i, e in enumerate(newcomer.examples)}
         ),
         "licence": newcomer.licence,
     }

@@ -259,17 +259,17 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
     missing = [name for name in family.names if name not in figure.names]
     if missing:
         raise row.error(
-            f"{row.place} has no joints {missing}, which the model has: expected a clip of the "
+            f"{row.file} has no joints {missing}, which the model has: expected a clip of the "
             "same skeleton"
         )
     smaller = clip_joints.ordered_as(clip, family.names)
     if smaller is None or not smaller.skeleton.same_tree(family):
         raise row.error(
-            f"{row.place} has the model's joints with other parents: expected a clip of the same "
+            f"{row.file} has the model's joints with other parents: expected a clip of the same "
             "skeleton"
         )
     surplus = [name for name in figure.names if name not in family.names]
-    note = f"{row.place}: joints {surplus}, which the model does not have, were left out"
+    note = f"{row.file}: joints {surplus}, which the model does not have, were left out"
     return smaller, [note] if surplus else []
 
 

@@ -13,7 +13,7 @@ def main(source: str, target: str) -> None:
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.fbx(filepath=source, use_anim=True, ignore_leaf_bones=False)
-    wanted = {
+    settings = {
         "export_format": "GLB",
         "export_animations": True,
         "export_animation_mode": "ACTIONS",
@@ -25,8 +25,8 @@ def main(source: str, target: str) -> None:
         "export_materials": "NONE",
     }
     # Options differ between versions of Blender.
-    known = bpy.ops.export_scene.gltf.get_rna_type().properties.keys()
-    options = {name: value for name, value in wanted.items() if name in known}
+    supported = bpy.ops.export_scene.gltf.get_rna_type().properties.keys()
+    options = {name: value for name, value in settings.items() if name in supported}
     bpy.ops.export_scene.gltf(filepath=target, **options)
 
 

@@ -37,33 +37,40 @@ class BlenderProgram:
         done = _run(words, source)
         if done.returncode or not target.is_file():
             lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-            said = " ".join(lines[-4:])[-SHOWN:] or "no output"
-            raise MotionFileError(str(source), f"Blender {self.version} cannot read it: {said}")
+            output = " ".join(lines[-4:])[-SHOWN:] or "no output"
+            raise MotionFileError(str(source), f"Blender {self.version} cannot read it: {output}")
 
 
-def find(given: Path | None) -> BlenderProgram:
+def find(program: Path | None) -> BlenderProgram:
     """Return the given Blender, or that of the PATH.
 
     given: the program, or a Python that has the module bpy. Raises FileError if it is neither, or
     older than LEAST_VERSION.
     """
-    found = shutil.which("blender") if given is None else str(given)
-    if found is None:
+    command_path = shutil.which("blender") if program is None else str(program)
+    if command_path is None:
         raise FileError(
             "blender",
             "not found on the PATH, expected an installed Blender, or --blender with its path",
         )
-    path = Path(found)
+    path = Path(command_path)
     if not path.is_file():
         raise FileError(path, "no such file, expected Blender, or a Python that has bpy")
-    by_program = (found, "--background", "--factory-startup", "--python-exit-code", "3", "--python")
+    by_program = (
+        command_path,
+        "--background",
+        "--factory-startup",
+        "--python-exit-code",
+        "3",
+        "--python",
+    )
     for probe, command in (
-        ([found, "--version"], by_program),
-        ([found, "-c", "import bpy; print(bpy.app.version_string)"], (found,)),
+        ([command_path, "--version"], by_program),
+        ([command_path, "-c", "import bpy; print(bpy.app.version_string)"], (command_path,)),
     ):
-        said = _run(probe, path).stdout
-        version = VERSION.search(said)
-        if version and (command == (found,) or said.startswith("Blender")):
+        output = _run(probe, path).stdout
+        version = VERSION.search(output)
+        if version and (command == (command_path,) or output.startswith("Blender")):
             return _checked(path, command, version)
     raise FileError(path, "states no version of Blender, expected Blender or a Python with bpy")
 
@@ -72,8 +79,8 @@ def _checked(path: Path, command: tuple[str, ...], version: re.Match[str]) -> Bl
     """Return the program; FileError if it is too old."""
     number = version[0].removeprefix("Blender ")
     if (int(version[1]), int(version[2])) < LEAST_VERSION:
-        least = ".".join(map(str, LEAST_VERSION))
-        raise FileError(path, f"is Blender {number}, expected {least} or later")
+        oldest = ".".join(map(str, LEAST_VERSION))
+        raise FileError(path, f"is Blender {number}, expected {oldest} or later")
     return BlenderProgram(command, number)
 
 
@@ -147,7 +154,7 @@ def _read(
         between = Path(folder, f"{path.stem}.glb")
         program.glb_of_fbx(path, between)
         try:
-            found = motion_readers.read(between, options)
+            motion = motion_readers.read(between, options)
         except MotionFileError as fault:
             raise MotionFileError(str(path), fault.message) from fault
-    return found, (f"{path.name}: read by Blender {program.version}",)
+    return motion, (f"{path.name}: read by Blender {program.version}",)

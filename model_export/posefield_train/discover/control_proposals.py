@@ -30,10 +30,12 @@ class RecordingPrediction:
     def __init__(
         self, values: Floats, performers: Sequence[str], recordings: Sequence[str]
     ) -> None:
-        who, named = np.array(performers), np.array(recordings)
+        performer_names, recording_names = np.array(performers), np.array(recordings)
         self._values = values
-        self._same = who[:, None] == who
-        self._groups = [np.flatnonzero(named == recording) for recording in sorted(set(recordings))]
+        self._same = performer_names[:, None] == performer_names
+        self._groups = [
+            np.flatnonzero(recording_names == recording) for recording in sorted(set(recordings))
+        ]
         self._alone = self._square([np.zeros(len(values))])
 
     def remaining(self, chosen: Sequence[Floats]) -> float:
@@ -44,18 +46,20 @@ class RecordingPrediction:
         """Return the values (N, k) less those that the clips of other recordings predict."""
         inverse = np.linalg.inv(self.covariance(chosen))
         weighted = inverse @ self._values
-        found = np.zeros_like(self._values)
-        for own in self._groups:
-            found[own] = np.linalg.solve(inverse[np.ix_(own, own)], weighted[own])
-        return found
+        differences = np.zeros_like(self._values)
+        for indices in self._groups:
+            differences[indices] = np.linalg.solve(
+                inverse[np.ix_(indices, indices)], weighted[indices]
+            )
+        return differences
 
     def covariance(self, chosen: Sequence[Floats]) -> Floats:
         """Return the covariance (N, N) of the motions for standardised measures (N,)."""
         points = np.stack(chosen, axis=1)
         root = np.sqrt(5.0) * np.linalg.norm(points[:, None] - points, axis=-1) / SCALE
         curved = (1.0 + root + root**2 / 3.0) * np.exp(-root)
-        found = LINEAR * points @ points.T + CURVED * curved + CONSTANT
-        return np.asarray(found + SAME_PERFORMER * self._same + NUGGET * np.eye(len(points)))
+        total = LINEAR * points @ points.T + CURVED * curved + CONSTANT
+        return np.asarray(total + SAME_PERFORMER * self._same + NUGGET * np.eye(len(points)))
 
     def _square(self, chosen: Sequence[Floats]) -> float:
         return float(np.square(self.residuals(chosen)).sum())
@@ -65,11 +69,11 @@ def motion_coefficients(motions: Sequence[MeasuredMotion]) -> Floats:
     """Return the motions (N, k) by coefficients of their principal components."""
     rows = []
     for motion in motions:
-        own = motion.positions
-        at = np.linspace(0.0, len(own) - 1.0, FRAMES)
-        before = np.minimum(at.astype(int), len(own) - 2)
+        positions = motion.positions
+        at = np.linspace(0.0, len(positions) - 1.0, FRAMES)
+        before = np.minimum(at.astype(int), len(positions) - 2)
         share = (at - before)[:, None, None]
-        rows.append((own[before] * (1.0 - share) + own[before + 1] * share).ravel())
+        rows.append((positions[before] * (1.0 - share) + positions[before + 1] * share).ravel())
     values = np.array(rows) - np.mean(rows, axis=0)
     left, sizes, _ = np.linalg.svd(values, full_matrices=False)
     return np.asarray(left * sizes)
@@ -139,10 +143,10 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
     prediction = RecordingPrediction(
         motion_coefficients(clips.motions), clips.performers, clips.recordings
     )
-    known = _candidates(clips)
+    measured_candidates = _candidates(clips)
     values = {
         control: (measured - measured.mean()) / measured.std()
-        for control, measured in known.items()
+        for control, measured in measured_candidates.items()
         if len(np.unique(measured.round(4))) >= FEWEST_VALUES
     }
     event = None if clips.cyclic else _event(clips, prediction, values)
@@ -150,7 +154,7 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
         first = [ProposedControl(quantity) for quantity in GAIT]
     else:
         first = [] if event is None else [ProposedControl(axis, *event) for axis in POSITIONS]
-    chosen = [own for own in first if own in values]
+    chosen = [candidate for candidate in first if candidate in values]
     remaining = [prediction.remaining([values[own] for own in chosen])] if chosen else []
     while len(chosen) < MOST_CONTROLS:
         best = _next(prediction, values, chosen)
@@ -164,7 +168,7 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
 def _candidates(clips: FamilyClips) -> dict[ProposedControl, Floats]:
     """Return the measures (N,) of the clips that may be controls."""
     roles = ["hips", "head", *_limb_ends(clips.joints)]
-    found = {
+    measured = {
         ProposedControl(axis, role, at): _measured(clips, Measure(axis, (clips.joints[role],), at))
         for role in roles
         if role in clips.joints
@@ -174,17 +178,17 @@ def _candidates(clips: FamilyClips) -> dict[ProposedControl, Floats]:
     }
     # Speed and turn of a motion that ends elsewhere depend on the cut: recipes refuse them.
     for quantity in GAIT if clips.cyclic else ():
-        found[ProposedControl(quantity)] = _measured(clips, Measure(quantity))
-    return found
+        measured[ProposedControl(quantity)] = _measured(clips, Measure(quantity))
+    return measured
 
 
 def _limb_ends(joints: Mapping[str, int]) -> list[str]:
-    ends = [
-        next((side + part for part in parts if side + part in joints), None)
+    roles = [
+        next((side + name for name in names if side + name in joints), None)
         for side in ("left", "right")
-        for parts in (("Hand",), ("Toes", "Foot"))
+        for names in (("Hand",), ("Toes", "Foot"))
     ]
-    return [end for end in ends if end is not None]
+    return [end for end in roles if end is not None]
 
 
 def _measured(clips: FamilyClips, measure: Measure) -> Floats:
@@ -195,18 +199,18 @@ def _event(
     clips: FamilyClips, prediction: RecordingPrediction, values: Mapping[ProposedControl, Floats]
 ) -> tuple[str, MeasureMoment] | None:
     """Return the limb's end that moves most among those that predict well, and its best moment."""
-    found: dict[str, tuple[float, MeasureMoment]] = {}
+    by_role: dict[str, tuple[float, MeasureMoment]] = {}
     for role in _limb_ends(clips.joints):
         for at in MOMENTS:
-            own = [ProposedControl(axis, role, at) for axis in POSITIONS]
-            given = [values[each] for each in own if each in values]
-            left = prediction.remaining(given) if given else np.inf
-            if left < found.get(role, (np.inf, at))[0]:
-                found[role] = left, at
-    least = min((left for left, _ in found.values()), default=np.inf)
-    if least > 1.0 - LEAST_GAIN:
+            controls = [ProposedControl(axis, role, at) for axis in POSITIONS]
+            measured = [values[control] for control in controls if control in values]
+            left = prediction.remaining(measured) if measured else np.inf
+            if left < by_role.get(role, (np.inf, at))[0]:
+                by_role[role] = left, at
+    smallest = min((left for left, _ in by_role.values()), default=np.inf)
+    if smallest > 1.0 - LEAST_GAIN:
         return None
-    near = [role for role, (left, _) in found.items() if left <= NEAR_BEST * least]
+    near = [role for role, (left, _) in by_role.items() if left <= NEAR_BEST * smallest]
 
     def excursion(role: str) -> float:
         """Return how far a joint goes relative to the hips, from its first position, mean, m."""
@@ -218,7 +222,7 @@ def _event(
         return float(np.mean(ways))
 
     role = max(near, key=excursion)
-    return role, found[role][1]
+    return role, by_role[role][1]
 
 
 def _next(
@@ -228,11 +232,13 @@ def _next(
 ) -> tuple[float, ProposedControl] | None:
     """Return the measure that lowers the remaining variance most, and what remains with it."""
     best: tuple[float, ProposedControl] | None = None
-    given = [values[own] for own in chosen]
-    for candidate, own in values.items():
-        if candidate in chosen or any(abs(np.mean(own * other)) > ALIKE for other in given):
+    measured = [values[standardised] for standardised in chosen]
+    for candidate, standardised in values.items():
+        if candidate in chosen or any(
+            abs(np.mean(standardised * other)) > ALIKE for other in measured
+        ):
             continue
-        left = prediction.remaining([*given, own])
+        left = prediction.remaining([*measured, standardised])
         if best is None or left < best[0]:
             best = left, candidate
     return best

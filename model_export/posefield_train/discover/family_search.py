@@ -33,7 +33,7 @@ SOFTNESS = 0.1
 
 
 def find_like(
-    corpus: Corpus, examples: Sequence[Span], most: int, rejected: Sequence[Span] = ()
+    corpus: Corpus, examples: Sequence[Span], count: int, rejected: Sequence[Span] = ()
 ) -> list[Match]:
     """Return the clips that are most like examples, the best first, without the examples.
 
@@ -42,21 +42,21 @@ def find_like(
     places where a clip may end.
     """
     joined = motion_features.join_features(corpus)
-    ends = _nearest([joined.ends(one) for one in examples])
-    kept = list(examples)
-    found: list[Match] = []
-    for end in map(int, np.argsort(ends.costs, kind="stable")):
-        if len(found) == most or not np.isfinite(ends.costs[end]):
+    best_ends = _nearest([joined.ends(one) for one in examples])
+    spans = list(examples)
+    matches: list[Match] = []
+    for end in map(int, np.argsort(best_ends.costs, kind="stable")):
+        if len(matches) == count or not np.isfinite(best_ends.costs[end]):
             break
-        span = joined.span(int(ends.starts[end]), end)
+        span = joined.span(int(best_ends.starts[end]), end)
         if not corpus.is_whole(span):
             continue
         if any(span.overlap(other) > REJECTED_OVERLAP for other in rejected):
             continue
-        if all(span.overlap(other) <= LARGEST_OVERLAP for other in kept):
-            kept.append(span)
-            found.append(Match(span, float(ends.costs[end])))
-    return found
+        if all(span.overlap(other) <= LARGEST_OVERLAP for other in spans):
+            spans.append(span)
+            matches.append(Match(span, float(best_ends.costs[end])))
+    return matches
 
 
 def _nearest(several: Sequence[Ends]) -> Ends:
@@ -68,11 +68,11 @@ def _nearest(several: Sequence[Ends]) -> Ends:
     starts = np.stack([one.starts for one in several])
     best = np.argmin(costs, axis=0)
     columns = np.arange(costs.shape[1])
-    least = costs[best, columns]
-    known = np.isfinite(least)
-    soft = least.copy()
-    near = np.exp((least[known] - costs[:, known]) / SOFTNESS)
-    soft[known] -= SOFTNESS * np.log(near.mean(axis=0))
+    smallest = costs[best, columns]
+    finite = np.isfinite(smallest)
+    soft = smallest.copy()
+    near = np.exp((smallest[finite] - costs[:, finite]) / SOFTNESS)
+    soft[finite] -= SOFTNESS * np.log(near.mean(axis=0))
     return Ends(soft, starts[best, columns])
 
 
@@ -120,39 +120,39 @@ def find_families(
     families share few frames.
     """
     joined = motion_features.join_features(corpus)
-    least = LEAST_MOTION * joined.variance
+    threshold = LEAST_MOTION * joined.variance
     spans = candidates(corpus)
-    listed = [span for span in spans if joined.clip(span).var(axis=0).sum() > least]
+    listed = [span for span in spans if joined.clip(span).var(axis=0).sum() > threshold]
     picked = (
         listed
         if len(listed) <= count
         else [listed[at] for at in np.linspace(0, len(listed) - 1, count).round().astype(int)]
     )
-    found = []
+    matches = []
     for searched, span in enumerate(picked, 1):
         # Left out after they were picked, so that a leap of one recording changes no other's
         # candidates.
         if corpus.is_whole(span):
-            found.append(_matches(joined, span))
+            matches.append(_matches(joined, span))
         report(searched)
-    return _cover(joined, found)
+    return _cover(joined, matches)
 
 
 def candidates(corpus: Corpus) -> list[Span]:
     """Return all parts of recordings of a clip's duration between minima of the pose's speed."""
-    found = []
+    spans = []
     for index, recording in enumerate(corpus.recordings):
         times = speed_minima(recording, corpus.roles)
         for start in times:
             within = times[(times >= start + SHORTEST) & (times <= start + LONGEST)]
-            found += [Span(index, float(start), float(end)) for end in within]
-    return found
+            spans += [Span(index, float(start), float(end)) for end in within]
+    return spans
 
 
 def speed_minima(recording: Recording, roles: Sequence[str]) -> Floats:
     """Return the times (M,), s, at which the pose of a recording is slowest, and of its ends."""
-    places = motion_features.recording_features(recording, roles)[:, : 3 * len(roles)]
-    speed = np.linalg.norm(np.gradient(places, axis=0), axis=1)
+    positions = motion_features.recording_features(recording, roles)[:, : 3 * len(roles)]
+    speed = np.linalg.norm(np.gradient(positions, axis=0), axis=1)
     half = SMOOTHED // 2
     smooth = np.convolve(np.pad(speed, half, "edge"), np.full(SMOOTHED, 1 / SMOOTHED), "valid")
     padded = np.pad(smooth, MINIMUM_SPAN, constant_values=np.inf)
@@ -173,54 +173,54 @@ class _Matches:
 
 def _matches(joined: JoinedFeatures, span: Span) -> _Matches:
     """Return the clips like a candidate, the best first, that hardly overlap each other."""
-    ends = joined.ends(span)
-    near = np.flatnonzero(ends.costs < LARGEST_COST)
-    near = near[np.argsort(ends.costs[near], kind="stable")]
-    firsts, lasts = ends.starts[near], near
-    kept: list[int] = []
+    best_ends = joined.ends(span)
+    near = np.flatnonzero(best_ends.costs < LARGEST_COST)
+    near = near[np.argsort(best_ends.costs[near], kind="stable")]
+    firsts, lasts = best_ends.starts[near], near
+    indices: list[int] = []
     open_ = np.ones(len(near), dtype=bool)
     while open_.any():
         best = int(np.argmax(open_))
-        kept.append(best)
+        indices.append(best)
         common = np.minimum(lasts, lasts[best]) - np.maximum(firsts, firsts[best])
         shorter = np.minimum(lasts - firsts, lasts[best] - firsts[best])
         open_ &= common <= LARGEST_OVERLAP * shorter
         open_[best] = False
-    return _Matches(span, firsts[kept], lasts[kept], ends.costs[near][kept])
+    return _Matches(span, firsts[indices], lasts[indices], best_ends.costs[near][indices])
 
 
-def _cover(joined: JoinedFeatures, found: Sequence[_Matches]) -> list[Family]:
+def _cover(joined: JoinedFeatures, matches: Sequence[_Matches]) -> list[Family]:
     """Return families, each the candidate's that explains most of what is free."""
     free = np.ones(len(joined.values))
     # What a candidate explains never grows, so that an old value bounds the new one from above.
-    bounds = [(-_gain(own, free)[0], at) for at, own in enumerate(found)]
+    bounds = [(-_gain(candidate, free)[0], at) for at, candidate in enumerate(matches)]
     heapq.heapify(bounds)
     families = []
     while bounds:
         _, at = heapq.heappop(bounds)
-        own = found[at]
-        gain, kept = _gain(own, free)
-        if len(kept) < FEWEST:
+        candidate = matches[at]
+        gain, indices = _gain(candidate, free)
+        if len(indices) < FEWEST:
             continue
         if bounds and gain < -bounds[0][0]:
             heapq.heappush(bounds, (-gain, at))
             continue
         members = []
-        for member in kept:
-            first, last = int(own.firsts[member]), int(own.lasts[member])
+        for member in indices:
+            first, last = int(candidate.firsts[member]), int(candidate.lasts[member])
             free[first : last + 1] = 0.0
-            members.append(Match(joined.span(first, last), float(own.costs[member])))
-        families.append(Family(own.example, tuple(members)))
+            members.append(Match(joined.span(first, last), float(candidate.costs[member])))
+        families.append(Family(candidate.example, tuple(members)))
     return families
 
 
-def _gain(own: _Matches, free: Floats) -> tuple[float, list[int]]:
+def _gain(matches: _Matches, free: Floats) -> tuple[float, list[int]]:
     """Return how much a candidate explains, and its matches that are mostly free."""
     before = np.concatenate([[0.0], np.cumsum(free)])
-    within = before[own.lasts + 1] - before[own.firsts]
-    kept = np.flatnonzero(within > FREE * (own.lasts + 1 - own.firsts))
-    gains = (1.0 - own.costs[kept] / LARGEST_COST) * within[kept]
-    return float(gains.sum()), kept.tolist()
+    within = before[matches.lasts + 1] - before[matches.firsts]
+    indices = np.flatnonzero(within > FREE * (matches.lasts + 1 - matches.firsts))
+    gains = (1.0 - matches.costs[indices] / LARGEST_COST) * within[indices]
+    return float(gains.sum()), indices.tolist()
 
 
 MOST_WITHIN = 0.2
@@ -252,20 +252,20 @@ class FamilyQuality:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Return why the family is not offered; empty if it is."""
-        found = []
+        sentences = []
         if self.seconds < SHORTEST:
-            found.append(f"{self.seconds:.1f} s long, expected {SHORTEST:g} s or more")
+            sentences.append(f"{self.seconds:.1f} s long, expected {SHORTEST:g} s or more")
         if self.within > MOST_WITHIN:
-            found.append(
+            sentences.append(
                 f"clips differ by {self.within:.0%} of all motion, expected at most "
                 f"{MOST_WITHIN:.0%}"
             )
         if self.shared < LEAST_SHARED:
-            found.append(
+            sentences.append(
                 f"{self.shared:.0%} of its motion is common to the clips, expected "
                 f"{LEAST_SHARED:.0%} or more"
             )
-        return tuple(found)
+        return tuple(sentences)
 
 
 def assess(joined: JoinedFeatures, family: Family) -> FamilyQuality:
@@ -274,11 +274,11 @@ def assess(joined: JoinedFeatures, family: Family) -> FamilyQuality:
     members = []
     for member in family.members:
         clip = joined.clip(member.span)
-        apart = np.linalg.norm(query[:, None] - clip, axis=-1)
-        members.append(clip[align(apart)])
+        distances = np.linalg.norm(query[:, None] - clip, axis=-1)
+        members.append(clip[align(distances)])
     aligned = np.stack(members)
     mean = aligned.mean(axis=0)
     within = float(np.square(aligned - mean).sum(axis=-1).mean())
     motion = float(np.square(mean - mean.mean(axis=0)).sum(axis=-1).mean())
-    whole = joined.variance
-    return FamilyQuality(within / whole, motion / whole, family.seconds)
+    variance = joined.variance
+    return FamilyQuality(within / variance, motion / variance, family.seconds)

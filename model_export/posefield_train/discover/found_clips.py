@@ -56,10 +56,10 @@ def find_strides(recording: Recording) -> list[Stride]:
     """
     # Distance (F,) by which the left foot is before the right, leg lengths, smooth.
     angles, across = recording.headings(), recording.across("Foot")
-    ahead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
-    signal = moving_mean(ahead, round(SMOOTHING * recording.rate))
+    lead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
+    signal = moving_mean(lead, round(SMOOTHING * recording.rate))
     extrema = alternating_extrema(signal)
-    found = []
+    strides_found = []
     for (first, kind), (middle, _), (last, _) in zip(
         extrema, extrema[1:], extrema[2:], strict=False
     ):
@@ -72,9 +72,9 @@ def find_strides(recording: Recording) -> list[Stride]:
             # Horizontal way of the hips, leg lengths.
             step = max(1, round(WAY_STEP * recording.rate))
             hips = recording.places["hips"][first : last + 1 : step, [0, 2]]
-            way = float(np.linalg.norm(np.diff(hips, axis=0), axis=1).sum())
-            found.append(Stride(first, last, way / swing))
-    return found
+            distance = float(np.linalg.norm(np.diff(hips, axis=0), axis=1).sum())
+            strides_found.append(Stride(first, last, distance / swing))
+    return strides_found
 
 
 def moving_mean(values: Floats, frames: int) -> Floats:
@@ -90,19 +90,19 @@ def alternating_extrema(values: Floats) -> list[tuple[int, int]]:
     An extremum counts once the signal left it by HYSTERESIS; then the search for the opposite one
     begins. The first and the last frame are no extrema.
     """
-    found: list[tuple[int, int]] = []
+    extrema: list[tuple[int, int]] = []
     low = high = 0
     sign = 0
     for at, value in enumerate(values):
         high = at if value > values[high] else high
         low = at if value < values[low] else low
         if sign >= 0 and value < values[high] - HYSTERESIS:
-            found += [(high, 1)] if high > 0 else []
+            extrema += [(high, 1)] if high > 0 else []
             sign, low = -1, at
         elif sign <= 0 and value > values[low] + HYSTERESIS:
-            found += [(low, -1)] if low > 0 else []
+            extrema += [(low, -1)] if low > 0 else []
             sign, high = 1, at
-    return found
+    return extrema
 
 
 EXAMPLE = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
@@ -143,15 +143,15 @@ COLUMNS = ("file", "name", "recording", "first_frame", "last_frame", "seconds", 
 
 def strides(recordings: Sequence[Recording]) -> tuple[list[FoundClip], int]:
     """Return the strides of all recordings, in their order, and how many more do not travel."""
-    every = [(recording, one) for recording in recordings for one in find_strides(recording)]
-    found = [
-        _clip(recording, "stride", one.first, one.last) for recording, one in every if one.travels
+    pairs = [(recording, one) for recording in recordings for one in find_strides(recording)]
+    clips = [
+        _clip(recording, "stride", one.first, one.last) for recording, one in pairs if one.travels
     ]
-    return found, len(every) - len(found)
+    return clips, len(pairs) - len(clips)
 
 
 def like(
-    recordings: Sequence[Recording], examples: Examples, name: str, most: int
+    recordings: Sequence[Recording], examples: Examples, name: str, count: int
 ) -> list[FoundClip]:
     """Return the examples, the clips that are like them, the best first, and the rejected ones.
 
@@ -162,17 +162,17 @@ def like(
         corpus = motion_features.build_corpus(recordings)
     except StillRecordings as fault:
         raise InvalidField("like", str(fault)) from fault
-    matches = family_search.find_like(corpus, accepted, most, rejected)
+    matches = family_search.find_like(corpus, accepted, count, rejected)
     rows: list[tuple[Span, float | None, Verdict]] = [
         *((span, 0.0, "true") for span in accepted),
         *((match.span, match.cost, "false") for match in matches),
         *((span, None, "rejected") for span in rejected),
     ]
-    found = []
+    clips = []
     for span, cost, verdict in rows:
         first, last = corpus.frames(span)
-        found.append(_clip(recordings[span.recording], name, first, last, cost, verdict))
-    return found
+        clips.append(_clip(recordings[span.recording], name, first, last, cost, verdict))
+    return clips
 
 
 def table(clips: Sequence[FoundClip]) -> bytes:
@@ -207,11 +207,11 @@ def parse_examples(recordings: Sequence[Recording], text: str) -> Examples:
     """
     if text.endswith(".csv"):
         return _reviewed(recordings, Path(text))
-    parts = EXAMPLE.fullmatch(text)
-    if parts is None:
+    match = EXAMPLE.fullmatch(text)
+    if match is None:
         raise InvalidField("like", f"{text!r}, expected FILE:START-END in seconds, or TABLE.csv")
-    seconds = float(parts[2]), float(parts[3])
-    return [_span(recordings, parts[1], seconds, SHORTEST_EXAMPLE)], []
+    seconds = float(match[2]), float(match[3])
+    return [_span(recordings, match[1], seconds, SHORTEST_EXAMPLE)], []
 
 
 def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
@@ -222,9 +222,9 @@ def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
     rates = {recording.file: recording.rate for recording in recordings}
     for line, record in cells.records:
         if record["accepted"] not in spans:
-            known = ", ".join(spans)
+            verdicts = ", ".join(spans)
             raise RecipeError(
-                cells.name, f"accepted {record['accepted']!r}, expected one of {known}", line
+                cells.name, f"accepted {record['accepted']!r}, expected one of {verdicts}", line
             )
         if record["accepted"] == "false":
             continue
@@ -240,10 +240,13 @@ def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
 
 
 def _span(
-    recordings: Sequence[Recording], file: str, part: tuple[float, float], shortest: float
+    recordings: Sequence[Recording],
+    file: str,
+    seconds_of_part: tuple[float, float],
+    shortest: float,
 ) -> Span:
     """Return a part of a recording, s; InvalidField if the recording is unknown or lacks it."""
-    start, end = part
+    start, end = seconds_of_part
     for index, recording in enumerate(recordings):
         if recording.file == file:
             seconds = (len(recording) - 1) / recording.rate
@@ -254,9 +257,9 @@ def _span(
                     f"and {seconds:.2f} s of {recording.file}",
                 )
             return Span(index, start, end)
-    known = ", ".join(recording.file for recording in recordings[:5])
+    files = ", ".join(recording.file for recording in recordings[:5])
     raise InvalidField(
-        "like", f"file {file!r}, expected a recording of the folder, such as {known}"
+        "like", f"file {file!r}, expected a recording of the folder, such as {files}"
     )
 
 
@@ -267,10 +270,10 @@ def read_roles(path: Path) -> dict[str, str]:
     """
     content = data_folder.read(path, MOST_ROLES_BYTES, "a TOML file with roles")
     try:
-        found = tomllib.loads(content.decode("utf-8-sig"))
+        tables = tomllib.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as fault:
         raise FileError(path, f"not TOML: {fault}") from fault
-    roles = found.get("roles")
+    roles = tables.get("roles")
     if not isinstance(roles, dict) or not all(isinstance(one, str) for one in roles.values()):
         raise FileError(path, "no table [roles] of joints by role")
     unknown = sorted(set(roles) - set(ROLES))

@@ -25,24 +25,24 @@ class Ends:
     starts: Indices
 
 
-def match_ends(apart: Floats) -> Ends:
+def match_ends(distances: Floats) -> Ends:
     """Return the best match that ends at each frame of the corpus.
 
     apart (L, F): distances of the query's frames from the corpus's; inf between two recordings.
     """
-    length, frames = apart.shape
+    length, frames = distances.shape
     starts = np.arange(frames)
     before: tuple[Floats, Indices] | None = None
-    last = apart[0], starts
+    last = distances[0], starts
     for at in range(1, length):
-        own = apart[at]
+        row = distances[at]
         costs = np.full(frames, np.inf)
-        costs[1:] = last[0][:-1] + own[1:]
+        costs[1:] = last[0][:-1] + row[1:]
         origin = np.zeros(frames, dtype=np.int64)
         origin[1:] = last[1][:-1]
-        _take_better((costs, origin), last, 2, own)
+        _take_better((costs, origin), last, 2, row)
         if before is not None:
-            _take_better((costs, origin), before, 1, own + apart[at - 1])
+            _take_better((costs, origin), before, 1, row + distances[at - 1])
         before, last = last, (costs, origin)
     costs, starts = last
     return Ends(costs / length, starts)
@@ -58,25 +58,25 @@ def _take_better(
     np.copyto(best[1][step:], row[1][:-step], where=better)
 
 
-def align(apart: Floats) -> Indices:
+def align(distances: Floats) -> Indices:
     """Return for each frame of the query (L,) the frame of a clip (F,) that is most like it.
 
     apart (L, F): distances. The first frames are alike, and the last ones; steps are those of a
     match. A frame of the query that a step leaves out shares the frame after. Raises ValueError
     for a clip that lasts less than half as long as the query, or more than twice.
     """
-    length, frames = apart.shape
+    length, frames = distances.shape
     costs = np.full((length, frames), np.inf)
     steps = np.zeros((length, frames), dtype=np.int64)
-    costs[0, 0] = apart[0, 0]
+    costs[0, 0] = distances[0, 0]
     for at in range(1, length):
         choices = np.full((len(STEPS), frames), np.inf)
         choices[0, 1:] = costs[at - 1, :-1]
         choices[1, 2:] = costs[at - 1, :-2]
         if at > 1:
-            choices[2, 1:] = costs[at - 2, :-1] + apart[at - 1, 1:]
+            choices[2, 1:] = costs[at - 2, :-1] + distances[at - 1, 1:]
         steps[at] = np.argmin(choices, axis=0)
-        costs[at] = choices.min(axis=0) + apart[at]
+        costs[at] = choices.min(axis=0) + distances[at]
     if not np.isfinite(costs[-1, -1]):
         raise ValueError(f"{frames} frames, expected {length // 2 + 1} to {2 * length - 1}")
     return _path(steps)
@@ -85,12 +85,12 @@ def align(apart: Floats) -> Indices:
 def _path(steps: Indices) -> Indices:
     """Return the frames (L,) of the best path, from the step (L, F) that led to each place."""
     row, column = steps.shape[0] - 1, steps.shape[1] - 1
-    found = np.zeros(row + 1, dtype=np.int64)
+    frames = np.zeros(row + 1, dtype=np.int64)
     while row > 0:
         rows, columns = STEPS[steps[row, column]]
-        found[row - rows + 1 : row + 1] = column
+        frames[row - rows + 1 : row + 1] = column
         row, column = row - rows, column - columns
-    return found
+    return frames
 
 
 RATE = 30.0
@@ -186,7 +186,9 @@ def build_corpus(recordings: Sequence[Recording]) -> Corpus:
     raw = [recording_features(recording, roles) for recording in recordings]
     mean, basis = principal_components(np.concatenate(raw))
     step = round(RATE / SEARCH_RATE)
-    return Corpus(tuple(recordings), roles, tuple((own[::step] - mean) @ basis for own in raw))
+    return Corpus(
+        tuple(recordings), roles, tuple((features[::step] - mean) @ basis for features in raw)
+    )
 
 
 def lacking_roles(recordings: Sequence[Recording]) -> list[str]:
@@ -202,16 +204,18 @@ def recording_features(recording: Recording, roles: Sequence[str]) -> Floats:
     Places are relative to the hips on the floor of the recording, in the heading of the hips.
     """
     times = np.arange(0.0, (len(recording) - 1) / recording.rate + 1e-9, 1.0 / RATE)
-    own = np.arange(len(recording)) / recording.rate
-    angles = np.interp(times, own, recording.headings())
-    places = {
-        role: np.stack([np.interp(times, own, axis) for axis in recording.places[role].T], axis=1)
+    frame_times = np.arange(len(recording)) / recording.rate
+    angles = np.interp(times, frame_times, recording.headings())
+    positions = {
+        role: np.stack(
+            [np.interp(times, frame_times, axis) for axis in recording.places[role].T], axis=1
+        )
         for role in {*roles, "hips"}
     }
-    floor = np.percentile(np.concatenate([places[role][:, 1] for role in roles]), 1.0)
-    base = places["hips"] * [1.0, 0.0, 1.0] + [0.0, floor, 0.0]
-    columns = [WEIGHTS[role] * _turned(places[role] - base, -angles) for role in roles]
-    travel = _turned(_velocity(places["hips"]), -angles)[:, [0, 2]]
+    floor = np.percentile(np.concatenate([positions[role][:, 1] for role in roles]), 1.0)
+    base = positions["hips"] * [1.0, 0.0, 1.0] + [0.0, floor, 0.0]
+    columns = [WEIGHTS[role] * _turned(positions[role] - base, -angles) for role in roles]
+    travel = _turned(_velocity(positions["hips"]), -angles)[:, [0, 2]]
     turn = _velocity(angles[:, None])
     return np.concatenate([*columns, TRAVEL_WEIGHT * travel, TURN_WEIGHT * turn], axis=1)
 
@@ -284,12 +288,12 @@ class JoinedFeatures:
         """Return the frames of a part of a recording; its end may lie beyond the last one."""
         offset = self.offsets[span.recording]
         first, last = (offset + round(time * SEARCH_RATE) for time in (span.start, span.end))
-        ends = (
+        length = (
             len(self.owners)
             if span.recording + 1 == len(self.offsets)
             else self.offsets[span.recording + 1]
         )
-        return slice(first, min(last + 1, ends - GAP))
+        return slice(first, min(last + 1, length - GAP))
 
     def clip(self, span: Span) -> Floats:
         """Return the features (L, k) of a part of a recording."""
@@ -310,17 +314,17 @@ class JoinedFeatures:
         distances = np.sum(np.square(query), axis=1)[:, None] + squares
         distances -= 2.0 * query @ values.T
         np.sqrt(np.maximum(distances, 0.0, out=distances), out=distances)
-        found = match_ends(distances)
-        usual = float(np.median(found.costs[np.isfinite(found.costs)]))
-        return Ends(found.costs / usual, found.starts)
+        best = match_ends(distances)
+        median = float(np.median(best.costs[np.isfinite(best.costs)]))
+        return Ends(best.costs / median, best.starts)
 
 
 def join_features(corpus: Corpus) -> JoinedFeatures:
     """Return the features of all recordings with gaps between them."""
     pieces, owners, offsets, count = [], [], [], 0
-    for recording, own in enumerate(corpus.features):
+    for recording, features in enumerate(corpus.features):
         offsets.append(count)
-        pieces += [own, np.full((GAP, own.shape[1]), np.nan)]
-        owners += [np.full(len(own), recording), np.full(GAP, -1)]
-        count += len(own) + GAP
+        pieces += [features, np.full((GAP, features.shape[1]), np.nan)]
+        owners += [np.full(len(features), recording), np.full(GAP, -1)]
+        count += len(features) + GAP
     return JoinedFeatures(np.concatenate(pieces), np.concatenate(owners), tuple(offsets))

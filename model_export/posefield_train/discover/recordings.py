@@ -4,7 +4,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -37,35 +37,37 @@ COMPARED = (
 
 
 def find_copies(
-    files: Sequence[str], places: Sequence[Mapping[str, Floats]]
+    files: Sequence[str], positions: Sequence[Mapping[str, Floats]]
 ) -> dict[str, tuple[str, str]]:
     """Return the original of each recording that is a copy, and why it is one, by file.
 
-    files: of the recordings. places: positions (F, 3) by role of each, leg lengths, Y up.
+    files: of the recordings. positions: (F, 3) by role of each, leg lengths, Y up.
     """
     if len(files) < 2:
         return {}
-    known = [role for role in COMPARED if all(role in own for own in places)]
-    roles = [role for role in known if _counterpart(role) in known]
-    motions = [_motion(own, roles) for own in places]
+    shared = [role for role in COMPARED if all(role in by_role for by_role in positions)]
+    roles = [role for role in shared if _counterpart(role) in shared]
+    motions = [_motion(by_role, roles) for by_role in positions]
     swapped = tuple(roles.index(_counterpart(role)) for role in roles)
     pairs = recording_groups.find_pairs(motions, swapped)
     originals = recording_groups.connected(files, pairs)
     notes: dict[str, str] = {}
     # Relations to the original itself come first.
-    named = {files.index(file) for file in originals}
-    for pair in sorted(pairs, key=lambda own: not {own.first, own.second} & named):
-        said = f"{files[pair.second]} {pair.relation} {files[pair.first]}"
+    original_indices = {files.index(file) for file in originals}
+    for pair in sorted(
+        pairs, key=lambda by_role: not {by_role.first, by_role.second} & original_indices
+    ):
+        relation = f"{files[pair.second]} {pair.relation} {files[pair.first]}"
         for at in (pair.first, pair.second):
             if files[at] != originals[at]:
-                notes.setdefault(files[at], f"{said}: both are one recording")
+                notes.setdefault(files[at], f"{relation}: both are one recording")
     copies = dict(zip(files, originals, strict=True))
     return {file: (copies[file], note) for file, note in notes.items()}
 
 
-def _motion(places: Mapping[str, Floats], roles: Sequence[str]) -> Positions:
+def _motion(positions: Mapping[str, Floats], roles: Sequence[str]) -> Positions:
     """Return positions (F, J, 3) of an adult of the usual size, m."""
-    return np.stack([ADULT_LEG * places[role] for role in roles], axis=1)
+    return np.stack([ADULT_LEG * positions[role] for role in roles], axis=1)
 
 
 def _counterpart(role: str) -> str:
@@ -180,16 +182,16 @@ def read_recordings(
     """
     if not folder.is_dir():
         raise FileError(folder, "not a folder, expected one with motion files")
-    found = motion_readers.find_refused(folder)
-    refused = {path.relative_to(folder).as_posix(): said for path, said in found.items()}
+    refused_paths = motion_readers.find_refused(folder)
+    refused = {path.relative_to(folder).as_posix(): hint for path, hint in refused_paths.items()}
     bodies, frames = list[Body](), 0
-    known = stated or FileStatements()
+    statements = stated or FileStatements()
     read = motion_readers.read if files is None else files.read
     measured: Counter[tuple[str, ...]] = Counter()
     for count, path in enumerate(motion_readers.find_files(folder), 1):
         name = path.relative_to(folder).as_posix()
         try:
-            body = _body(name, read(path, ReadOptions(rate=known.rate)), known)
+            body = _body(name, read(path, ReadOptions(rate=statements.rate)), statements)
             frames += len(body.recording)
             measured[body.joints] += 1
             bodies.append(body if measured[body.joints] <= MOST_WHOLE else body.light())
@@ -203,13 +205,13 @@ def read_recordings(
                 f"found more than {MOST_FRAMES} frames, expected a smaller part of the files",
             )
         report(count)
-    kept = _of_one_unit(bodies, refused)
-    recordings, notes = _with_originals(_turned(kept, known.up, refused))
+    same_unit = _of_one_unit(bodies, refused)
+    recordings, notes = _with_originals(_turned(same_unit, statements.up, refused))
     if not recordings:
         first = next(iter(refused.items()), None)
-        said = f"such as {first[0]}: {first[1]}" if first else "it has no motion files"
-        raise FileError(folder, f"no recording that can be searched; {said}")
-    figures = {body.recording.file: body.figure for body in kept}
+        hint = f"such as {first[0]}: {first[1]}" if first else "it has no motion files"
+        raise FileError(folder, f"no recording that can be searched; {hint}")
+    figures = {body.recording.file: body.figure for body in same_unit}
     for file, figure in figures.items():
         if figure.file.notes:
             notes[file] = [*figure.file.notes, *notes.get(file, [])]
@@ -250,8 +252,8 @@ def _body(name: str, file: MotionFile, stated: FileStatements) -> Body:
         raise UnusableRecording(f"no joint {', '.join(map(repr, unknown))}, which the roles name")
     # Stated roles in place of those that were recognised.
     certain = {role: RoleGuess(joint, 1.0) for role, joint in roles.items()}
-    others = {r: g for r, g in measured.guesses.items() if g.joint not in roles.values()}
-    measured = replace(measured, guesses=others | certain)
+    recognised = {r: g for r, g in measured.guesses.items() if g.joint not in roles.values()}
+    measured = replace(measured, guesses=recognised | certain)
     lacking = []
     for role in NEEDED:
         guess = measured.guesses.get(role)
@@ -269,14 +271,23 @@ def _body(name: str, file: MotionFile, stated: FileStatements) -> Body:
     joints = file.skeleton
     positions = skeleton.positions(joints.parents, file.rotations, file.translations)
     index = {joint: at for at, joint in enumerate(joints.names)}
-    searched = {role: index[own] for role, own in measured.sure_roles.items() if role in SEARCHED}
+    searched = {
+        role: index[joint_name]
+        for role, joint_name in measured.sure_roles.items()
+        if role in SEARCHED
+    }
     columns = list(searched.values())
-    moved, rest = positions[:, columns] / leg, joints.at_rest(joints.offsets)[columns] / leg
-    faults = frame_faults.find_faults(ADULT_LEG * moved, file.rate, ADULT_LEG * rest)
+    searched_positions, rest = (
+        positions[:, columns] / leg,
+        joints.at_rest(joints.offsets)[columns] / leg,
+    )
+    faults = frame_faults.find_faults(ADULT_LEG * searched_positions, file.rate, ADULT_LEG * rest)
     if faults.rests_first:
-        moved[0] = moved[1]
-    places = {role: np.ascontiguousarray(moved[:, at]) for at, role in enumerate(searched)}
-    recording = Recording(name, file.rate, places, faults)
+        searched_positions[0] = searched_positions[1]
+    positions_by_role = {
+        role: np.ascontiguousarray(searched_positions[:, at]) for at, role in enumerate(searched)
+    }
+    recording = Recording(name, file.rate, positions_by_role, faults)
     up = proposals.propose_up([measured])
     return Body(recording, tuple(measured.names), measured.without_frames(), leg, up)
 
@@ -289,7 +300,7 @@ def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
     kinds: dict[tuple[str, ...], list[Body]] = {}
     for body in bodies:
         kinds.setdefault(body.joints, []).append(body)
-    kept = set[str]()
+    files = set[str]()
     for alike in kinds.values():
         # Groups between whose legs the lengths leap.
         lengths = sorted({body.leg for body in alike})
@@ -297,14 +308,15 @@ def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
         groups: dict[int, list[Body]] = {}
         for body in alike:
             groups.setdefault(bisect_left(tops, body.leg), []).append(body)
-        usual = max(groups.values(), key=len)
-        kept.update(body.recording.file for body in usual)
-        for body in (own for group in groups.values() if group is not usual for own in group):
+        largest = max(groups.values(), key=len)
+        files.update(body.recording.file for body in largest)
+        for body in chain.from_iterable(group for group in groups.values() if group is not largest):
             refused[body.recording.file] = (
-                f"its legs are {body.leg:.4g} units long, those of {usual[0].recording.file} and "
-                f"most files with its joints {usual[0].leg:.4g}: search files of one unit together"
+                f"its legs are {body.leg:.4g} units long, those of {largest[0].recording.file} and "
+                f"most files with its joints {largest[0].leg:.4g}: search files of one unit "
+                "together"
             )
-    return [body for body in bodies if body.recording.file in kept]
+    return [body for body in bodies if body.recording.file in files]
 
 
 def _with_originals(
@@ -313,17 +325,17 @@ def _with_originals(
     """Return the recordings with the originals of which they are copies, and notes by file."""
     files = [recording.file for recording in recordings]
     copies = find_copies(files, [recording.places for recording in recordings])
-    found, notes = [], {}
+    resolved, notes = [], {}
     for recording in recordings:
         joints = list(recording.places)
-        said = frame_faults.describe(recording.faults, joints, recording.rate, left_out=True)
+        sentences = frame_faults.describe(recording.faults, joints, recording.rate, left_out=True)
         original, note = copies.get(recording.file, (None, ""))
         if note:
-            said += [note]
-        if said:
-            notes[recording.file] = said
-        found.append(replace(recording, copy_of=original))
-    return found, notes
+            sentences += [note]
+        if sentences:
+            notes[recording.file] = sentences
+        resolved.append(replace(recording, copy_of=original))
+    return resolved, notes
 
 
 def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> list[Recording]:
@@ -333,7 +345,7 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
     """
     axes: dict[tuple[str, ...], UpAxis | None] = {}
     reasons: dict[tuple[str, ...], str] = {}
-    found = []
+    turned = []
     for body in bodies:
         if body.joints not in axes:
             alike = [other.figure for other in bodies if other.joints == body.joints]
@@ -343,8 +355,8 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
             reasons[body.joints] = "; ".join(proposal.evidence)
         axis = axes[body.joints]
         if axis is None:
-            said = f"its up axis is unclear ({reasons[body.joints]}): say it with --up"
-            refused[body.recording.file] = said
+            reason = f"its up axis is unclear ({reasons[body.joints]}): say it with --up"
+            refused[body.recording.file] = reason
             continue
         own_axis = body.up.value if body.up.confidence in ("certain", "high") else axis
         if up is None and own_axis != axis:
@@ -353,6 +365,8 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
                 "files of one up axis together"
             )
             continue
-        places = {r: motion_file.to_y_up(own, axis) for r, own in body.recording.places.items()}
-        found.append(replace(body.recording, places=places))
-    return found
+        positions = {
+            r: motion_file.to_y_up(vectors, axis) for r, vectors in body.recording.places.items()
+        }
+        turned.append(replace(body.recording, places=positions))
+    return turned

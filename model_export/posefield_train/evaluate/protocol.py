@@ -230,7 +230,7 @@ def train_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> Train
     try:
         trained = train_examples(recipe, rest)
     except TrainingError as error:
-        file_names = ", ".join(sorted({example.row.place.name for example in held_out}))
+        file_names = ", ".join(sorted({example.row.file.name for example in held_out}))
         raise TrainingError(f"with {file_names} held out: {error}") from error
     queries = Queries(np.stack([e.controls for e in held_out]), [e.row.labels for e in held_out])
     # As captured: closing a cycle moves joints, which would favour what closes the same way.
@@ -284,7 +284,7 @@ def held_out_result(
     merged = merge(
         recipe,
         f"leave_one_{protocol}_out",
-        [f"{example.row.place.name} (line {example.row.line})" for example in examples],
+        [f"{example.row.file.name} (line {example.row.line})" for example in examples],
         clip.skeleton.names,
         sample_points.recording_numbers(examples).tolist(),
         results,

@@ -59,8 +59,8 @@ def draw(recording: Recording, first: int, last: int) -> StickStrip:
     frames = np.linspace(first, last, INSTANTS).round().astype(int)
     bones = [bone for bone in BONES if set(bone) <= recording.places.keys()]
     hips = recording.places["hips"][frames] * (1.0 - UP)
-    ends = [[recording.places[role][frames] - hips for role in bone] for bone in bones]
-    points = np.array(ends).transpose(2, 0, 1, 3)
+    bone_ends = [[recording.places[role][frames] - hips for role in bone] for bone in bones]
+    points = np.array(bone_ends).transpose(2, 0, 1, 3)
     across = points @ _direction(points)
     floor, top = points[..., 1].min(), points[..., 1].max()
     step = across.max() - across.min() + GAP
@@ -80,14 +80,14 @@ def _direction(points: Floats) -> Floats:
 
     From exactly there one side of the body would hide the other.
     """
-    moved = (points - points.mean(axis=0)).reshape(-1, 3) * (1.0 - UP)
+    motion = (points - points.mean(axis=0)).reshape(-1, 3) * (1.0 - UP)
     spread = (points - points.mean(axis=(1, 2), keepdims=True)).reshape(-1, 3) * (1.0 - UP)
     # A body that does not move is seen from where it is widest.
-    _, vectors = np.linalg.eigh(moved.T @ moved + 0.01 * spread.T @ spread)
-    found = vectors[:, -1]
-    found = found if found[2] + 1e-3 * found[0] >= 0.0 else -found
-    aside = np.array([found[2], 0.0, -found[0]])
-    return np.asarray(np.cos(VIEW_TURN) * found + np.sin(VIEW_TURN) * aside)
+    _, vectors = np.linalg.eigh(motion.T @ motion + 0.01 * spread.T @ spread)
+    direction = vectors[:, -1]
+    direction = direction if direction[2] + 1e-3 * direction[0] >= 0.0 else -direction
+    aside = np.array([direction[2], 0.0, -direction[0]])
+    return np.asarray(np.cos(VIEW_TURN) * direction + np.sin(VIEW_TURN) * aside)
 
 
 def _path(bones: Floats) -> str:
@@ -108,7 +108,10 @@ HEADINGS = {
 
 
 def render(
-    found: FoundFamilies, recordings: Sequence[Recording], folder: str, refused: Mapping[str, str]
+    families: FoundFamilies,
+    recordings: Sequence[Recording],
+    folder: str,
+    refused: Mapping[str, str],
 ) -> bytes:
     """Return the page as one file of HTML; all text is escaped.
 
@@ -125,10 +128,10 @@ def render(
     by_file = {recording.file: recording for recording in recordings}
     left = [
         (f"{len(one.rows)} clips of {one.seconds:.1f} s", "; ".join(one.reasons))
-        for one in found.refused
+        for one in families.refused
     ]
     page = environment.get_template("contact_sheet.html").render(
-        families=[_shown(one, by_file) for one in found.offered],
+        families=[_shown(one, by_file) for one in families.offered],
         left=left,
         folder=folder,
         recordings=len(recordings),
@@ -167,12 +170,12 @@ def _clip(number: int, row: FamilyRow, recordings: Mapping[str, Recording]) -> d
 
 def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:
     family, proposal = one.family, one.proposal
-    names = ", ".join(recipe_folder.control_name(own) for own in proposal.controls)
-    said = f"explain {1.0 - proposal.remaining[-1]:.0%} of the variance of recordings left out"
+    names = ", ".join(recipe_folder.control_name(control) for control in proposal.controls)
+    sentence = f"explain {1.0 - proposal.remaining[-1]:.0%} of the variance of recordings left out"
     facts = [
         ("Performers", ", ".join(sorted({row.performer for row in family.rows}))),
         ("Duration", f"{family.seconds:.1f} s in the median"),
-        ("What varies", f"{names}, which {said}"),
+        ("What varies", f"{names}, which {sentence}"),
     ]
     if family.quality is not None:
         alike = f"clips differ by {family.quality.within:.1%} of all motion"
@@ -180,8 +183,8 @@ def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:
     else:
         facts.append(("Why", "from one left foot most forward to the next, and the body travels"))
     if family.left_out:
-        said = ", ".join(
+        sentence = ", ".join(
             f"{count} clips, {why}" for why, count in Counter(family.left_out.values()).items()
         )
-        facts.append(("Left out", said))
+        facts.append(("Left out", sentence))
     return tuple(facts)

@@ -57,8 +57,8 @@ def find_kinds(
     """
     groups: dict[tuple[str, ...], list[tuple[str, Figure]]] = {}
     for count, file in enumerate(files, 1):
-        own = figures[file] if figures else _measured(folder / file, stated.rate)
-        groups.setdefault(tuple(own.names), []).append((file, own))
+        figure = figures[file] if figures else _measured(folder / file, stated.rate)
+        groups.setdefault(tuple(figure.names), []).append((file, figure))
         report(count)
     return [_kind(folder, joints, group, stated) for joints, group in groups.items()]
 
@@ -73,20 +73,22 @@ def _kind(
     group: Sequence[tuple[str, Figure]],
     stated: FileStatements,
 ) -> BodyKind:
-    files, figures = [file for file, _ in group], [own for _, own in group]
-    found = _stated(probe_report.report_of([folder / file for file in files], figures), stated)
+    files, figures = [file for file, _ in group], [stated_roles for _, stated_roles in group]
+    report_of_kind = _stated(
+        probe_report.report_of([folder / file for file in files], figures), stated
+    )
     for name, key in (("metres_per_unit", "unit"), ("up", "up")):
-        if found.proposed[name].value is None:
-            said = "; ".join(found.proposed[name].evidence)
-            raise InvalidField(key, f"not told by {files[0]} ({said}), expected a statement")
-    unit = float(found.proposed["metres_per_unit"].value)
-    names = name_performers(files, [unit * own.bones[1:] for own in figures])
-    own = {role: joint for role, joint in stated.roles.items() if joint in joints}
+        if report_of_kind.proposed[name].value is None:
+            evidence = "; ".join(report_of_kind.proposed[name].evidence)
+            raise InvalidField(key, f"not told by {files[0]} ({evidence}), expected a statement")
+    unit = float(report_of_kind.proposed["metres_per_unit"].value)
+    names = name_performers(files, [unit * stated_roles.bones[1:] for stated_roles in figures])
+    stated_roles = {role: joint for role, joint in stated.roles.items() if joint in joints}
     performers = dict(zip(files, names, strict=True))
-    return BodyKind(joints, found, performers, figures[0].file.skeleton, own)
+    return BodyKind(joints, report_of_kind, performers, figures[0].file.skeleton, stated_roles)
 
 
-def _stated(found: ProbeReport, stated: FileStatements) -> ProbeReport:
+def _stated(report: ProbeReport, stated: FileStatements) -> ProbeReport:
     """Return the report with statements in place of proposals and guesses."""
     values = {"metres_per_unit": stated.metres_per_unit, "up": stated.up, "rate": stated.rate}
     proposed = {
@@ -95,10 +97,12 @@ def _stated(found: ProbeReport, stated: FileStatements) -> ProbeReport:
         if value is not None
     }
     roles = {
-        role: RoleGuess(joint, 1.0) for role, joint in stated.roles.items() if joint in found.joints
+        role: RoleGuess(joint, 1.0)
+        for role, joint in stated.roles.items()
+        if joint in report.joints
     }
-    others = {r: g for r, g in found.guesses.items() if g.joint not in stated.roles.values()}
-    return replace(found, proposed=found.proposed | proposed, guesses=others | roles)
+    recognised = {r: g for r, g in report.guesses.items() if g.joint not in stated.roles.values()}
+    return replace(report, proposed=report.proposed | proposed, guesses=recognised | roles)
 
 
 def name_performers(files: Sequence[str], bones: Sequence[Floats]) -> list[str]:
@@ -110,24 +114,32 @@ def name_performers(files: Sequence[str], bones: Sequence[Floats]) -> list[str]:
     """
     groups = _groups(bones)
     words = [_words(file) for file in files]
-    found = [""] * len(files)
+    performers = [""] * len(files)
     for number, group in enumerate(groups, 1):
         shared = set(words[group[0]]).intersection(*(words[at] for at in group))
-        others = {word for at, own in enumerate(words) if at not in group for word in own}
-        own = [word for word in words[group[0]] if word in shared - others]
-        is_told = len(groups) > 1 and own
+        other_words = {
+            word
+            for at, unique_words in enumerate(words)
+            if at not in group
+            for word in unique_words
+        }
+        unique_words = [word for word in words[group[0]] if word in shared - other_words]
+        is_told = len(groups) > 1 and unique_words
         for at in group:
-            found[at] = own[0] if is_told else f"performer_{number}"
-    return found
+            performers[at] = unique_words[0] if is_told else f"performer_{number}"
+    return performers
 
 
 def _groups(bones: Sequence[Floats]) -> list[list[int]]:
     """Return the indices of files with equal bones, in the order of their first files."""
     groups: list[list[int]] = []
-    for at, own in enumerate(bones):
+    for at, lengths in enumerate(bones):
         for group in groups:
             other = bones[group[0]]
-            if own.shape == other.shape and np.abs(own - other).max(initial=0.0) <= SAME_BONE:
+            if (
+                lengths.shape == other.shape
+                and np.abs(lengths - other).max(initial=0.0) <= SAME_BONE
+            ):
                 group.append(at)
                 break
         else:
@@ -150,7 +162,7 @@ SAME_UNIT = 1e-4
 def can_share(kinds: Sequence[BodyKind]) -> bool:
     """Return whether bodies have all roles of a common topology, and one unit and up axis."""
     units, axes = (
-        [own.report.proposed[key].value for own in kinds] for key in ("metres_per_unit", "up")
+        [kind.report.proposed[key].value for kind in kinds] for key in ("metres_per_unit", "up")
     )
     if max(units) - min(units) > SAME_UNIT * max(units) or len(set(axes)) > 1:
         return False
@@ -164,9 +176,9 @@ def can_share(kinds: Sequence[BodyKind]) -> bool:
 def _bodies(kinds: Sequence[BodyKind]) -> list[RoleJoints]:
     return [
         common_topology.role_joints(
-            own.skeleton, {role: [joint] for role, joint in own.stated.items()}
+            kind.skeleton, {role: [joint] for role, joint in kind.stated.items()}
         )
-        for own in kinds
+        for kind in kinds
     ]
 
 
@@ -181,9 +193,9 @@ def shared_report(report: ProbeReport, kinds: Sequence[BodyKind]) -> ProbeReport
     }
     by_joint = {joint: role for role, joint in report.roles.items()}
     feet = report.proposed["feet"]
-    named = [by_joint[joint] for joint in feet.value if by_joint.get(joint) in names]
+    foot_roles = [by_joint[joint] for joint in feet.value if by_joint.get(joint) in names]
     proposed = report.proposed | {
-        "feet": replace(feet, value=named),
+        "feet": replace(feet, value=foot_roles),
         "facing": Proposal(0.0, "certain", ("bodies on the topology of roles face +z",)),
     }
     return replace(report, joints=names, guesses=guesses, proposed=proposed)
@@ -191,7 +203,7 @@ def shared_report(report: ProbeReport, kinds: Sequence[BodyKind]) -> ProbeReport
 
 def skeleton_lines(kinds: Sequence[BodyKind]) -> list[str]:
     """Return the section [skeleton] of a family's recipe, with its evidence as comments."""
-    counts = ", ".join(str(len(own.joints)) for own in kinds)
+    counts = ", ".join(str(len(kind.joints)) for kind in kinds)
     lines = [
         f"# The files have {len(kinds)} kinds of skeletons, of {counts} joints: clips get the",
         "# joints of the roles that all have, named by their roles.",
@@ -199,10 +211,10 @@ def skeleton_lines(kinds: Sequence[BodyKind]) -> list[str]:
         'topology = "roles"',
     ]
     stated: dict[str, list[str]] = {}
-    for own in kinds:
-        for role, joint in own.stated.items():
-            known = stated.setdefault(role, [])
-            known += [] if joint in known else [joint]
+    for kind in kinds:
+        for role, joint in kind.stated.items():
+            joints_of_role = stated.setdefault(role, [])
+            joints_of_role += [] if joint in joints_of_role else [joint]
     if stated:
         lines += ["", f"# {STATED[0]}", "[skeleton.roles]"]
         lines += [f"{role} = {recipe_draft.names(joints)}" for role, joints in stated.items()]
@@ -255,13 +267,13 @@ def read(path: Path) -> list[FamilyRow]:
     rows = []
     for line, record in cells.records:
         if record["accepted"] not in ("true", "false"):
-            said = f"column 'accepted': {record['accepted']!r}, expected true or false"
-            raise RecipeError(path, said, line)
+            fault = f"column 'accepted': {record['accepted']!r}, expected true or false"
+            raise RecipeError(path, fault, line)
         first, last = (cells.frame(line, record, key) for key in ("first_frame", "last_frame"))
         cost = cells.number(line, record, "cost") if record["cost"] else None
         accepted = record["accepted"] == "true"
-        told = (record["file"], first, last, record["performer"], record[column])
-        rows.append(FamilyRow(*told, cost, accepted))
+        cells_of_row = (record["file"], first, last, record["performer"], record[column])
+        rows.append(FamilyRow(*cells_of_row, cost, accepted))
     return rows
 
 
@@ -301,17 +313,17 @@ def find_families(
     """
     corpus = motion_features.build_corpus(recordings)
     joined = motion_features.join_features(corpus)
-    found = []
+    families = []
     for family in family_search.find_families(corpus, count, report):
         quality = family_search.assess(joined, family)
         rows = [_row(corpus, member.span, member.cost, kinds) for member in family.members]
         example = _row(corpus, family.example, 0.0, kinds)
-        own = FoundFamily(
+        family_found = FoundFamily(
             "motions", tuple(rows), example, (), family.seconds, quality, {}, quality.reasons
         )
-        found.append(_of_one_topology(own, kinds, recordings))
+        families.append(_of_one_topology(family_found, kinds, recordings))
     strides = _strides(recordings, kinds)
-    return found if strides is None else [*found, strides]
+    return families if strides is None else [*families, strides]
 
 
 def _row(
@@ -324,25 +336,25 @@ def _clip(
     recording: Recording, first: int, last: int, cost: float | None, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
     # A mirrored copy swaps the bones of both sides, but its performer is that of the recording.
-    who = recording.original
-    performer = next(kind.performers[who] for kind in kinds if who in kind.performers)
+    original = recording.original
+    performer = next(kind.performers[original] for kind in kinds if original in kind.performers)
     return FamilyRow(recording.file, first, last, performer, recording.original_name, cost)
 
 
 def _strides(recordings: Sequence[Recording], kinds: Sequence[BodyKind]) -> FoundFamily | None:
     """Return the strides that travel as a family; None if there are few."""
-    found = [
+    pairs = [
         (recording, one)
         for recording in recordings
         for one in found_clips.find_strides(recording)
         if one.travels
     ]
-    if len(found) < STRIDE_CLIPS:
+    if len(pairs) < STRIDE_CLIPS:
         return None
-    rows = [_clip(recording, one.first, one.last, None, kinds) for recording, one in found]
-    seconds = sorted((one.last - one.first) / recording.rate for recording, one in found)
-    own = FoundFamily("strides", tuple(rows), None, (), seconds[len(seconds) // 2], None, {}, ())
-    return _of_one_topology(own, kinds, recordings)
+    rows = [_clip(recording, one.first, one.last, None, kinds) for recording, one in pairs]
+    seconds = sorted((one.last - one.first) / recording.rate for recording, one in pairs)
+    family = FoundFamily("strides", tuple(rows), None, (), seconds[len(seconds) // 2], None, {}, ())
+    return _of_one_topology(family, kinds, recordings)
 
 
 def _of_one_topology(
@@ -358,20 +370,24 @@ def _of_one_topology(
     common = [at for at, _ in counts.most_common()]
     if len(common) > 1 and not can_share([kinds[at] for at in common]):
         common = common[:1]
-    kept, left_out = [], {}
+    kept_rows, left_out = [], {}
     for row in family.rows:
-        whole = by_file[row.file].is_whole(row.first_frame, row.last_frame)
-        if numbers[row.file] in common and whole:
-            kept.append(row)
+        is_whole = by_file[row.file].is_whole(row.first_frame, row.last_frame)
+        if numbers[row.file] in common and is_whole:
+            kept_rows.append(row)
         else:
-            place = f"{row.file}@{row.first_frame / by_file[row.file].rate:.1f}"
-            left_out[place] = "a joint leaps" if not whole else "other joints than most clips"
+            clip_name = f"{row.file}@{row.first_frame / by_file[row.file].rate:.1f}"
+            left_out[clip_name] = (
+                "a joint leaps" if not is_whole else "other joints than most clips"
+            )
     reasons = family.reasons
-    if len(kept) < FEWEST:
-        reasons = (*reasons, f"{len(kept)} clips of one skeleton, expected {FEWEST} or more")
-    if len({row.recording for row in kept}) < 2:
+    if len(kept_rows) < FEWEST:
+        reasons = (*reasons, f"{len(kept_rows)} clips of one skeleton, expected {FEWEST} or more")
+    if len({row.recording for row in kept_rows}) < 2:
         reasons = (*reasons, "clips of one recording, expected two recordings or more")
     # Clips in which a joint leaps may have been all of a kind.
-    left = {numbers[row.file] for row in kept} or {common[0]}
-    own = tuple(kinds[at] for at in common if at in left)
-    return replace(family, rows=tuple(kept), kinds=own, left_out=left_out, reasons=reasons)
+    left = {numbers[row.file] for row in kept_rows} or {common[0]}
+    family_kinds = tuple(kinds[at] for at in common if at in left)
+    return replace(
+        family, rows=tuple(kept_rows), kinds=family_kinds, left_out=left_out, reasons=reasons
+    )

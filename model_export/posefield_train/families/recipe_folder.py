@@ -29,42 +29,42 @@ def propose(
     rows: Sequence[FamilyRow],
     data: Path,
     roles: dict[str, str],
-    known: MotionFiles | None = None,
+    files_read: MotionFiles | None = None,
 ) -> ControlProposal:
     """Return the proposed controls of a family.
 
     text: of a recipe with any control. name: of its table without the ending. data: folder of the
-    recordings. roles: joints by role. known: files that were read before. Raises MotionError for
+    recordings. roles: joints by role. files_read: before. Raises MotionError for
     clips that cannot be read as one family, and ValueError for those that no control can be
     proposed for.
     """
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        (place / f"{name}.csv").write_bytes(found_families.table(rows))
-        (place / f"{name}.toml").write_text(text, encoding="utf-8")
-        own = recipe.read(place / f"{name}.toml")
-        examples, _ = ingest.ingest(own, data, known)
-        found = control_proposals.propose_controls(_family_clips(own, examples))
-        if not found.controls:
+        scratch = Path(folder)
+        (scratch / f"{name}.csv").write_bytes(found_families.table(rows))
+        (scratch / f"{name}.toml").write_text(text, encoding="utf-8")
+        draft = recipe.read(scratch / f"{name}.toml")
+        examples, _ = ingest.ingest(draft, data, files_read)
+        proposal = control_proposals.propose_controls(_family_clips(draft, examples))
+        if not proposal.controls:
             raise ValueError(
                 "no measure of the clips predicts those of recordings that are left out"
             )
-        if found.event is None:
-            return found
+        if proposal.event is None:
+            return proposal
         # A moment at the start or the end of a clip is refused as an event.
-        lines = proposal_lines(found, roles)
-        (place / f"{name}.toml").write_text(with_proposal(text, lines), encoding="utf-8")
+        lines = proposal_lines(proposal, roles)
+        (scratch / f"{name}.toml").write_text(with_proposal(text, lines), encoding="utf-8")
         try:
-            ingest.ingest(recipe.read(place / f"{name}.toml"), data, known)
+            ingest.ingest(recipe.read(scratch / f"{name}.toml"), data, files_read)
         except MotionError:
-            return replace(found, event=None)
-    return found
+            return replace(proposal, event=None)
+    return proposal
 
 
-def _family_clips(own: Recipe, examples: Sequence[ingest.Example]) -> FamilyClips:
+def _family_clips(family_recipe: Recipe, examples: Sequence[ingest.Example]) -> FamilyClips:
     names = examples[0].clip.skeleton.names
-    roles = {str(role): joint for role, joint in own.roles.items()}
-    if own.skeleton.is_unified:
+    roles = {str(role): joint for role, joint in family_recipe.roles.items()}
+    if family_recipe.skeleton.is_unified:
         roles = common_topology.model_roles(names)
     joints: Mapping[str, int] = {
         role: names.index(joint) for role, joint in roles.items() if joint in names
@@ -74,7 +74,7 @@ def _family_clips(own: Recipe, examples: Sequence[ingest.Example]) -> FamilyClip
         joints,
         tuple(one.row.performer for one in examples),
         tuple(one.recording for one in examples),
-        own.motion.cyclic,
+        family_recipe.motion.cyclic,
     )
 
 
@@ -130,7 +130,7 @@ def recipe_text(facts: RecipeFacts, proposal: ControlProposal, accepted: bool = 
     return "\n".join(
         [
             "# Found by posefield discover: look at its clips in index.html, then accept it.",
-            *(f"# {said}" for said in facts.evidence),
+            *(f"# {sentence}" for sentence in facts.evidence),
             "schema = 1",
             f"name = {quote(facts.name)}",
             f"description = {quote(facts.description)}",
@@ -177,8 +177,10 @@ def with_merged(text: str, clips: str, merged: str) -> str:
     clips: evidence on all clips, in place of that on the family's own. merged: on those merged.
     """
     counted = r"^# \d+ clips of \d+ performers, [\d.]+ s long in the median\.$"
-    found = re.sub(counted, lambda _: f"# {clips}", text, count=1, flags=re.M)
-    return re.sub(r"^schema = ", lambda own: f"# {merged}\n{own[0]}", found, count=1, flags=re.M)
+    counted_text = re.sub(counted, lambda _: f"# {clips}", text, count=1, flags=re.M)
+    return re.sub(
+        r"^schema = ", lambda start: f"# {merged}\n{start[0]}", counted_text, count=1, flags=re.M
+    )
 
 
 def with_accepted(text: str, accepted: bool) -> str:
@@ -212,8 +214,8 @@ def proposal_lines(proposal: ControlProposal, roles: dict[str, str]) -> list[str
 
 def control_name(control: ProposedControl) -> str:
     """Return the name of a control, such as right_hand_height_end."""
-    parts = [control.role, control.quantity, control.at]
-    return "_".join(re.sub(r"([A-Z])", r"_\1", part).lower() for part in parts if part)
+    words = [control.role, control.quantity, control.at]
+    return "_".join(re.sub(r"([A-Z])", r"_\1", word).lower() for word in words if word)
 
 
 def _evidence(proposal: ControlProposal) -> list[str]:
@@ -221,8 +223,8 @@ def _evidence(proposal: ControlProposal) -> list[str]:
     single = len(proposal.controls) - len(proposal.remaining) + 1
     lines = []
     for at, left in enumerate(proposal.remaining):
-        named = ", ".join(control_name(one) for one in proposal.controls[: single + at])
-        lines.append(f"# {left:.0%} of the variance of recordings left out remains with {named}")
+        names = ", ".join(control_name(one) for one in proposal.controls[: single + at])
+        lines.append(f"# {left:.0%} of the variance of recordings left out remains with {names}")
     return lines
 
 
@@ -256,16 +258,16 @@ class FoundFamilies:
 
 
 def offer(
-    found: Sequence[FoundFamily], data: Path, licence: str, known: MotionFiles | None = None
+    families: Sequence[FoundFamily], data: Path, licence: str, files_read: MotionFiles | None = None
 ) -> FoundFamilies:
     """Return the families with recipes, in the order found, numbered from 1.
 
-    data: folder of the recordings. known: files that were read before. A family whose clips cannot
+    data: folder of the recordings. files_read: before. A family whose clips cannot
     be read together, or that no control predicts, is refused with the reason.
     """
     offered: list[OfferedFamily] = []
     refused = []
-    for family in found:
+    for family in families:
         if family.reasons:
             refused.append(family)
             continue
@@ -273,18 +275,18 @@ def offer(
         draft = replace(facts, licence="not stated yet")
         text = recipe_text(draft, PLACEHOLDER)
         try:
-            proposal = propose(text, facts.name, family.rows, data, facts.report.roles, known)
+            proposal = propose(text, facts.name, family.rows, data, facts.report.roles, files_read)
         except (MotionError, ValueError) as fault:
             refused.append(replace(family, reasons=(str(fault),)))
             continue
-        told = recipe_text(facts, proposal)
-        offered.append(OfferedFamily(len(offered) + 1, family, facts, proposal, told))
+        recipe_content = recipe_text(facts, proposal)
+        offered.append(OfferedFamily(len(offered) + 1, family, facts, proposal, recipe_content))
     return FoundFamilies(tuple(offered), tuple(refused))
 
 
 def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
-    kind, own = family.kinds[0], family.kinds
-    is_mixed = len(own) > 1
+    kind, kinds = family.kinds[0], family.kinds
+    is_mixed = len(kinds) > 1
     performers = {row.performer for row in family.rows}
     what = "Strides" if family.kind == "strides" else "Similar motions"
     evidence = [clips_text(len(family.rows), len(performers), family.seconds)]
@@ -297,19 +299,23 @@ def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
         family_name(number),
         f"{what} found in long recordings, family {number}",
         licence,
-        found_families.shared_report(kind.report, own) if is_mixed else kind.report,
+        found_families.shared_report(kind.report, kinds) if is_mixed else kind.report,
         family.kind == "strides",
         len(performers) > 1,
         tuple(evidence),
-        tuple(found_families.skeleton_lines(own)) if is_mixed else (),
+        tuple(found_families.skeleton_lines(kinds)) if is_mixed else (),
     )
 
 
 def summary(
-    found: FoundFamilies, folder: Path, read: ReadRecordings, kinds: Sequence[BodyKind], count: int
+    families: FoundFamilies,
+    folder: Path,
+    read: ReadRecordings,
+    kinds: Sequence[BodyKind],
+    count: int,
 ) -> dict[str, Any]:
     """Return all that was found as JSON values. count: of candidates that were searched."""
-    performers = {file: who for kind in kinds for file, who in kind.performers.items()}
+    performers = {file: performer for kind in kinds for file, performer in kind.performers.items()}
     return {
         "folder": folder.as_posix(),
         "versions": {"posefield": posefield.__version__},
@@ -338,16 +344,16 @@ def summary(
                 **proposal_facts(one.proposal),
                 "roles": one.facts.report.roles,
             }
-            for one in found.offered
+            for one in families.offered
         ],
-        "not_offered": [_family_facts(one) | {"reasons": one.reasons} for one in found.refused],
+        "not_offered": [_family_facts(one) | {"reasons": one.reasons} for one in families.refused],
     }
 
 
 def proposal_facts(proposal: ControlProposal) -> dict[str, Any]:
     """Return the proposed event and controls as JSON values."""
     return {
-        "controls": [control_name(own) for own in proposal.controls],
+        "controls": [control_name(control) for control in proposal.controls],
         "event": proposal.event,
         "remaining": [round(left, 4) for left in proposal.remaining],
     }
@@ -372,10 +378,10 @@ def _family_facts(family: FoundFamily) -> dict[str, Any]:
     }
 
 
-def contents(found: FoundFamilies, facts: Mapping[str, Any]) -> dict[str, bytes]:
+def contents(families: FoundFamilies, facts: Mapping[str, Any]) -> dict[str, bytes]:
     """Return the files of the folder, but for the page, by name."""
     files = {SUMMARY: json_bytes(facts)}
-    for one in found.offered:
+    for one in families.offered:
         files[f"{one.name}.toml"] = one.text.encode()
         files[f"{one.name}.csv"] = found_families.table(one.family.rows)
     return files

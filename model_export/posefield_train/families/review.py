@@ -56,18 +56,18 @@ def of_texts(
     "2:bd_1.bvh@33.2". Raises InvalidField for a text that is none, and for contradictions.
     """
     pairs = [_numbers("merge", text) for text in merge]
-    if odd := next((text for text, own in zip(merge, pairs, strict=True) if len(own) != 2), None):
+    if odd := next((text for text, pair in zip(merge, pairs, strict=True) if len(pair) != 2), None):
         raise InvalidField("merge", f"{odd!r}, expected two numbers of families, such as 4,5")
     accepted = _numbers("accept", accept) if accept else ()
     rejected = _numbers("reject", reject) if reject else ()
     clips = []
     for text in drop:
-        parts = DROP.fullmatch(text)
-        if parts is None:
+        match = DROP.fullmatch(text)
+        if match is None:
             expected = "expected FAMILY:FILE@SECONDS, such as 2:bd_1.bvh@33.2"
             raise InvalidField("drop", f"{text!r}, {expected}")
-        clips.append(DroppedClip(int(parts[1]), parts[2], float(parts[3])))
-    merged = tuple((own[0], own[1]) for own in pairs)
+        clips.append(DroppedClip(int(match[1]), match[2], float(match[3])))
+    merged = tuple((pair[0], pair[1]) for pair in pairs)
     both = sorted(set(accepted) & set(rejected))
     if both:
         raise InvalidField("reject", f"{both[0]} is accepted too, expected one of both")
@@ -76,21 +76,26 @@ def of_texts(
         if first == second or first in seconds or seconds.count(second) > 1:
             raise InvalidField("merge", f"{first},{second}: expected each family merged once")
         if second in accepted or second in rejected:
-            said = f"{second} goes into {first}, expected no other decision on it"
-            raise InvalidField("merge", said)
+            fault = f"{second} goes into {first}, expected no other decision on it"
+            raise InvalidField("merge", fault)
     return Decisions(accepted, rejected, merged, tuple(clips))
 
 
 def read(path: Path) -> Decisions:
     """Return the decisions of a JSON file, which the page saves; FileError for another file."""
     try:
-        found = json.loads(data_folder.read(path, MAX_DECISIONS_BYTES, "decisions"))
+        decisions = json.loads(data_folder.read(path, MAX_DECISIONS_BYTES, "decisions"))
     except (ValueError, RecursionError) as fault:
         raise FileError(path, f"not JSON: {fault}") from fault
-    if not isinstance(found, dict) or not set(found) <= {"accept", "reject", "merge", "drop"}:
+    if not isinstance(decisions, dict) or not set(decisions) <= {
+        "accept",
+        "reject",
+        "merge",
+        "drop",
+    }:
         raise FileError(path, "expected an object of accept, reject, merge and drop")
-    lists = {key: found.get(key, []) for key in ("accept", "reject", "merge", "drop")}
-    if not all(isinstance(own, list) for own in lists.values()):
+    lists = {key: decisions.get(key, []) for key in ("accept", "reject", "merge", "drop")}
+    if not all(isinstance(values, list) for values in lists.values()):
         raise FileError(path, "expected a list for each decision")
     return of_texts(
         ",".join(map(str, lists["accept"])),
@@ -136,19 +141,21 @@ def apply(folder: Path, decisions: Decisions, data: Path | None = None) -> dict[
     nothing. Raises InvalidField for a family or a clip that the folder does not have, and FileError
     for a folder that posefield discover did not write; no file is changed then.
     """
-    own = _read(folder, data)
-    _check_numbers(own, decisions)
+    reviewed = _read(folder, data)
+    _check_numbers(reviewed, decisions)
     for clip in decisions.drop:
-        _drop(own, clip)
+        _drop(reviewed, clip)
     for first, second in decisions.merge:
-        if own.family(second)["status"] != "merged":
-            _merge(own, first, second)
+        if reviewed.family(second)["status"] != "merged":
+            _merge(reviewed, first, second)
     for numbers, status in ((decisions.accept, "accepted"), (decisions.reject, "rejected")):
         for number in numbers:
-            own.family(number)["status"] = status
-            own.texts[number] = recipe_folder.with_accepted(own.texts[number], status == "accepted")
-    _write(folder, own)
-    return own.facts
+            reviewed.family(number)["status"] = status
+            reviewed.texts[number] = recipe_folder.with_accepted(
+                reviewed.texts[number], status == "accepted"
+            )
+    _write(folder, reviewed)
+    return reviewed.facts
 
 
 def _read(folder: Path, data: Path | None) -> ReviewedFolder:
@@ -165,58 +172,60 @@ def _read(folder: Path, data: Path | None) -> ReviewedFolder:
     texts, rows = {}, {}
     for number in numbers:
         name = recipe_folder.family_name(number)
-        found = data_folder.read(folder / f"{name}.toml", MAX_FAMILIES_BYTES, "a recipe")
-        texts[number] = found.decode(errors="strict").replace(*FORMER_KEY)
+        content = data_folder.read(folder / f"{name}.toml", MAX_FAMILIES_BYTES, "a recipe")
+        texts[number] = content.decode(errors="strict").replace(*FORMER_KEY)
         rows[number] = found_families.read(folder / f"{name}.csv")
     return ReviewedFolder(data or Path(facts["folder"]), facts, texts, rows)
 
 
-def _check_numbers(own: ReviewedFolder, decisions: Decisions) -> None:
+def _check_numbers(reviewed: ReviewedFolder, decisions: Decisions) -> None:
     """Raise InvalidField for a family that is unknown, or was merged by another decision."""
-    merged = {one["number"]: one.get("into") for one in own.facts["families"]}
+    merged = {one["number"]: one.get("into") for one in reviewed.facts["families"]}
     again = {second for first, second in decisions.merge if merged.get(second) == first}
     for field, number in decisions.numbers():
-        if number not in own.texts and number not in again:
+        if number not in reviewed.texts and number not in again:
             into = merged.get(number)
             gone = f", which was merged into {into}" if into else ""
-            known = ", ".join(map(str, own.texts))
-            raise InvalidField(field, f"family {number}{gone}, expected one of {known}")
+            numbers = ", ".join(map(str, reviewed.texts))
+            raise InvalidField(field, f"family {number}{gone}, expected one of {numbers}")
 
 
-def _drop(own: ReviewedFolder, clip: DroppedClip) -> None:
+def _drop(reviewed: ReviewedFolder, clip: DroppedClip) -> None:
     """Mark the clip of a family that a file and a time name as not accepted."""
     # A family that the same decisions merged before has its clips in the other one.
-    number = own.family(clip.family).get("into", clip.family)
-    recordings, rows = own.facts["recordings"], own.rows[number]
-    found = [
+    number = reviewed.family(clip.family).get("into", clip.family)
+    recordings, rows = reviewed.facts["recordings"], reviewed.rows[number]
+    indices = [
         at
         for at, row in enumerate(rows)
         if (row.file == clip.file or row.file.endswith(f"/{clip.file}"))
         and row.first_frame <= clip.at * recordings[row.file]["rate"] <= row.last_frame
     ]
-    if len(found) != 1:
+    if len(indices) != 1:
         starts = [
             f"{row.file}@{row.first_frame / recordings[row.file]['rate']:.1f}" for row in rows
         ]
-        known = ", ".join(starts[:8]) + (" and others" if len(starts) > 8 else "")
-        what = f"{len(found)} clips at {clip}" if found else f"no clip at {clip}"
-        raise InvalidField("drop", f"{what}, expected one of {known}")
-    rows[found[0]] = replace(rows[found[0]], accepted=False)
+        examples = ", ".join(starts[:8]) + (" and others" if len(starts) > 8 else "")
+        what = f"{len(indices)} clips at {clip}" if indices else f"no clip at {clip}"
+        raise InvalidField("drop", f"{what}, expected one of {examples}")
+    rows[indices[0]] = replace(rows[indices[0]], accepted=False)
 
 
-def _merge(own: ReviewedFolder, first: int, second: int) -> None:
+def _merge(reviewed: ReviewedFolder, first: int, second: int) -> None:
     """Move the clips of a family into another, and propose its event and controls again."""
-    into, gone = own.family(first), own.family(second)
+    into, gone = reviewed.family(first), reviewed.family(second)
     if into["kind"] != gone["kind"]:
         said = f"{first} are {into['kind']} and {second} {gone['kind']}, expected the same"
         raise InvalidField("merge", said)
-    known = {row.frames for row in own.rows[first]}
-    moved = [row for row in own.rows.pop(second) if row.frames not in known]
-    own.rows[first] += moved
-    own.texts.pop(second)
-    into["performers"] = sorted({row.performer for row in own.rows[first]})
-    rates = {file: float(recording["rate"]) for file, recording in own.facts["recordings"].items()}
-    spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in own.rows[first]]
+    frames = {row.frames for row in reviewed.rows[first]}
+    new_rows = [row for row in reviewed.rows.pop(second) if row.frames not in frames]
+    reviewed.rows[first] += new_rows
+    reviewed.texts.pop(second)
+    into["performers"] = sorted({row.performer for row in reviewed.rows[first]})
+    rates = {
+        file: float(recording["rate"]) for file, recording in reviewed.facts["recordings"].items()
+    }
+    spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in reviewed.rows[first]]
     into["seconds"] = round(statistics.median(spans), 3)
     into["left_out"] |= gone["left_out"]
     evidence = f"Family {second} was merged into it: {gone['clips']} clips"
@@ -226,34 +235,38 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
             "motion is common"
         )
     text = recipe_folder.with_merged(
-        own.texts[first],
-        recipe_folder.clips_text(len(own.rows[first]), len(into["performers"]), into["seconds"]),
+        reviewed.texts[first],
+        recipe_folder.clips_text(
+            len(reviewed.rows[first]), len(into["performers"]), into["seconds"]
+        ),
         f"{evidence}.",
     )
     draft = re.sub('^licence = ""$', 'licence = "not stated yet"', text, count=1, flags=re.M)
     name = recipe_folder.family_name(first)
     try:
-        found = recipe_folder.propose(draft, name, own.rows[first], own.data, into["roles"])
+        proposal = recipe_folder.propose(
+            draft, name, reviewed.rows[first], reviewed.data, into["roles"]
+        )
     except (MotionError, ValueError) as fault:
         said = f"the clips of {first} and those merged into it make no family: {fault}"
         raise InvalidField("merge", said) from fault
-    own.texts[first] = recipe_folder.with_proposal(
-        text, recipe_folder.proposal_lines(found, into["roles"])
+    reviewed.texts[first] = recipe_folder.with_proposal(
+        text, recipe_folder.proposal_lines(proposal, into["roles"])
     )
-    into |= recipe_folder.proposal_facts(found)
-    into["clips"] = len(own.rows[first])
+    into |= recipe_folder.proposal_facts(proposal)
+    into["clips"] = len(reviewed.rows[first])
     gone |= {"status": "merged", "into": first}
 
 
-def _write(folder: Path, own: ReviewedFolder) -> None:
-    for number, text in own.texts.items():
+def _write(folder: Path, reviewed: ReviewedFolder) -> None:
+    for number, text in reviewed.texts.items():
         name = recipe_folder.family_name(number)
         atomic_files.write(text.encode(), folder / f"{name}.toml")
-        atomic_files.write(found_families.table(own.rows[number]), folder / f"{name}.csv")
-    for one in own.facts["families"]:
+        atomic_files.write(found_families.table(reviewed.rows[number]), folder / f"{name}.csv")
+    for one in reviewed.facts["families"]:
         if one["status"] == "merged":
             for ending in ("toml", "csv"):
                 name = recipe_folder.family_name(one["number"])
                 (folder / f"{name}.{ending}").unlink(missing_ok=True)
     # The summary is last: a review that was interrupted is repeated.
-    atomic_files.write(recipe_folder.json_bytes(own.facts), folder / recipe_folder.SUMMARY)
+    atomic_files.write(recipe_folder.json_bytes(reviewed.facts), folder / recipe_folder.SUMMARY)

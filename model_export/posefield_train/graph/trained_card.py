@@ -265,7 +265,7 @@ def card_labels(label_names: LabelNames, samples: SamplePoints) -> tuple[LabelSe
 def _recordings(examples: Sequence[Example]) -> tuple[int, ...]:
     """Return the number (N,) of each example's recording; empty where each file is one."""
     recordings = sample_points.recording_numbers(examples)
-    files = np.unique([example.row.place.name for example in examples], return_inverse=True)[1]
+    files = np.unique([example.row.file.name for example in examples], return_inverse=True)[1]
     pairs = len({*zip(recordings.tolist(), files.tolist(), strict=True)})
     one_each = pairs == len(np.unique(recordings)) == len(np.unique(files))
     return () if one_each else tuple(recordings.tolist())
@@ -369,7 +369,7 @@ def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
     return {
         "licence": recipe.licence,
         "recipe_sha256": hashlib.sha256(recipe.model_dump_json().encode()).hexdigest(),
-        "data_sha256": data_digest({str(e.row.place.name): e for e in examples}),
+        "data_sha256": data_digest({str(e.row.file.name): e for e in examples}),
         "clips": len(examples),
         "versions": {name: version(name) for name in ("posefield", "numpy", "scipy", "onnx")},
     }
@@ -381,7 +381,7 @@ def data_digest(files: Mapping[str, Example]) -> str:
     files: clips by the names of their motion files. Files of curves count as well.
     """
     total = hashlib.sha256()
-    locations = {name: example.row.place for name, example in files.items()}
+    locations = {name: example.row.file for name, example in files.items()}
     curves = (example.row.curve_place for example in files.values())
     locations |= {location.name: location for location in curves if location is not None}
     for name in sorted(locations):

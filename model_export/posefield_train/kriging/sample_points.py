@@ -239,7 +239,7 @@ def _points(examples: Sequence[Example]) -> SampleControls:
 
 def recording_numbers(examples: Sequence[Example]) -> Annotated[Indices, "{len(examples)}"]:
     """Return the number (N,) of each example's recording; of its file without one."""
-    recordings = [example.recording or str(example.row.place) for example in examples]
+    recordings = [example.recording or str(example.row.file) for example in examples]
     return np.unique(recordings, return_inverse=True)[1]
 
 

@@ -67,7 +67,7 @@ class ProbeReport:
             "joints": list(self.joints),
             "roles": self.roles,
             "role_confidence": {role: asdict(guess) for role, guess in self.guesses.items()},
-            "proposed": {name: asdict(found) for name, found in self.proposed.items()},
+            "proposed": {name: asdict(proposal) for name, proposal in self.proposed.items()},
             "warnings": list(self.warnings),
             "refused": self.refused,
         }
@@ -85,117 +85,125 @@ def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None)
     faulty: list[str] = []
     for count, path in enumerate(paths, 1):
         try:
-            own = proposals.measure(motion_readers.read(path))
+            figure = proposals.measure(motion_readers.read(path))
         except FileError as fault:
             faults[path] = fault
             report(count)
             continue
-        faulty += [f"{path}: {said}" for said in proposals.faults(own)]
-        own = own.without_frames()
-        measured[tuple(own.names)] += 1
-        whole = measured[tuple(own.names)] <= proposals.MOST_WHOLE
-        figures[path] = own if whole else own.with_few_frames()
+        faulty += [f"{path}: {fault_text}" for fault_text in proposals.faults(figure)]
+        figure = figure.without_frames()
+        measured[tuple(figure.names)] += 1
+        keeps_all = measured[tuple(figure.names)] <= proposals.MOST_WHOLE
+        figures[path] = figure if keeps_all else figure.with_few_frames()
         report(count)
     if not figures:
         raise next(iter(faults.values()))
-    found = report_of(list(figures), list(figures.values()))
+    report_of_files = report_of(list(figures), list(figures.values()))
     if len(faulty) > SHOWN_FAULTS:
         faulty[SHOWN_FAULTS:] = [f"{len(faulty) - SHOWN_FAULTS} further faults of frames"]
-    reasons = {str(path): motion_readers.reason(own, path) for path, own in faults.items()}
-    return replace(found, warnings=(*found.warnings, *faulty), refused=reasons)
+    reasons = {str(path): motion_readers.reason(figure, path) for path, figure in faults.items()}
+    return replace(report_of_files, warnings=(*report_of_files.warnings, *faulty), refused=reasons)
 
 
 def report_of(paths: Sequence[Path], figures: Sequence[Figure]) -> ProbeReport:
     """Return the report on the figures of motion files."""
-    common, _ = Counter(tuple(each.names) for each in figures).most_common(1)[0]
-    usual = [each for each in figures if tuple(each.names) == common]
-    up = proposals.propose_up(usual)
+    common, _ = Counter(tuple(figure.names) for figure in figures).most_common(1)[0]
+    alike = [figure for figure in figures if tuple(figure.names) == common]
+    up = proposals.propose_up(alike)
     files = tuple(
-        FileFacts(str(path), each.file.format, each.frames, each.file.rate)
-        for path, each in zip(paths, figures, strict=True)
+        FileFacts(str(path), figure.file.format, figure.frames, figure.file.rate)
+        for path, figure in zip(paths, figures, strict=True)
     )
     proposed = {
-        "metres_per_unit": proposals.propose_unit(usual),
+        "metres_per_unit": proposals.propose_unit(alike),
         "up": up,
         "fps": _propose_rate(figures),
-        "feet": proposals.propose_feet(usual, up.value),
-        "facing": proposals.propose_facing(usual, up.value),
+        "feet": proposals.propose_feet(alike, up.value),
+        "facing": proposals.propose_facing(alike, up.value),
         "licence": LICENCE,
     }
-    return ProbeReport(files, common, usual[0].guesses, proposed, tuple(_warnings(figures, usual)))
+    return ProbeReport(files, common, alike[0].guesses, proposed, tuple(_warnings(figures, alike)))
 
 
 def _propose_rate(figures: Sequence[Figure]) -> Proposal:
-    rates = Counter(each.file.rate for each in figures if each.file.rate is not None)
+    rates = Counter(figure.file.rate for figure in figures if figure.file.rate is not None)
     if not rates:
         return Proposal(None, "none", ("the files state no rate: ask who captured them",))
-    said = sorted({each.file.evidence for each in figures if each.file.rate is not None})
-    evidence = f"{', '.join(said[:5])} in the files"
+    evidences = sorted({figure.file.evidence for figure in figures if figure.file.rate is not None})
+    evidence = f"{', '.join(evidences[:5])} in the files"
     rate, count = rates.most_common(1)[0]
     meant, doubt = motion_file.doubted_rate(rate)
     if doubt:
         return Proposal(meant, "low" if meant else "none", (evidence, doubt))
     if count < len(figures):
-        counted = ", ".join(f"{count} files at {each:g}" for each, count in rates.most_common(5))
+        counted = ", ".join(
+            f"{count} files at {figure:g}" for figure, count in rates.most_common(5)
+        )
         return Proposal(rate, "medium", (evidence, counted))
     return Proposal(rate, "certain", (evidence,))
 
 
-def _warnings(figures: Sequence[Figure], usual: Sequence[Figure]) -> list[str]:
+def _warnings(figures: Sequence[Figure], alike: Sequence[Figure]) -> list[str]:
     """Return what keeps the files from being trained together, and joints that hint at damage."""
-    found = ingest.reader_notes({each.file.source: each.file for each in figures})
-    if len(usual) < len(figures):
-        odd = next(each for each in figures if each.names != usual[0].names)
-        differ = sorted(set(odd.names) ^ set(usual[0].names))[:6]
-        found.append(
-            f"{len(figures) - len(usual)} of {len(figures)} files have other joints, such as "
+    warnings = ingest.reader_notes({figure.file.source: figure.file for figure in figures})
+    if len(alike) < len(figures):
+        odd = next(figure for figure in figures if figure.names != alike[0].names)
+        differ = sorted(set(odd.names) ^ set(alike[0].names))[:6]
+        warnings.append(
+            f"{len(figures) - len(alike)} of {len(figures)} files have other joints, such as "
             f"{odd.file.source} ({', '.join(differ) or 'another order'}): one model needs one "
             "skeleton"
         )
-    found += _mixed_settings(usual)
-    still = [each for each in usual if not each.moves[0] and any(each.moves)]
+    warnings += _mixed_settings(alike)
+    still = [figure for figure in alike if not figure.moves[0] and any(figure.moves)]
     if still:
         mover = still[0].names[still[0].moves.index(True)]
-        beside = [
+        siblings = [
             name
             for name, parent in zip(still[0].names, still[0].file.skeleton.parents, strict=True)
             if parent == 0 and name != mover
         ]
         then = f"training takes {mover!r} as the root"
-        if beside:
-            then += f" where motion.drop_joints = {beside[:6]} leaves out what is beside it"
-        found.append(f"the root {still[0].names[0]!r} stays in place while {mover!r} moves: {then}")
-    stretching = [each for each in usual if any(each.moves[1:])]
+        if siblings:
+            then += f" where motion.drop_joints = {siblings[:6]} leaves out what is beside it"
+        warnings.append(
+            f"the root {still[0].names[0]!r} stays in place while {mover!r} moves: {then}"
+        )
+    stretching = [figure for figure in alike if any(figure.moves[1:])]
     if stretching and not still:
-        found.append(
-            f"{len(stretching)} of {len(usual)} files have bones whose length changes; training "
+        warnings.append(
+            f"{len(stretching)} of {len(alike)} files have bones whose length changes; training "
             "keeps their mean"
         )
-    return found
+    return warnings
 
 
-def _mixed_settings(usual: Sequence[Figure]) -> list[str]:
+def _mixed_settings(alike: Sequence[Figure]) -> list[str]:
     """Return the warnings on files in another unit, or with another up axis, than most."""
-    found = []
-    legs = {each.file.source: leg for each in usual if (leg := each.leg_length())}
+    warnings = []
+    legs = {figure.file.source: leg for figure in alike if (leg := figure.leg_length())}
     middle = float(np.median(list(legs.values()))) if legs else 0.0
-    least = OTHER_UNIT
-    odd = [own for own, leg in legs.items() if max(leg, middle) > least * min(leg, middle)]
+    limit = OTHER_UNIT
+    odd = [source for source, leg in legs.items() if max(leg, middle) > limit * min(leg, middle)]
     if odd:
-        found.append(
-            f"{len(odd)} of {len(usual)} files are in another unit, such as {odd[0]}, whose legs "
+        warnings.append(
+            f"{len(odd)} of {len(alike)} files are in another unit, such as {odd[0]}, whose legs "
             f"are {legs[odd[0]]:.4g} units long, and {middle:.4g} in the median: a recipe has one"
         )
-    axes = {each.file.source: proposals.propose_up([each]) for each in usual}
-    sure = {own: axis.value for own, axis in axes.items() if axis.confidence in ("certain", "high")}
+    axes = {figure.file.source: proposals.propose_up([figure]) for figure in alike}
+    sure = {
+        source: axis.value
+        for source, axis in axes.items()
+        if axis.confidence in ("certain", "high")
+    }
     counts = Counter(sure.values()).most_common()
     if len(counts) > 1:
-        other = next(own for own, axis in sure.items() if axis != counts[0][0])
-        found.append(
+        other = next(source for source, axis in sure.items() if axis != counts[0][0])
+        warnings.append(
             f"files have different up axes, such as {sure[other]} in {other} and {counts[0][0]} in "
             f"{counts[0][1]} files: a recipe has one"
         )
-    return found
+    return warnings
 
 
 UNITS = {"metres_per_unit": " m", "fps": " frames a second", "facing": " degrees"}
@@ -226,10 +234,10 @@ def text(report: ProbeReport) -> str:
 def summary(report: ProbeReport, with_evidence: bool = False) -> list[str]:
     """Return lines with the proposals and the warnings."""
     lines = []
-    for name, found in report.proposed.items():
-        lines.append(f"{name:<15} {_value(name, found)} (confidence: {found.confidence})")
-        lines += [f"{'':<18}{said}" for said in found.evidence if with_evidence]
-    return [*lines, *(f"warning: {said}" for said in report.warnings)]
+    for name, proposal in report.proposed.items():
+        lines.append(f"{name:<15} {_value(name, proposal)} (confidence: {proposal.confidence})")
+        lines += [f"{'':<18}{sentence}" for sentence in proposal.evidence if with_evidence]
+    return [*lines, *(f"warning: {sentence}" for sentence in report.warnings)]
 
 
 def _roles(report: ProbeReport) -> str:
@@ -239,12 +247,14 @@ def _roles(report: ProbeReport) -> str:
     )
 
 
-def _value(name: str, found: Proposal) -> str:
-    if found.value is None or found.value == []:
+def _value(name: str, proposal: Proposal) -> str:
+    if proposal.value is None or proposal.value == []:
         return "unknown"
-    is_list, is_number = (isinstance(found.value, kind) for kind in (list, float))
-    shown = ", ".join(found.value) if is_list else f"{found.value:{'.7g' if is_number else ''}}"
-    return f"{shown}{UNITS.get(name, '')}"
+    is_list, is_number = (isinstance(proposal.value, kind) for kind in (list, float))
+    text = (
+        ", ".join(proposal.value) if is_list else f"{proposal.value:{'.7g' if is_number else ''}}"
+    )
+    return f"{text}{UNITS.get(name, '')}"
 
 
 def _span(values: Sequence[float], form: str) -> str:

@@ -70,8 +70,8 @@ class Figure:
 
     def without_frames(self) -> "Figure":
         """Return the figure with the first frame alone of its file, whose others take memory."""
-        own = self.file
-        first = replace(own, rotations=own.rotations[:1], translations=own.translations[:1])
+        file = self.file
+        first = replace(file, rotations=file.rotations[:1], translations=file.translations[:1])
         return replace(self, file=first)
 
     def with_few_frames(self) -> "Figure":
@@ -112,10 +112,12 @@ def faults(measured: Figure) -> list[str]:
         return []
     columns = [measured.names.index(joint) for joint in joints]
     bones = file.skeleton
-    moved = skeleton.positions(bones.parents, file.rotations, file.translations)[:, columns]
+    positions = skeleton.positions(bones.parents, file.rotations, file.translations)[:, columns]
     rest = bones.at_rest(bones.offsets)[columns]
-    found = frame_faults.find_faults(moved * ADULT_LEG / leg, file.rate, rest * ADULT_LEG / leg)
-    return frame_faults.describe(found, joints, file.rate)
+    frame_fault = frame_faults.find_faults(
+        positions * ADULT_LEG / leg, file.rate, rest * ADULT_LEG / leg
+    )
+    return frame_faults.describe(frame_fault, joints, file.rate)
 
 
 Confidence = Literal["certain", "high", "medium", "low", "none"]
@@ -151,8 +153,8 @@ def _stated(values: Sequence[Any], measured: Proposal, unit: str = "") -> Propos
     if None in values:
         return None
     if len(set(values)) > 1:
-        said = f"the files state different values: {', '.join(map(str, sorted(set(values))))}"
-        return Proposal(None, "none", (said, *measured.evidence))
+        sentence = f"the files state different values: {', '.join(map(str, sorted(set(values))))}"
+        return Proposal(None, "none", (sentence, *measured.evidence))
     doubtful = measured.confidence == "high" and measured.value != values[0]
     evidence = f"stated by the files: {values[0]}{unit}"
     if doubtful:
@@ -163,27 +165,27 @@ def _stated(values: Sequence[Any], measured: Proposal, unit: str = "") -> Propos
 
 def _measured_unit(figures: Sequence[Figure]) -> Proposal:
     """Return the length of the files' unit in metres, from the length of the legs."""
-    every = [leg for figure in figures if (leg := figure.leg_length())]
+    lengths = [leg for figure in figures if (leg := figure.leg_length())]
     # Of files in several units those of most.
-    alike = [[leg for leg in every if one / OTHER_UNIT < leg <= one] for one in every]
+    alike = [[leg for leg in lengths if one / OTHER_UNIT < leg <= one] for one in lengths]
     legs = max(alike, key=len, default=[])
     length = float(np.median(legs or [figure.size for figure in figures]))
-    usual, what = (ADULT_LEG, "leg, hip to foot") if legs else (ADULT_SIZE, "largest extent")
+    adult, what = (ADULT_LEG, "leg, hip to foot") if legs else (ADULT_SIZE, "largest extent")
     if length <= 0.0:
         return Proposal(None, "none", (f"{what}: no length",))
-    apart = {name: abs(np.log(length * metres / usual)) for name, metres in UNITS.items()}
-    first, second, third = sorted(apart, key=lambda name: apart[name])[:3]
-    factor = float(np.exp(apart[first]))
+    deviations = {name: abs(np.log(length * metres / adult)) for name, metres in UNITS.items()}
+    first, second, third = sorted(deviations, key=lambda name: deviations[name])[:3]
+    factor = float(np.exp(deviations[first]))
     high, medium = LEG_FACTORS
     confidence: Confidence = "high" if factor < high else "medium" if factor < medium else "low"
     evidence = [
         f"{what}: {length:.4g} units, which is {length * UNITS[first]:.2f} m in {first}; of an "
-        f"adult about {usual} m",
+        f"adult about {adult} m",
         f"the next units: {length * UNITS[second]:.3g} m in {second}, "
         f"{length * UNITS[third]:.3g} m in {third}",
     ]
-    if len(legs) < len(every):
-        evidence.append(f"{len(every) - len(legs)} of {len(every)} files are in another unit")
+    if len(legs) < len(lengths):
+        evidence.append(f"{len(lengths) - len(legs)} of {len(lengths)} files are in another unit")
         confidence = "low"
     if not legs:
         evidence.append("no legs were recognised by their names")
@@ -211,17 +213,17 @@ def _measured_up(figures: Sequence[Figure]) -> Proposal:
             [one for one in at_rest if one is not None], "from the feet to the head at rest"
         ),
     ]
-    found = [(axis, said) for axis, said in votes if axis is not None]
-    evidence = tuple(said for _, said in found)
-    if not found:
+    known_votes = [(axis, sentence) for axis, sentence in votes if axis is not None]
+    evidence = tuple(sentence for _, sentence in known_votes)
+    if not known_votes:
         return Proposal(None, "none", ("neither a head nor feet were recognised",))
-    first = found[0][0]
-    agreeing = sum(axis == first for axis, _ in found)
+    first = known_votes[0][0]
+    agreeing = sum(axis == first for axis, _ in known_votes)
     if first not in ("+y", "+z"):
-        said = f"the up axis seems to be {first}; only +y and +z can be read"
-        return Proposal(None, "none", (*evidence, said))
-    confidence: Confidence = "high" if agreeing == len(found) > 1 else "medium"
-    return Proposal(first[1], "low" if agreeing * 2 < len(found) else confidence, evidence)
+        sentence = f"the up axis seems to be {first}; only +y and +z can be read"
+        return Proposal(None, "none", (*evidence, sentence))
+    confidence: Confidence = "high" if agreeing == len(known_votes) > 1 else "medium"
+    return Proposal(first[1], "low" if agreeing * 2 < len(known_votes) else confidence, evidence)
 
 
 Vote = tuple[str | None, str]
@@ -261,11 +263,11 @@ def _floor_axis(figures: Sequence[Figure]) -> Vote:
     spread = np.mean(spreads, axis=0)
     best = int(np.argmin(spread))
     name = ("+" if best < 3 else "-") + AXES[best % 3]
-    others = np.delete(spread, best).min()
-    said = (
+    second = np.delete(spread, best).min()
+    sentence = (
         f"lowest joint along {name}: moves by {spread[best]:.1%} of the figure's size, along any "
     )
-    return name, f"{said}other axis by {others:.1%} or more"
+    return name, f"{sentence}other axis by {second:.1%} or more"
 
 
 def propose_feet(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
@@ -307,13 +309,13 @@ def propose_facing(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
     mean = float(np.degrees(np.angle(np.mean(np.exp(1j * np.array(angles))))))
     agree = float(np.abs(np.mean(np.exp(1j * np.array(angles)))))
     value = round(mean, 1) + 0.0
-    said = [f"the line between the hips faces {value:g} degrees to the left of the root's +z"]
+    evidence = [f"the line between the hips faces {value:g} degrees to the left of the root's +z"]
     if abs(mean) > 45.0:
-        said.append(
+        evidence.append(
             "training takes +z of the root as forward: say motion.facing = 'hips' to take the "
             "nearest axis"
         )
-    return Proposal(value, "high" if agree > 0.9 and abs(mean) < 45.0 else "low", tuple(said))
+    return Proposal(value, "high" if agree > 0.9 and abs(mean) < 45.0 else "low", tuple(evidence))
 
 
 def _facing(figure: Figure, up: UpAxis) -> float | None:

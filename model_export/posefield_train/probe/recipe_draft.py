@@ -60,13 +60,13 @@ def recipe_name(name: str) -> str:
 
 def read_table(path: Path) -> ClipTable:
     """Return a table that exists; RecipeError if it names no motion files."""
-    found = clip_table.open_table(path)
-    if not found.records:
+    table = clip_table.open_table(path)
+    if not table.records:
         raise RecipeError(path, "no rows below the heading")
-    if not _first_of(found, FILE_COLUMNS):
-        known = ", ".join(FILE_COLUMNS)
-        raise RecipeError(path, f"no column of the motion files, expected one of {known}", 1)
-    return found
+    if not _first_of(table, FILE_COLUMNS):
+        columns = ", ".join(FILE_COLUMNS)
+        raise RecipeError(path, f"no column of the motion files, expected one of {columns}", 1)
+    return table
 
 
 def files_of(table: ClipTable, folder: Path) -> list[Path]:
@@ -109,16 +109,16 @@ def source_lines(report: ProbeReport) -> list[str]:
     """
     unit, up = report.proposed["metres_per_unit"], report.proposed["up"]
     lines = ["[source]"]
-    for key, found in (("metres_per_unit", unit), ("up", up)):
-        lines += [f"# {said}" for said in found.evidence]
-        lines.append(f"# confidence: {found.confidence}")
-        known = found.value is not None
-        lines.append(f"{key} = {json.dumps(found.value)}" if known else f"# TODO {key} = ")
+    for key, proposal in (("metres_per_unit", unit), ("up", up)):
+        lines += [f"# {sentence}" for sentence in proposal.evidence]
+        lines.append(f"# confidence: {proposal.confidence}")
+        is_known = proposal.value is not None
+        lines.append(f"{key} = {json.dumps(proposal.value)}" if is_known else f"# TODO {key} = ")
     rate, stated = report.proposed["fps"], report.proposed.get("rate")
     if stated is not None:
         lines.append(f"rate = {json.dumps(stated.value)}")
     elif rate.confidence in ("low", "none"):
-        lines += [f"# {said}" for said in rate.evidence]
+        lines += [f"# {sentence}" for sentence in rate.evidence]
         lines.append("# TODO rate = " if rate.value is None else f"rate = {rate.value:g}")
     return [*lines, ""]
 
@@ -166,12 +166,12 @@ def frame_columns(table: ClipTable) -> list[str]:
 
 def number_columns(table: ClipTable) -> list[str]:
     """Return the columns whose cells are numbers, and not all the same."""
-    found = []
+    columns = []
     for name in table.records[0][1]:
         cells = [record[name] for _, record in table.records]
         if all(re.fullmatch(r"[+-]?[0-9.]+([eE][+-]?[0-9]+)?", cell) for cell in cells):
-            found += [name] if len(set(cells)) > 1 else []
-    return found
+            columns += [name] if len(set(cells)) > 1 else []
+    return columns
 
 
 def _controls(report: ProbeReport, table: ClipTable | None) -> list[str]:
@@ -215,9 +215,12 @@ def motion_lines(report: ProbeReport, cyclic: bool = False) -> list[str]:
         "# true if the last pose leads into the first, as in one whole stride:",
         f"cyclic = {json.dumps(cyclic)}",
         'root = "travelling"  # or "in_place"',
-        *[f"# {said} (confidence: {feet.confidence})" for said in feet.evidence],
+        *[f"# {sentence} (confidence: {feet.confidence})" for sentence in feet.evidence],
         f"feet = {names(feet.value)}",
-        *[f"# facing: {said} (confidence: {facing.confidence})" for said in facing.evidence],
+        *[
+            f"# facing: {sentence} (confidence: {facing.confidence})"
+            for sentence in facing.evidence
+        ],
         *(['facing = "hips"'] if abs(facing.value or 0.0) > LARGEST_ANGLE else []),
         "",
     ]

@@ -34,7 +34,7 @@ FRAMES, MARGIN = 6, 0.25
 
 def clip_label(example: Example) -> str:
     """Return a clip's name on the page: its file, and its line in the table of clips."""
-    return f"{example.row.place.name.removesuffix('.bvh')} (line {example.row.line})"
+    return f"{example.row.file.name.removesuffix('.bvh')} (line {example.row.line})"
 
 
 def worst_first(trained: TrainedModel) -> list[int]:

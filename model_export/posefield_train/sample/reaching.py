@@ -61,13 +61,13 @@ def _target_position(controls: SampleControls, figure: Skeleton, shoulder: Float
     It is nearer if it lies above, below or beside the shoulder, so that the elbow never locks: the
     arm is extended to sqrt(0.68² + w² / 2) of its length, where w of its length are not ahead.
     """
-    ahead = np.array([np.sin(controls.azimuth), 0.0, np.cos(controls.azimuth)])
+    forward = np.array([np.sin(controls.azimuth), 0.0, np.cos(controls.azimuth)])
     length = sample_limbs.arm_reach(figure)
     above = controls.target_height - shoulder[1]
-    beside = shoulder[2] * ahead[0] - shoulder[0] * ahead[2]
-    distance = shoulder @ ahead + np.sqrt((0.68 * length) ** 2 - 0.5 * (above**2 + beside**2))
-    place: Floats = distance * ahead + np.array([0.0, controls.target_height, 0.0])
-    return place
+    sideways = shoulder[2] * forward[0] - shoulder[0] * forward[2]
+    distance = shoulder @ forward + np.sqrt((0.68 * length) ** 2 - 0.5 * (above**2 + sideways**2))
+    position: Floats = distance * forward + np.array([0.0, controls.target_height, 0.0])
+    return position
 
 
 def target(controls: SampleControls) -> Floats:
@@ -98,6 +98,6 @@ def reaching_motion(controls: SampleControls, u: Floats) -> ReachingMotion:
 
 def hand_travel(controls: SampleControls) -> float:
     """Return the distance, m, from the hand at rest to the target."""
-    ends = reaching_motion(controls, np.array([0.0, 1.0]))
-    first, last = sample_limbs.palm_position(ends.forward()[0])
+    motion = reaching_motion(controls, np.array([0.0, 1.0]))
+    first, last = sample_limbs.palm_position(motion.forward()[0])
     return float(np.linalg.norm(last - first))

@@ -55,8 +55,8 @@ Bone = tuple[str, str, str, tuple[float, float, float]]
 
 def _mirrored(bones: tuple[Bone, ...], side: str) -> Iterator[Bone]:
     for name, parent, segment, (x, y, z) in bones:
-        whole = parent if parent in ("Hips", "Spine1") else side + parent
-        yield side + name, whole, segment, (SIDES[side] * x, y, z)
+        parent_name = parent if parent in ("Hips", "Spine1") else side + parent
+        yield side + name, parent_name, segment, (SIDES[side] * x, y, z)
 
 
 def _bones() -> tuple[Bone, ...]:
@@ -96,8 +96,8 @@ def _segments(stature: float) -> dict[str, float]:
         "hand": 1.0 + 0.010 * z - 0.010 * z**2,
         "girth": 1.0 - 0.020 * z + 0.020 * z**2,
     }
-    taken = 0.042 * ratio["foot"] + 0.487 * ratio["leg"] + 0.151 * ratio["head"]
-    ratio["torso"] = (1.0 - taken) / 0.320
+    height = 0.042 * ratio["foot"] + 0.487 * ratio["leg"] + 0.151 * ratio["head"]
+    ratio["torso"] = (1.0 - height) / 0.320
     return {segment: stature * size for segment, size in ratio.items()}
 
 
@@ -114,8 +114,8 @@ def skeleton(stature: float) -> Skeleton:
 
 def offset(body: Skeleton, name: str) -> Floats:
     """Return the rest offset (3,), m, of a joint by name."""
-    found: Floats = body.offsets[INDEX[name]]
-    return found
+    vector: Floats = body.offsets[INDEX[name]]
+    return vector
 
 
 def ankle_height(stature: float) -> float:

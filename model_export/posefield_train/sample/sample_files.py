@@ -65,19 +65,19 @@ def _trial_controls(stature: float, standing: bool, spread: Floats) -> SampleCon
         else (low, low + 2 * sample_controls.SEAT_RANGE)
     )
     hip = _rounded(float(np.interp(spread[2], (0, 1), band)), low, high)
-    places = []
-    for name, part in zip(("turn", "target_height"), spread, strict=False):
-        ends = sample_controls.limits(name, stature, hip)
-        places.append(_rounded(float(np.interp(part, (0, 1), ends)), *ends))
-    return SampleControls(stature, hip, *places)
+    values = []
+    for name, share in zip(("turn", "target_height"), spread, strict=False):
+        limits = sample_controls.limits(name, stature, hip)
+        values.append(_rounded(float(np.interp(share, (0, 1), limits)), *limits))
+    return SampleControls(stature, hip, *values)
 
 
 def _rounded(value: float, low: float, high: float) -> float:
     """Return a value of a control with the table's four decimals, within its limits."""
-    found, step = round(value, 4), 1e-4
-    if found > high:
-        return round(found - step, 4)
-    return round(found + step, 4) if found < low else found
+    rounded, step = round(value, 4), 1e-4
+    if rounded > high:
+        return round(rounded - step, 4)
+    return round(rounded + step, 4) if rounded < low else rounded
 
 
 def design(count: int = COUNT) -> Iterator[tuple[str, SampleControls]]:
@@ -263,17 +263,17 @@ def _write_files(output: Path, files: dict[str, bytes]) -> None:
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}-") as scratch:
         # A subdirectory, because the temporary directory is readable by its owner only.
-        whole = Path(scratch) / "family"
+        family_folder = Path(scratch) / "family"
         for path, content in files.items():
-            (whole / path).parent.mkdir(parents=True, exist_ok=True)
-            (whole / path).write_bytes(content)
-        whole.rename(output)
+            (family_folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (family_folder / path).write_bytes(content)
+        family_folder.rename(output)
 
 
 def _expect_same(output: Path, files: dict[str, bytes]) -> None:
-    found = {path.relative_to(output).as_posix() for path in output.rglob("*") if path.is_file()}
-    for path in sorted(found ^ files.keys()):
-        state = "is in the way" if path in found else "is missing"
+    paths = {path.relative_to(output).as_posix() for path in output.rglob("*") if path.is_file()}
+    for path in sorted(paths ^ files.keys()):
+        state = "is in the way" if path in paths else "is missing"
         raise FileError(output, f"not empty and not this family: {path} {state}")
     for path, content in files.items():
         if (output / path).read_bytes() != content:
@@ -281,11 +281,11 @@ def _expect_same(output: Path, files: dict[str, bytes]) -> None:
 
 
 def _recipe() -> str:
-    parts = [
+    sections = [
         _CONTROL.format(name=name, unit=unit, description=description)
         for name, (_, _, unit, description) in RANGES.items()
     ]
-    return _RECIPE.format(controls="".join(parts))
+    return _RECIPE.format(controls="".join(sections))
 
 
 def _row(path: str, sample: SampleTrial) -> list[str]:

@@ -250,9 +250,9 @@ def _ankle(controls: SampleControls, figure: Skeleton, side: str) -> Floats:
     It is below the hips when standing, and a thigh's length ahead when sitting.
     """
     thigh = -sample_body.offset(figure, side + "Leg")[1]
-    ahead = (1.0 - controls.uprightness) * 0.93 * thigh
+    forward = (1.0 - controls.uprightness) * 0.93 * thigh
     across = 1.15 * sample_body.offset(figure, side + "UpLeg")[0]
-    return np.array([across, sample_body.ankle_height(controls.stature), ahead])
+    return np.array([across, sample_body.ankle_height(controls.stature), forward])
 
 
 def legs(

@@ -68,9 +68,11 @@ def trunk_displacement(controls: SampleControls) -> TrunkDisplacement:
 def root_path(controls: SampleControls, goal: TrunkDisplacement, u: Floats) -> Floats:
     """Return root positions (P, 3), m: from above the origin towards the target, and down."""
     heading = 0.5 * controls.azimuth
-    way = np.array([goal.shift * np.sin(heading), -goal.drop, goal.shift * np.cos(heading)])
+    displacement = np.array(
+        [goal.shift * np.sin(heading), -goal.drop, goal.shift * np.cos(heading)]
+    )
     start = np.array([0.0, controls.hip_height, 0.0])
-    path: Floats = start + sample_controls.trunk(u)[:, None] * way
+    path: Floats = start + sample_controls.trunk(u)[:, None] * displacement
     return path
 
 

@@ -118,20 +118,20 @@ class _Line:
         return values
 
 
-def _read_lines(path: Readable, most: int) -> Iterator[_Line]:
+def _read_lines(path: Readable, max_bytes: int) -> Iterator[_Line]:
     """Yield the lines of a file that have words, without comments.
 
-    most: limit of the file's size, bytes. Any byte is text (Latin-1), since comments have paths in
-    the code pages of their authors. Raises AcclaimError if the file cannot be read, is larger, or
-    has a line longer than MAX_LINE; lines are read one at a time.
+    max_bytes: limit of the file's size, bytes. Any byte is text (Latin-1), since comments have
+    paths in the code pages of their authors. Raises AcclaimError if the file cannot be read, is
+    larger, or has a line longer than MAX_LINE; lines are read one at a time.
     """
     source, read, number = str(path), 0, 0
     try:
         with path.open("rb") as file:
             while content := file.readline(MAX_LINE + 1):
                 read, number = read + len(content), number + 1
-                if len(content) > MAX_LINE or read > most:
-                    expected = f"expected at most {MAX_LINE} bytes a line and {most} in all"
+                if len(content) > MAX_LINE or read > max_bytes:
+                    expected = f"expected at most {MAX_LINE} bytes a line and {max_bytes} in all"
                     raise AcclaimError(source, f"found more bytes than allowed, {expected}", number)
                 if number == 1 and (packed := foreign_encoding(content)):
                     message = f"found {packed}, expected plain text"
@@ -253,7 +253,7 @@ def _bone(draft: _Draft, name: str, parent: str, angle: float) -> AsfBone:
 def _tree(lines: Sequence[_Line], drafts: dict[str, _Draft]) -> list[tuple[str, str]]:
     """Return the names of all bones and of their parents, depth first."""
     children: dict[str, list[str]] = {}
-    seen = {ROOT}
+    named_bones = {ROOT}
     for line in lines:
         parent, *names = line.words
         if parent.lower() in ("begin", "end") and not names:
@@ -261,15 +261,15 @@ def _tree(lines: Sequence[_Line], drafts: dict[str, _Draft]) -> list[tuple[str, 
         if parent not in {ROOT, *drafts} or parent in children:
             raise line.unexpected("each bone once with its children")
         for name in names:
-            if name not in drafts or name in seen:
+            if name not in drafts or name in named_bones:
                 raise line.error(f"found child {name!r}, expected a bone that has no parent yet")
-            seen.add(name)
+            named_bones.add(name)
         children[parent] = names
-    ordered, ahead = [], [(name, ROOT) for name in reversed(children.get(ROOT, []))]
-    while ahead:
-        name, parent = ahead.pop()
+    ordered, stack = [], [(name, ROOT) for name in reversed(children.get(ROOT, []))]
+    while stack:
+        name, parent = stack.pop()
         ordered.append((name, parent))
-        ahead += [(child, name) for child in reversed(children.get(name, []))]
+        stack += [(child, name) for child in reversed(children.get(name, []))]
     if lost := sorted(drafts.keys() - {name for name, _ in ordered}):
         raise lines[-1].error(f"found no way from the root to {', '.join(lost)}, expected one")
     return ordered
@@ -291,15 +291,15 @@ def read_amc(path: Readable, skeleton: AsfFile) -> AmcFile:
         angle = ANGLES.get(key[1:], angle)
         if key[1:] not in ("fully-specified", *ANGLES):
             notes.append(f"the header {' '.join(line.words)} is unknown: left out")
-    most = MAX_POSES // (len(skeleton.bones) + 1)
+    max_frames = MAX_POSES // (len(skeleton.bones) + 1)
     frames: list[Floats] = []
     before = None
     for first, *lines in groups:
         number = int(first.words[0])
         if before is not None and number != before + 1:
             raise first.unexpected(f"frame {before + 1}")
-        if len(frames) == most:
-            raise first.error(f"found more than {most} frames, expected at most as many")
+        if len(frames) == max_frames:
+            raise first.error(f"found more than {max_frames} frames, expected at most as many")
         values: dict[str, tuple[float, ...]] = {}
         for line in lines:
             name, *words = line.words
@@ -312,25 +312,25 @@ def read_amc(path: Readable, skeleton: AsfFile) -> AmcFile:
         before = number
     if not frames:
         raise AcclaimError(str(path), "found no frame, expected at least one")
-    ends = np.cumsum([*widths.values()])[:-1]
-    columns = dict(zip(widths, np.split(np.stack(frames), ends, axis=1), strict=True))
+    splits = np.cumsum([*widths.values()])[:-1]
+    columns = dict(zip(widths, np.split(np.stack(frames), splits, axis=1), strict=True))
     root = columns.pop(ROOT)[:, [skeleton.columns.index(name) for name in CHANNELS]]
     root[:, 3:] *= angle
-    angles = {name: angle * own for name, own in columns.items()}
+    angles = {name: angle * turns for name, turns in columns.items()}
     return AmcFile(str(path), root, angles, tuple(notes))
 
 
-def _groups(lines: Iterator[_Line], most: int) -> Iterator[list[_Line]]:
+def _groups(lines: Iterator[_Line], max_lines: int) -> Iterator[list[_Line]]:
     """Yield the header's lines, then those of each frame, its number first.
 
-    Raises AcclaimError for more than `most` lines in one of them.
+    Raises AcclaimError for more than `max_lines` lines in one of them.
     """
     group: list[_Line] = []
     for line in lines:
         if len(line.words) == 1 and FRAME.fullmatch(line.words[0]):
             yield group
             group = []
-        elif len(group) == most:
+        elif len(group) == max_lines:
             raise line.unexpected("the number of the next frame")
         group.append(line)
     yield group

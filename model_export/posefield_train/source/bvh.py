@@ -160,8 +160,8 @@ class _Lines:
             if len(line) == MAX_LINE:
                 raise self.error(f"found {MAX_LINE} characters in a line, expected fewer")
             if self._read > MAX_BYTES:
-                most = f"{MAX_BYTES // 1_000_000} MB"
-                raise BvhError(self.source, f"found more than {most}, expected at most {most}")
+                limit = f"{MAX_BYTES // 1_000_000} MB"
+                raise BvhError(self.source, f"found more than {limit}, expected at most {limit}")
             yield line
 
     def error(self, message: str) -> BvhError:
@@ -174,8 +174,8 @@ def _header(lines: _Lines, pattern: re.Pattern[str], expected: str) -> str:
     line = next((line.strip() for line in lines if not line.isspace()), "")
     if match := pattern.fullmatch(line):
         return match.group(1)
-    shown = quote(decode(line.encode("latin-1"))) if line else "the end of the file"
-    raise lines.error(f"found {shown}, expected {expected}")
+    quoted = quote(decode(line.encode("latin-1"))) if line else "the end of the file"
+    raise lines.error(f"found {quoted}, expected {expected}")
 
 
 IN_NUMBERS = "0123456789+-.eE" + string.whitespace
@@ -194,10 +194,10 @@ def _values(lines: _Lines, frames: int, channels: int, joints: int) -> Floats:
         if line.isspace():
             continue
         numbers = _numbers(lines, line, frames * channels - len(values))
-        begun = len(values) % channels
-        begin = begin if begun else lines.number
-        if begun + len(numbers) > channels:
-            split = f"{begun} and then {len(numbers)}" if begun else len(numbers)
+        started = len(values) % channels
+        begin = begin if started else lines.number
+        if started + len(numbers) > channels:
+            split = f"{started} and then {len(numbers)}" if started else len(numbers)
             message = f"found {split} numbers, expected {channels} a frame, on lines of its own"
             raise BvhError(lines.source, message, begin)
         values.extend(numbers)
@@ -269,8 +269,8 @@ def motion_file(file: BvhFile) -> MotionFile:
     moving = [
         j for j, joint in enumerate(file.joints) if j and set(CHANNELS[:3]) <= {*joint.channels}
     ]
-    usual = np.abs(translations[:, moving].mean(axis=0)).sum()
-    if usual < RELATIVE * np.abs(offsets[moving]).sum():
+    mean_length = np.abs(translations[:, moving].mean(axis=0)).sum()
+    if mean_length < RELATIVE * np.abs(offsets[moving]).sum():
         translations[:, moving] += offsets[moving]
         notes += (f"positions of {len(moving)} joints are relative to their OFFSETs: added",)
     root = file.joints[0]

@@ -230,8 +230,8 @@ def foreign_encoding(start: bytes) -> str:
         b"\x1f\x8b": "a file packed by gzip",
         b"PK\x03\x04": "a zip archive",
     }
-    found = next((name for mark, name in marks.items() if start.startswith(mark)), "")
-    return found or ("text in UTF-16" if start[:2].count(0) == 1 else "")
+    marked = next((name for mark, name in marks.items() if start.startswith(mark)), "")
+    return marked or ("text in UTF-16" if start[:2].count(0) == 1 else "")
 
 
 def quote(text: str) -> str:

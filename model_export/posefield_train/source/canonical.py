@@ -79,8 +79,8 @@ def remove_jumps(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
     rotations = clip.rotations.copy()
     for joint in np.flatnonzero(small & (turned.max(axis=0, initial=0.0) > JUMP_ANGLE)):
         steps = _steps(clip.rotations[:, joint])
-        kept = np.where(turned[:, joint, None] > JUMP_ANGLE, quat.IDENTITY, steps)
-        for frame, step in enumerate(kept):
+        smooth = np.where(turned[:, joint, None] > JUMP_ANGLE, quat.IDENTITY, steps)
+        for frame, step in enumerate(smooth):
             rotations[frame + 1, joint] = quat.mul(rotations[frame, joint], step)
         findings.append(Finding("jump", int(joint), index, float(turned[:, joint].max())))
     return replace(clip, rotations=rotations), findings
@@ -101,13 +101,13 @@ def move_twists(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
         jumps = (angles > JUMP_ANGLE) & (swung < MOST_SWING)
         if not jumps.any():
             continue
-        moved = np.concatenate([[0.0], np.cumsum(np.where(jumps, twists, 0.0))])
-        parts = np.split(np.arange(len(moved)), np.flatnonzero(jumps) + 1)
-        moved -= moved[max(parts, key=len)[0]]
-        own = quat.from_axis_angle(axis, moved)
-        rotations[:, joint] = quat.mul(rotations[:, joint], quat.conj(own))
+        twist_angles = np.concatenate([[0.0], np.cumsum(np.where(jumps, twists, 0.0))])
+        sections = np.split(np.arange(len(twist_angles)), np.flatnonzero(jumps) + 1)
+        twist_angles -= twist_angles[max(sections, key=len)[0]]
+        corrections = quat.from_axis_angle(axis, twist_angles)
+        rotations[:, joint] = quat.mul(rotations[:, joint], quat.conj(corrections))
         for child in np.flatnonzero(np.array(clip.skeleton.parents) == joint):
-            rotations[:, child] = quat.mul(own, rotations[:, child])
+            rotations[:, child] = quat.mul(corrections, rotations[:, child])
         findings.append(Finding("twist", joint, index, float(np.abs(twists[jumps]).max())))
     return (replace(clip, rotations=rotations) if findings else clip), findings
 
@@ -146,7 +146,7 @@ def remove_flips_about(
     """Return the result of `remove_flips` relative to given means (J, 4)."""
     blocks = clip_blocks(len(rotations))
     # Least angle (N, J) of each joint from its mean.
-    least = np.concatenate(
+    nearest = np.concatenate(
         [
             np.linalg.norm(quat.log(quat.mul(quat.conj(means), rotations[rows])), axis=-1).min(
                 axis=1
@@ -154,7 +154,7 @@ def remove_flips_about(
             for rows in blocks
         ]
     )
-    flips = np.argwhere((least > FLIP_ANGLE) & small.astype(bool))
+    flips = np.argwhere((nearest > FLIP_ANGLE) & small.astype(bool))
     clean, findings = rotations.copy() if len(flips) else rotations, []
     for clip, joint in flips:
         away = quat.mul(quat.conj(means[joint]), rotations[clip, :, joint])
@@ -228,8 +228,8 @@ def _offsets(gap: Floats, rates: Floats, frames: int) -> Floats:
     total = np.zeros((frames, *np.shape(gap)))
     for distance, sign in ((share, 1.0), (1.0 - share, -1.0)):
         t = np.minimum(distance / FADE, 1.0)
-        place, rate = (1.0 + 2.0 * t) * (1.0 - t) ** 2, FADE * t * (1.0 - t) ** 2
-        total += 0.5 * sign * np.multiply.outer(place, gap) + 0.5 * np.multiply.outer(rate, rates)
+        value, rate = (1.0 + 2.0 * t) * (1.0 - t) ** 2, FADE * t * (1.0 - t) ** 2
+        total += 0.5 * sign * np.multiply.outer(value, gap) + 0.5 * np.multiply.outer(rate, rates)
     return total
 
 

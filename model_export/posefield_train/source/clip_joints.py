@@ -30,12 +30,12 @@ def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     joints = clip.skeleton
     missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
     if missing:
-        known = list(dict.fromkeys((*joints.names, *sites)))
-        told = ", ".join(f"{name!r}{did_you_mean(name, known)}" for name in sorted(missing))
-        more = f" and {len(known) - MAX_LISTED} more" if len(known) > MAX_LISTED else ""
+        candidates = list(dict.fromkeys((*joints.names, *sites)))
+        listed = ", ".join(f"{name!r}{did_you_mean(name, candidates)}" for name in sorted(missing))
+        more = f" and {len(candidates) - MAX_LISTED} more" if len(candidates) > MAX_LISTED else ""
         raise row.error(
-            f"{row.place} has no joints {told} that the recipe names, expected some of "
-            f"{', '.join(known[:MAX_LISTED])}{more}"
+            f"{row.file} has no joints {listed} that the recipe names, expected some of "
+            f"{', '.join(candidates[:MAX_LISTED])}{more}"
         )
     dropped = {joints.names.index(name) for name in recipe.motion.drop_joints}
     for joint, parent in enumerate(joints.parents):
@@ -43,25 +43,25 @@ def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
             dropped.add(joint)
     if 0 in dropped:
         raise row.error("the root cannot be dropped")
-    kept = [joint for joint in range(len(joints)) if joint not in dropped]
-    gone = needed - {joints.names[joint] for joint in kept}
+    indices = [joint for joint in range(len(joints)) if joint not in dropped]
+    gone = needed - {joints.names[joint] for joint in indices}
     if gone:
         raise row.error(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
-    return keep_joints(clip, kept)
+    return keep_joints(clip, indices)
 
 
-def keep_joints(clip: Clip, kept: Sequence[int]) -> Clip:
-    """Return the clip of some of its joints, each with its parent before it in `kept`."""
+def keep_joints(clip: Clip, indices: Sequence[int]) -> Clip:
+    """Return the clip of some of its joints, each with its parent before it in `indices`."""
     joints = clip.skeleton
-    tips = [i for i, joint in enumerate(joints.tip_joints) if joint in kept]
+    tips = [i for i, joint in enumerate(joints.tip_joints) if joint in indices]
     smaller = Skeleton(
-        tuple(joints.names[joint] for joint in kept),
-        tuple(kept.index(joints.parents[j]) if j else -1 for j in kept),
-        joints.offsets[kept],
-        tuple(kept.index(joints.tip_joints[i]) for i in tips),
+        tuple(joints.names[joint] for joint in indices),
+        tuple(indices.index(joints.parents[j]) if j else -1 for j in indices),
+        joints.offsets[indices],
+        tuple(indices.index(joints.tip_joints[i]) for i in tips),
         joints.tip_offsets[tips],
     )
-    rotations, translations = clip.rotations[:, kept], clip.translations[:, kept]
+    rotations, translations = clip.rotations[:, indices], clip.translations[:, indices]
     return replace(clip, skeleton=smaller, rotations=rotations, translations=translations)
 
 
@@ -88,18 +88,18 @@ def in_common_order(rows: Sequence[ClipRow], clips: Sequence[Clip]) -> tuple[lis
     RecipeError for a row whose clip has other joints than the first row's, or other parents.
     """
     first = clips[0].skeleton
-    found = [ordered_as(clip, first.names) for clip in clips]
-    for row, clip, same in zip(rows, clips, found, strict=True):
+    ordered = [ordered_as(clip, first.names) for clip in clips]
+    for row, clip, same in zip(rows, clips, ordered, strict=True):
         if same is None or not same.skeleton.same_tree(first):
             only = sorted(set(clip.skeleton.names) ^ set(first.names))
             difference = "the same names with other parents"
             if only:
                 difference = f"only one of them has {only}"
             raise row.error(
-                f"{row.place} has other joints than {rows[0].place} of line {rows[0].line}: "
+                f"{row.file} has other joints than {rows[0].file} of line {rows[0].line}: "
                 f"{difference}; of people, say skeleton.topology = 'roles'"
             )
-    return _with_common_sites([clip for clip in found if clip is not None])
+    return _with_common_sites([clip for clip in ordered if clip is not None])
 
 
 def ordered_as(clip: Clip, names: Sequence[str]) -> Clip | None:
@@ -107,29 +107,33 @@ def ordered_as(clip: Clip, names: Sequence[str]) -> Clip | None:
 
     None for a clip that lacks one of them or its parent, or has a parent after its child.
     """
-    own = clip.skeleton
-    if own.names == tuple(names):
+    joints = clip.skeleton
+    if joints.names == tuple(names):
         return clip
-    if not set(names) <= set(own.names):
+    if not set(names) <= set(joints.names):
         return None
-    kept = [own.names.index(name) for name in names]
-    is_tree = all(own.parents[j] in kept[:at] or own.parents[j] < 0 for at, j in enumerate(kept))
-    return keep_joints(clip, kept) if is_tree and kept[0] == 0 else None
+    indices = [joints.names.index(name) for name in names]
+    is_tree = all(
+        joints.parents[j] in indices[:at] or joints.parents[j] < 0 for at, j in enumerate(indices)
+    )
+    return keep_joints(clip, indices) if is_tree and indices[0] == 0 else None
 
 
 def _with_common_sites(clips: Sequence[Clip]) -> tuple[list[Clip], list[str]]:
     """Return the clips of one tree with the end sites that all of them have, and a note."""
     sites = [end_site_names(clip.skeleton) for clip in clips]
-    common = [name for name in sites[0] if name and all(name in others for others in sites)]
-    found = []
+    common = [name for name in sites[0] if name and all(name in site_names for site_names in sites)]
+    trimmed = []
     for clip, names in zip(clips, sites, strict=True):
-        own, kept = clip.skeleton, [names.index(name) for name in common]
-        tips = tuple(own.tip_joints[at] for at in kept)
-        skeleton = replace(own, tip_joints=tips, tip_offsets=own.tip_offsets[kept])
-        found.append(replace(clip, skeleton=skeleton))
+        joints, indices = clip.skeleton, [names.index(name) for name in common]
+        tips = tuple(joints.tip_joints[at] for at in indices)
+        skeleton = replace(joints, tip_joints=tips, tip_offsets=joints.tip_offsets[indices])
+        trimmed.append(replace(clip, skeleton=skeleton))
     lost = sorted({name for names in sites for name in names} - {*common, ""})
-    said = f"{', '.join(lost[:MAX_LISTED])}: left out, since not all {len(clips)} clips have them"
-    return found, [f"end sites {said}"] if lost else []
+    sentence = (
+        f"{', '.join(lost[:MAX_LISTED])}: left out, since not all {len(clips)} clips have them"
+    )
+    return trimmed, [f"end sites {sentence}"] if lost else []
 
 
 ENDING = "_end"
@@ -151,13 +155,13 @@ def end_site_names(joints: Skeleton) -> list[str]:
     return names
 
 
-def with_end_joints(clip: Clip, wanted: Collection[str]) -> Clip:
+def with_end_joints(clip: Clip, requested: Collection[str]) -> Clip:
     """Return the clip with joints, each after its parent, in place of the end sites of some names.
 
     The joints never turn and keep their distance from their parents.
     """
     joints, names = clip.skeleton, end_site_names(clip.skeleton)
-    chosen = [site for site, name in enumerate(names) if name and name in wanted]
+    chosen = [site for site, name in enumerate(names) if name and name in requested]
     if not chosen:
         return clip
     count = len(joints)
@@ -167,24 +171,24 @@ def with_end_joints(clip: Clip, wanted: Collection[str]) -> Clip:
         range(count + len(chosen)),
         key=lambda joint: (joint, 0) if joint < count else (parents[joint - count], joint),
     )
-    place = {joint: index for index, joint in enumerate(order)}
+    new_index = {joint: index for index, joint in enumerate(order)}
     above = [*joints.parents, *parents]
-    kept = [site for site in range(len(names)) if site not in chosen]
+    remaining = [site for site in range(len(names)) if site not in chosen]
     tips = joints.tip_offsets[chosen]
     longer = Skeleton(
         tuple([*joints.names, *(names[site] for site in chosen)][joint] for joint in order),
-        tuple(place[above[joint]] if joint else -1 for joint in order),
+        tuple(new_index[above[joint]] if joint else -1 for joint in order),
         np.concatenate([joints.offsets, tips])[order],
-        tuple(place[joints.tip_joints[site]] for site in kept),
-        joints.tip_offsets[kept],
+        tuple(new_index[joints.tip_joints[site]] for site in remaining),
+        joints.tip_offsets[remaining],
     )
     still = np.tile(quat.IDENTITY, (len(clip), len(chosen), 1))
-    moved = np.broadcast_to(tips, (len(clip), *tips.shape))
+    tip_translations = np.broadcast_to(tips, (len(clip), *tips.shape))
     return replace(
         clip,
         skeleton=longer,
         rotations=np.concatenate([clip.rotations, still], axis=1)[:, order],
-        translations=np.concatenate([clip.translations, moved], axis=1)[:, order],
+        translations=np.concatenate([clip.translations, tip_translations], axis=1)[:, order],
     )
 
 
@@ -211,12 +215,12 @@ SAME, CLEAR = 0.002, 3.0
 class ForeignBones:
     """A clip whose bones differ from those of its performer's other clips.
 
-    apart: root mean square distance, m. others: number of the performer's other clips. alike:
-    another performer with matching bones, or "". within: distance from that performer's bones, m.
+    distance: root mean square, m. clips: number of the performer's other clips. nearest_performer:
+    another one with matching bones, or "". nearest_distance: from that performer's bones, m.
     """
 
-    apart: float
-    others: int
+    distance: float
+    clips: int
     nearest_performer: str
     nearest_distance: float
 
@@ -227,8 +231,8 @@ def relative_sizes(offsets: Floats) -> Floats:
     A single joint has no bones: its clips are alike.
     """
     lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
-    usual = np.median(lengths)
-    return np.asarray(lengths / usual) if usual > 0.0 else np.ones(len(lengths))
+    median = np.median(lengths)
+    return np.asarray(lengths / median) if median > 0.0 else np.ones(len(lengths))
 
 
 def guess_unit(metres_per_unit: float, size: float) -> str:
@@ -247,18 +251,18 @@ def find_foreign_bones(
     performer's bones.
     """
     whose = np.array(performers)
-    own = np.flatnonzero((whose == whose[clip]) & (np.arange(len(whose)) != clip))
-    if not whose[clip] or not len(own):
+    siblings = np.flatnonzero((whose == whose[clip]) & (np.arange(len(whose)) != clip))
+    if not whose[clip] or not len(siblings):
         return None
-    usual = np.median(offsets[own], axis=0)
-    gap = apart(offsets[clip], usual)
-    spread = float(np.median([apart(one, usual) for one in offsets[own]]))
+    median = np.median(offsets[siblings], axis=0)
+    gap = apart(offsets[clip], median)
+    spread = float(np.median([apart(one, median) for one in offsets[siblings]]))
     if gap < max(SAME, CLEAR * spread):
         return None
     near = _nearest(offsets, whose, clip)
     if near[0] < gap / CLEAR:
-        return ForeignBones(gap, len(own), near[1], near[0])
-    return ForeignBones(gap, len(own), "", 0.0) if len(own) > 1 else None
+        return ForeignBones(gap, len(siblings), near[1], near[0])
+    return ForeignBones(gap, len(siblings), "", 0.0) if len(siblings) > 1 else None
 
 
 def _nearest(offsets: Floats, whose: npt.NDArray[np.str_], clip: int) -> tuple[float, str]:

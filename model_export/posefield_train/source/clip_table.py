@@ -44,59 +44,59 @@ MAX_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
 DECIMAL_COMMA = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)", re.ASCII)
 
 
-def open_table(place: FileLocation) -> "ClipTable":
+def open_table(file: FileLocation) -> "ClipTable":
     """Return the table of a CSV file; RecipeError if it is invalid.
 
     Cells are separated by commas, or by semicolons or tabs, of which the heading has more; decimal
     commas are then read as points, and `decimal_commas` counts them.
     """
-    content = data_folder.read(place, MAX_BYTES, "a table")
+    content = data_folder.read(file, MAX_BYTES, "a table")
     if packed := foreign_encoding(content[:4]):
-        raise RecipeError(str(place), f"found {packed}, expected a table in UTF-8", 1)
+        raise RecipeError(str(file), f"found {packed}, expected a table in UTF-8", 1)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
-        raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
-    file = io.StringIO(text, newline=None)
-    heading = file.readline()
+        raise RecipeError(str(file), f"not UTF-8 text: {fault}") from fault
+    content_lines = io.StringIO(text, newline=None)
+    heading = content_lines.readline()
     # The first line of a table of Excel may name the separator.
     skipped = int(re.fullmatch("sep=.\n", heading) is not None)
-    file.seek(len(heading) if skipped else 0)
+    content_lines.seek(len(heading) if skipped else 0)
     delimiter = heading[4] if skipped else max(",;\t", key=heading.count)
-    reader = csv.DictReader(file, strict=True, delimiter=delimiter)
+    reader = csv.DictReader(content_lines, strict=True, delimiter=delimiter)
     try:
         names = reader.fieldnames or []
         if len(names) > MOST_COLUMNS:
             message = f"found {len(names)} columns, expected at most {MOST_COLUMNS}"
-            raise RecipeError(str(place), message, 1)
+            raise RecipeError(str(file), message, 1)
         if twins := sorted({name for name in names if names.count(name) > 1}):
-            raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
-        records = [(reader.line_num + skipped, own) for own in islice(reader, MOST_ROWS)]
+            raise RecipeError(str(file), f"columns {twins} are in the heading twice", 1)
+        records = [(reader.line_num + skipped, cells) for cells in islice(reader, MOST_ROWS)]
         further = next(reader, None)
     except csv.Error as fault:
-        raise RecipeError(str(place), f"not CSV: {fault}", reader.line_num) from fault
+        raise RecipeError(str(file), f"not CSV: {fault}", reader.line_num) from fault
     if further is not None:
         message = f"found more than {MOST_ROWS} rows, expected at most {MOST_ROWS}"
-        raise RecipeError(str(place), message, reader.line_num)
+        raise RecipeError(str(file), message, reader.line_num)
     for line, record in records:
         if None in record or None in record.values():
             count = sum(record.get(name) is not None for name in names) + len(record.get(None, ""))
             message = f"found {count} cells, expected the {len(names)} of the heading"
-            raise RecipeError(str(place), message, line)
+            raise RecipeError(str(file), message, line)
     if delimiter == ",":
-        return ClipTable(str(place), records)
-    commas = sum(bool(DECIMAL_COMMA.fullmatch(c)) for _, own in records for c in own.values())
+        return ClipTable(str(file), records)
+    commas = sum(bool(DECIMAL_COMMA.fullmatch(c)) for _, cells in records for c in cells.values())
     points = [
         (
             line,
             {
                 name: DECIMAL_COMMA.sub(r"\1.\2", c) if DECIMAL_COMMA.fullmatch(c) else c
-                for name, c in own.items()
+                for name, c in cells.items()
             },
         )
-        for line, own in records
+        for line, cells in records
     ]
-    return ClipTable(str(place), points, commas)
+    return ClipTable(str(file), points, commas)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
@@ -123,8 +123,8 @@ class ClipTable:
         """Raise RecipeError for unknown columns."""
         unknown = sorted(set(self.records[0][1]) - set(columns))
         if unknown:
-            known = ", ".join(sorted(columns))
-            raise RecipeError(self.name, f"columns {unknown}, expected some of {known}", 1)
+            allowed = ", ".join(sorted(columns))
+            raise RecipeError(self.name, f"columns {unknown}, expected some of {allowed}", 1)
 
     def require(self, columns: Mapping[str, str]) -> None:
         """Raise RecipeError for a table without rows, or without a required column.
@@ -148,9 +148,9 @@ class ClipTable:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            found = record[column]
-            expected = "a number with a decimal point" if "," in found else "a number"
-            raise RecipeError(self.name, f"column {column!r}: {found!r}, expected {expected}", line)
+            cell = record[column]
+            expected = "a number with a decimal point" if "," in cell else "a number"
+            raise RecipeError(self.name, f"column {column!r}: {cell!r}, expected {expected}", line)
         return value
 
     def frame(self, line: int, record: dict[str, str], column: str) -> int:
@@ -164,9 +164,9 @@ class ClipTable:
 
     def spans(self, line: int, record: dict[str, str], column: str) -> FrameSpans:
         """Return the intervals of frames in a cell, such as '12-40 77-90', in order."""
-        ends = [part.split("-") for part in record[column].split()]
-        right = all(len(pair) == 2 and all(end.isdecimal() for end in pair) for pair in ends)
-        flat = [int(end) for pair in ends for end in pair] if right else []
+        pairs = [word.split("-") for word in record[column].split()]
+        right = all(len(pair) == 2 and all(end.isdecimal() for end in pair) for pair in pairs)
+        flat = [int(end) for pair in pairs for end in pair] if right else []
         # A contact begins behind the end of the one before; one frame is an interval, too.
         right = right and all(a <= b for a, b in pairwise(flat))
         right = right and all(b < c for b, c in zip(flat[1::2], flat[2::2], strict=False))
@@ -181,12 +181,12 @@ class ClipTable:
 
     def name_of(self, line: int, record: dict[str, str], column: str) -> str:
         """Return the name in a cell of labels."""
-        found = record[column]
-        if not is_label(found):
+        name = record[column]
+        if not is_label(name):
             raise RecipeError(
-                self.name, f"column {column!r}: {found!r}, expected {LABEL_FORM}", line
+                self.name, f"column {column!r}: {name!r}, expected {LABEL_FORM}", line
             )
-        return found
+        return name
 
     def satisfies(
         self, line: int, record: dict[str, str], column: str, condition: Condition
@@ -217,7 +217,7 @@ class ClipRow:
     one of several in the file; None for the only one.
     """
 
-    place: FileLocation
+    file: FileLocation
     table: str
     line: int | None
     performer: str
@@ -235,7 +235,7 @@ class ClipRow:
     @property
     def motion(self) -> str:
         """Return the name of the motion that the clip is a part of: its file and animation."""
-        return str(self.place) if self.animation is None else f"{self.place}[{self.animation}]"
+        return str(self.file) if self.animation is None else f"{self.file}[{self.animation}]"
 
     @property
     def labels(self) -> dict[str, str]:
@@ -245,12 +245,12 @@ class ClipRow:
     @property
     def curve_file(self) -> FileLocation:
         """Return the file of the clip's curves."""
-        return self.curve_place or self.place
+        return self.curve_place or self.file
 
     @property
     def named(self) -> str:
         """Return the name of the row in messages: its line and its file."""
-        return self.place.name if self.line is None else f"line {self.line}, {self.place.name}"
+        return self.file.name if self.line is None else f"line {self.line}, {self.file.name}"
 
     @property
     def source(self) -> str:
@@ -263,7 +263,7 @@ class ClipRow:
     @property
     def _motion_name(self) -> str:
         """Return the name of the file, with the animation if it holds several."""
-        return self.place.name if self.animation is None else f"{self.place.name}[{self.animation}]"
+        return self.file.name if self.animation is None else f"{self.file.name}[{self.animation}]"
 
     def error(self, message: str) -> RecipeError:
         """Return an error that names this row."""
@@ -278,8 +278,8 @@ def read(recipe: Recipe, folder: Path, notes: list[str] | None = None) -> list[C
     line and column, for the first invalid cell, and for a missing column, no matching row, two rows
     of the same frames, and styles of which the recipe says nothing.
     """
-    place = data_folder.find_table(folder, recipe.clips.table, recipe.folder)
-    cells = open_table(place)
+    file = data_folder.find_table(folder, recipe.clips.table, recipe.folder)
+    cells = open_table(file)
     columns = _columns(recipe)
     cells.require(columns)
     chosen = [
@@ -305,27 +305,27 @@ def read(recipe: Recipe, folder: Path, notes: list[str] | None = None) -> list[C
         notes += recipe.notes
         notes += data_folder.table_notes(cells.name)
         if cells.decimal_commas:
-            notes.append(f"{place.name}: {cells.decimal_commas} decimal commas were read as points")
+            notes.append(f"{file.name}: {cells.decimal_commas} decimal commas were read as points")
     return rows
 
 
 def _columns(recipe: Recipe) -> dict[str, str]:
     clips = recipe.clips
-    named = {
+    purposes = {
         clips.file: "clips.file",
         **dict.fromkeys(clips.where, "clips.where"),
         **dict.fromkeys(clips.landmarks, "clips.landmarks"),
         **{column: f"clips.labels.{name}" for name, column in clips.labels.items()},
         **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
-    named |= {column: f"contacts.columns.{j}" for j, column in recipe.contacts.columns.items()}
+    purposes |= {column: f"contacts.columns.{j}" for j, column in recipe.contacts.columns.items()}
     for key in ("animation", "performer", "recording", "first_frame", "last_frame"):
         column = getattr(clips, key)
         if column is not None:
-            named[column] = f"clips.{key}"
+            purposes[column] = f"clips.{key}"
     if recipe.curves and recipe.curves.column:
-        named[recipe.curves.column] = "curves.column"
-    return named
+        purposes[recipe.curves.column] = "curves.column"
+    return purposes
 
 
 def _row(
@@ -339,14 +339,14 @@ def _row(
 
     def find(column: str, cell: str) -> FileLocation:
         """Return the file that a cell names; RecipeError names the column."""
-        beside = clips.table.rpartition("/")[0]
+        folder_name = clips.table.rpartition("/")[0]
         try:
-            return data_folder.find(folder, f"{beside}/{cell}" if beside else cell)
+            return data_folder.find(folder, f"{folder_name}/{cell}" if folder_name else cell)
         except RecipeError as fault:
             text = f"column {column!r}: {fault.message}"
             raise RecipeError(cells.name, text, line) from fault
 
-    place = find(clips.file, record[clips.file])
+    motion_file = find(clips.file, record[clips.file])
     performer = record[clips.performer] if clips.performer else ""
     if clips.performer and PERFORMER in recipe.kriging.label:
         # A label of that set makes the performer a name of requests.
@@ -364,11 +364,11 @@ def _row(
         curve_place = find(curves.column, record[curves.column])
     elif curves and not curves.alone:
         # Beside the motion file.
-        beside, slash, name = record[clips.file].rpartition("/")
+        folder_name, slash, name = record[clips.file].rpartition("/")
         stem = name.rpartition(".")[0] or name
-        curve_place = find(clips.file, f"{beside}{slash}{stem}{curves.suffix}")
+        curve_place = find(clips.file, f"{folder_name}{slash}{stem}{curves.suffix}")
     return ClipRow(
-        place=place,
+        file=motion_file,
         table=cells.name,
         line=line,
         performer=performer,
@@ -388,14 +388,14 @@ def _row(
 
 def refuse_repeats(rows: Sequence[ClipRow]) -> None:
     """Raise RecipeError for two rows with the same frames of the same file."""
-    seen: dict[tuple[str, int, int | None], ClipRow] = {}
+    first_rows: dict[tuple[str, int, int | None], ClipRow] = {}
     for row in rows:
         key = (row.motion, row.first_frame, row.last_frame)
-        if key in seen:
-            line = seen[key].line
+        if key in first_rows:
+            line = first_rows[key].line
             again = "as before" if line is None else f"as line {line}"
             raise row.error(f"the same frames of the same file {again}")
-        seen[key] = row
+        first_rows[key] = row
 
 
 def stated_recordings(rows: Sequence[ClipRow]) -> list[str] | None:
@@ -405,12 +405,12 @@ def stated_recordings(rows: Sequence[ClipRow]) -> list[str] | None:
     """
     if any(row.recording is None for row in rows):
         return None
-    seen: dict[str, ClipRow] = {}
+    first_rows: dict[str, ClipRow] = {}
     for row in rows:
-        other = seen.setdefault(row.motion, row)
+        other = first_rows.setdefault(row.motion, row)
         if _named_recording(other) != _named_recording(row):
             raise row.error(
-                f"{row.place.name} is of recording {row.recording!r} here and of "
+                f"{row.file.name} is of recording {row.recording!r} here and of "
                 f"{other.recording!r} in line {other.line}, expected one for a file: its clips "
                 "were recorded in one go"
             )

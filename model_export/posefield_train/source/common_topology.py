@@ -58,89 +58,89 @@ class RoleJoints:
         return {*self.limbs.values(), self.hips, *self.spine, *self.neck, self.head}
 
 
-def role_joints(own: Skeleton, stated: StatedRoles) -> RoleJoints:
+def role_joints(joints: Skeleton, stated: StatedRoles) -> RoleJoints:
     """Return the joints of a skeleton by role.
 
     stated: joints of the recipe, which count more than those that are recognised. Raises
     TopologyError for a lacking role, and for joints that are not below each other as roles are.
     """
-    found = _indices(own, stated)
-    hips, head = found["hips"], found["head"]
-    path = skeleton.joint_chain(own.parents, head)
+    indices = _indices(joints, stated)
+    hips, head = indices["hips"], indices["head"]
+    path = skeleton.joint_chain(joints.parents, head)
     if hips not in path:
         raise TopologyError(
-            f"joint {own.names[head]!r} (head) is not below {own.names[hips]!r} (hips)"
+            f"joint {joints.names[head]!r} (head) is not below {joints.names[hips]!r} (hips)"
         )
     between = path[path.index(hips) + 1 : -1]
-    limbs = {role: joint for role, joint in found.items() if role in LIMB_ROLES}
-    split = _spine_length(own, between, found)
+    limbs = {role: joint for role, joint in indices.items() if role in LIMB_ROLES}
+    split = _spine_length(joints, between, indices)
     if not split:
         raise TopologyError(
-            f"no joint of the spine between {own.names[hips]!r} (hips) and "
-            f"{own.names[head]!r} (head), expected one or more"
+            f"no joint of the spine between {joints.names[hips]!r} (hips) and "
+            f"{joints.names[head]!r} (head), expected one or more"
         )
-    _expect_order(own, hips, limbs)
+    _expect_order(joints, hips, limbs)
     # Without joints at the position of the next one, whose turns that one has too.
     repeats = {
         a
-        for part in (between[:split], between[split:])
-        for a, b in pairwise(part)
-        if own.parents[b] == a and not own.offsets[b].any()
+        for segment in (between[:split], between[split:])
+        for a, b in pairwise(segment)
+        if joints.parents[b] == a and not joints.offsets[b].any()
     }
     spine = tuple(joint for joint in between[:split] if joint not in repeats)
     neck = tuple(joint for joint in between[split:] if joint not in repeats)
     return RoleJoints(limbs, hips, spine, neck, head)
 
 
-def _indices(own: Skeleton, stated: StatedRoles) -> dict[str, int]:
+def _indices(joints: Skeleton, stated: StatedRoles) -> dict[str, int]:
     """Return the joint of each role that is stated or sure; TopologyError if a needed one lacks."""
-    guesses = joint_recognition.recognise(own.names, own.parents)
-    said: dict[str, str] = {}
+    guesses = joint_recognition.recognise(joints.names, joints.parents)
+    stated_joints: dict[str, str] = {}
     for role, names in stated.items():
-        there = [name for name in names if name in own.names]
+        there = [name for name in names if name in joints.names]
         if len(there) > 1:
             raise TopologyError(f"skeleton.roles.{role}: found joints {there}, expected one")
-        said |= {role: there[0]} if there else {}
+        stated_joints |= {role: there[0]} if there else {}
     sure = joint_recognition.sure_roles(
-        {role: one for role, one in guesses.items() if one.joint not in said.values()}
+        {role: one for role, one in guesses.items() if one.joint not in stated_joints.values()}
     )
-    known = sure | said
-    lacking = [role for role in NEEDED if role not in known]
+    by_role = sure | stated_joints
+    lacking = [role for role in NEEDED if role not in by_role]
     if lacking:
-        told = [
+        descriptions = [
             f"{role} ({guesses[role].joint}? {'; '.join(guesses[role].reasons)})"
             if role in guesses and guesses[role].reasons
             else role
             for role in lacking
         ]
         raise TopologyError(
-            f"skeleton.topology: found no joint for {', '.join(told)}, expected one for each; "
-            f"{STATEMENT.format(lacking[0])}"
+            f"skeleton.topology: found no joint for {', '.join(descriptions)}, expected one for "
+            f"each; {STATEMENT.format(lacking[0])}"
         )
-    return {role: own.names.index(known[role]) for role in ROLES if role in known}
+    return {role: joints.names.index(by_role[role]) for role in ROLES if role in by_role}
 
 
-def _spine_length(own: Skeleton, between: Sequence[int], found: Mapping[str, int]) -> int:
+def _spine_length(joints: Skeleton, between: Sequence[int], indices: Mapping[str, int]) -> int:
     """Return the number of joints between hips and head that belong to the spine."""
-    neck = found.get("neck")
+    neck = indices.get("neck")
     # Of a body without a spine the joint that carries the arms is one.
     if neck in between[1:]:
         return between.index(neck)
-    arms = [found.get(side + "Shoulder", found[side + "UpperArm"]) for side in SIDES]
-    paths = [set(skeleton.joint_chain(own.parents, arm)) for arm in arms]
+    arms = [indices.get(side + "Shoulder", indices[side + "UpperArm"]) for side in SIDES]
+    paths = [set(skeleton.joint_chain(joints.parents, arm)) for arm in arms]
     return sum(joint in paths[0] & paths[1] for joint in between)
 
 
-def _expect_order(own: Skeleton, hips: int, limbs: Mapping[str, int]) -> None:
+def _expect_order(joints: Skeleton, hips: int, limbs: Mapping[str, int]) -> None:
     """Raise TopologyError unless each joint of a limb is below the one before and the hips."""
     for limb in (ARM, LEG):
         for side in SIDES:
             above = ("hips", hips)
             for role in (side + name for name in limb if side + name in limbs):
-                if above[1] not in skeleton.joint_chain(own.parents, limbs[role])[:-1]:
+                if above[1] not in skeleton.joint_chain(joints.parents, limbs[role])[:-1]:
                     raise TopologyError(
-                        f"joint {own.names[limbs[role]]!r} ({role}) is not below "
-                        f"{own.names[above[1]]!r} ({above[0]}); {STATEMENT.format(role)}"
+                        f"joint {joints.names[limbs[role]]!r} ({role}) is not below "
+                        f"{joints.names[above[1]]!r} ({above[0]}); {STATEMENT.format(role)}"
                     )
                 above = (role, limbs[role])
 
@@ -183,7 +183,9 @@ def numbered(name: str, count: int) -> tuple[str, ...]:
 
 def common_topology(bodies: Sequence[RoleJoints]) -> Topology:
     """Return the topology of roles that all bodies have, with the longest common chains."""
-    spine, neck = (min(len(getattr(body, part)) for body in bodies) for part in ("spine", "neck"))
+    spine, neck = (
+        min(len(getattr(body, chain_name)) for body in bodies) for chain_name in ("spine", "neck")
+    )
     shared = set.intersection(*(set(body.limbs) for body in bodies))
     links: list[tuple[str, str]] = [("hips", "")]
     for side in SIDES:
@@ -211,10 +213,10 @@ def model_roles(names: Sequence[str]) -> dict[str, str]:
     trunk = dict(zip(("spine", "chest"), chain, strict=False))
     if len(chain) > 2:
         trunk = {"spine": chain[0], "chest": chain[len(chain) // 2], "upperChest": chain[-1]}
-    known = {role: role for role in ROLES if role in names} | trunk
+    by_role = {role: role for role in ROLES if role in names} | trunk
     if "neck1" in names:
-        known["neck"] = "neck1"
-    return {role: known[role] for role in ROLES if role in known}
+        by_role["neck"] = "neck1"
+    return {role: by_role[role] for role in ROLES if role in by_role}
 
 
 def joint_points(
@@ -232,24 +234,24 @@ def joint_points(
     shares = [
         np.median(
             [
-                _shares(own[part], bones)
-                for own, bones in zip(chains, lengths, strict=True)
-                if len(own[part]) == counts[part]
+                _shares(body_chains[number], bones)
+                for body_chains, bones in zip(chains, lengths, strict=True)
+                if len(body_chains[number]) == counts[number]
             ],
             axis=0,
         )
-        for part in (0, 1)
+        for number in (0, 1)
     ]
     names = numbered("spine", topology.spine), (*numbered("neck", topology.neck), "head")
-    found = []
-    for body, own, bones in zip(bodies, chains, lengths, strict=True):
+    points_of_bodies = []
+    for body, body_chains, bones in zip(bodies, chains, lengths, strict=True):
         limbs = {role: joint for role, joint in body.limbs.items() if role in topology.names}
         points = {name: JointPoint(at, at) for name, at in {"hips": body.hips, **limbs}.items()}
-        for part in (0, 1):
-            placed = _sample(own[part], bones, shares[part])
-            points |= dict(zip(names[part], placed, strict=True))
-        found.append({name: points[name] for name in topology.names})
-    return found
+        for number in (0, 1):
+            placed = _sample(body_chains[number], bones, shares[number])
+            points |= dict(zip(names[number], placed, strict=True))
+        points_of_bodies.append({name: points[name] for name in topology.names})
+    return points_of_bodies
 
 
 def _shares(chain: Sequence[int], bones: Floats) -> Floats:
@@ -264,10 +266,14 @@ def _sample(chain: Sequence[int], bones: Floats, shares: Floats) -> list[JointPo
         return [JointPoint(joint, joint) for joint in chain]
     if len(shares) == 1:
         return [JointPoint(chain[-1], chain[-1])]
-    own = _shares(chain, bones)
-    found = [JointPoint(chain[0], chain[0])]
+    chain_shares = _shares(chain, bones)
+    points = [JointPoint(chain[0], chain[0])]
     for share in shares[1:-1]:
-        at = int(np.clip(np.searchsorted(own, share, side="right") - 1, 0, len(chain) - 2))
-        along = float((share - own[at]) / (own[at + 1] - own[at])) if own[at + 1] > own[at] else 0.0
-        found.append(JointPoint(chain[at], chain[at + 1], along))
-    return [*found, JointPoint(chain[-1], chain[-1])]
+        at = int(np.clip(np.searchsorted(chain_shares, share, side="right") - 1, 0, len(chain) - 2))
+        along = (
+            float((share - chain_shares[at]) / (chain_shares[at + 1] - chain_shares[at]))
+            if chain_shares[at + 1] > chain_shares[at]
+            else 0.0
+        )
+        points.append(JointPoint(chain[at], chain[at + 1], along))
+    return [*points, JointPoint(chain[-1], chain[-1])]

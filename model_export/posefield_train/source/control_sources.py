@@ -93,14 +93,14 @@ class Auto(RecipePart):
 
     @model_validator(mode="after")
     def _check_keys(self) -> "Auto":
-        given = [key for key in ("joint", "joints", "at") if getattr(self, key) is not None]
+        stated = [key for key in ("joint", "joints", "at") if getattr(self, key) is not None]
         takes, needs = ALLOWED_KEYS.get(self.quantity, ()), REQUIRED_KEYS.get(self.quantity, ())
-        if not set(needs) <= set(given) <= set(takes):
+        if not set(needs) <= set(stated) <= set(takes):
             expected = " and ".join(takes) or "nothing"
             optional = " or nothing" if takes and not needs else ""
-            found = " and ".join(given) or "nothing"
+            listed = " and ".join(stated) or "nothing"
             raise ValueError(
-                f"found {found} besides quantity {self.quantity!r}, expected {expected}{optional}"
+                f"found {listed} besides quantity {self.quantity!r}, expected {expected}{optional}"
             )
         if (self.quantity, self.at) == (ROOT_HEIGHT, "farthest"):
             raise KeyFault("found 'farthest', but the root is never away from itself", "at")
@@ -178,10 +178,10 @@ UNIT_RANGE = [0.0, 1.0]
 DEFAULT_DISTANCE_CM = 2.0
 
 
-def _check_curve_range(found: list[float] | None) -> list[float] | None:
-    if found is not None and not found[0] < found[1]:
-        raise ValueError(f"found {found}, expected the smaller end first")
-    return found
+def _check_curve_range(ends_of_range: list[float] | None) -> list[float] | None:
+    if ends_of_range is not None and not ends_of_range[0] < ends_of_range[1]:
+        raise ValueError(f"found {ends_of_range}, expected the smaller end first")
+    return ends_of_range
 
 
 class CurveKeys(RecipePart):
@@ -253,17 +253,17 @@ class Curves(RecipePart):
 
     @model_validator(mode="after")
     def _check_place(self) -> "Curves":
-        places = ("column", "suffix", "rate")
-        found = [key for key in places if getattr(self, key) is not None]
-        if len(found) != 1:
+        keys = ("column", "suffix", "rate")
+        stated = [key for key in keys if getattr(self, key) is not None]
+        if len(stated) != 1:
             raise ValueError(
-                f"found {', '.join(found) or 'none'}, expected one of {', '.join(places)}, which "
+                f"found {', '.join(stated) or 'none'}, expected one of {', '.join(keys)}, which "
                 "says where the curves of a clip are"
             )
         return self
 
     def curve(self, name: str) -> Curve:
         """Return the curve of a name with its range and distance."""
-        own = self.of.get(name, CurveKeys())
-        low, high = own.range or self.range
-        return Curve(name, low, high, 0.01 * (own.distance_cm or self.distance_cm))
+        overrides = self.of.get(name, CurveKeys())
+        low, high = overrides.range or self.range
+        return Curve(name, low, high, 0.01 * (overrides.distance_cm or self.distance_cm))

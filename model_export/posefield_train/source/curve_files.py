@@ -25,15 +25,15 @@ RESTING_JOINT = "Root"
 
 def _open(row: ClipRow, rate: float | None) -> ClipTable:
     """Return the table of a row's curves; of a file of motions the weights of blend shapes."""
-    place = row.curve_file
-    if PurePosixPath(place.name).suffix.lower() not in motion_readers.SUFFIXES:
-        return _expect_frames(clip_table.open_table(place))
-    curves = motion_readers.read(place, ReadOptions(rate, row.animation)).curves
+    file = row.curve_file
+    if PurePosixPath(file.name).suffix.lower() not in motion_readers.SUFFIXES:
+        return _expect_frames(clip_table.open_table(file))
+    curves = motion_readers.read(file, ReadOptions(rate, row.animation)).curves
     columns = {name: map(repr, values.tolist()) for name, values in curves.items()}
     cells = zip(*columns.values(), strict=True)
     numbered = ((str(frame), *values) for frame, values in enumerate(cells))
     records = [dict(zip((FRAME, *columns), values, strict=True)) for values in numbered]
-    return _expect_frames(ClipTable(str(place), list(enumerate(records))))
+    return _expect_frames(ClipTable(str(file), list(enumerate(records))))
 
 
 def find_curves(keys: Curves, rows: Sequence[ClipRow], rate: float | None) -> tuple[Curve, ...]:
@@ -64,40 +64,40 @@ def read(row: ClipRow, keys: Curves, curves: tuple[Curve, ...], rate: float | No
     return _values(table, curves)
 
 
-def read_known(place: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveValues, list[str]]:
+def read_known(file: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveValues, list[str]]:
     """Return the curves of a trained model from a file, and the names of its other columns.
 
     Raises RecipeError for a missing column or frame, and for a cell that is not a number within the
     curve's range.
     """
-    table, names = _expect_frames(clip_table.open_table(place)), [curve.name for curve in curves]
+    table, names = _expect_frames(clip_table.open_table(file)), [curve.name for curve in curves]
     missing = [name for name in names if name not in table.columns]
     if missing:
         hint = did_you_mean(missing[0], table.columns)
         raise RecipeError(table.name, f"found no curves {missing}{hint}, expected {names}", 1)
-    others = [name for name in table.columns if name not in (FRAME, *names)]
-    return _values(table, curves), others
+    unused = [name for name in table.columns if name not in (FRAME, *names)]
+    return _values(table, curves), unused
 
 
-def with_curves(clip: Clip, own: CurveValues, row: ClipRow) -> Clip:
+def with_curves(clip: Clip, curves: CurveValues, row: ClipRow) -> Clip:
     """Return a clip of all frames of a motion file with its curves.
 
     Raises RecipeError for another number of frames.
     """
-    if len(own.values) != len(clip):
+    if len(curves.values) != len(clip):
         raise row.error(
-            f"{row.curve_file} has {len(own.values)} frames of curves and {row.place} has "
+            f"{row.curve_file} has {len(curves.values)} frames of curves and {row.file} has "
             f"{len(clip)} frames, expected as many"
         )
-    return replace(clip, curves=own)
+    return replace(clip, curves=curves)
 
 
-def resting_clip(own: CurveValues, rate: float) -> Clip:
+def resting_clip(curves: CurveValues, rate: float) -> Clip:
     """Return a clip of curves on one joint that rests at the origin."""
-    frames, nothing = len(own.values), np.zeros((1, 3))
+    frames, nothing = len(curves.values), np.zeros((1, 3))
     joints = Skeleton((RESTING_JOINT,), (-1,), nothing, (), np.zeros((0, 3)))
     rotations = np.tile(quat.IDENTITY, (frames, 1, 1))
-    return Clip(joints, rotations, np.zeros((frames, 1, 3)), rate, own)
+    return Clip(joints, rotations, np.zeros((frames, 1, 3)), rate, curves)
 
 
 def _expect_frames(table: ClipTable) -> ClipTable:
@@ -112,15 +112,15 @@ def _expect_frames(table: ClipTable) -> ClipTable:
 
 
 def _expect_columns(table: ClipTable, names: Sequence[str], keys: Curves) -> None:
-    found = [name for name in table.columns if name != FRAME]
-    missing = [name for name in names if name not in found]
+    columns = [name for name in table.columns if name != FRAME]
+    missing = [name for name in names if name not in columns]
     # Columns beside those that the recipe names are not curves of the family.
-    more = [] if keys.names else [name for name in found if name not in names]
+    more = [] if keys.names else [name for name in columns if name not in names]
     if missing or more:
-        hint = did_you_mean(missing[0], found) if missing else ""
-        parts = [f"no curves {missing}{hint}"] * bool(missing)
-        parts += [f"curves {more} that the first clip lacks"] * bool(more)
-        raise RecipeError(table.name, f"found {' and '.join(parts)}, expected {list(names)}", 1)
+        hint = did_you_mean(missing[0], columns) if missing else ""
+        faults = [f"no curves {missing}{hint}"] * bool(missing)
+        faults += [f"curves {more} that the first clip lacks"] * bool(more)
+        raise RecipeError(table.name, f"found {' and '.join(faults)}, expected {list(names)}", 1)
 
 
 def _values(table: ClipTable, curves: tuple[Curve, ...]) -> CurveValues:

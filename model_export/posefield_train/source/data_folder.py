@@ -68,11 +68,11 @@ class ZipMember:
         if info.flag_bits & ENCRYPTED:
             raise RecipeError(str(self), "found an encrypted member, expected no password")
         if info.compress_type not in COMPRESSION_METHODS:
-            known = " or ".join(
+            methods = " or ".join(
                 f"{number} ({name})" for number, name in COMPRESSION_METHODS.items()
             )
             raise RecipeError(
-                str(self), f"found compression method {info.compress_type}, expected {known}"
+                str(self), f"found compression method {info.compress_type}, expected {methods}"
             )
         try:
             file = _open_zip(self.archive).open(self.entry)
@@ -113,47 +113,49 @@ def _member_error(member: ZipMember, fault: Exception) -> RecipeError:
 FileLocation = Path | ZipMember
 
 
-def read(place: FileLocation, most: int, what: str) -> bytes:
+def read(file_location: FileLocation, max_bytes: int, what: str) -> bytes:
     """Return the whole content of a file; `what` names it in the message of one that is too large.
 
-    Raises RecipeError for more than `most` bytes, reading at most one byte more, and if the file
-    cannot be read.
+    Raises RecipeError for more than `max_bytes` bytes, reading at most one byte more, and if the
+    file cannot be read.
     """
     try:
-        with place.open("rb") as file:
-            content = file.read(most + 1)
+        with file_location.open("rb") as file:
+            content = file.read(max_bytes + 1)
     except OSError as fault:
-        raise RecipeError(str(place), f"cannot be read: {fault.strerror}") from fault
-    if len(content) > most:
-        size = f"{most // 1000} kB"
-        raise RecipeError(str(place), f"found more than {size}, expected {what} of at most {size}")
+        raise RecipeError(str(file_location), f"cannot be read: {fault.strerror}") from fault
+    if len(content) > max_bytes:
+        size = f"{max_bytes // 1000} kB"
+        raise RecipeError(
+            str(file_location), f"found more than {size}, expected {what} of at most {size}"
+        )
     return content
 
 
-def names_beside(place: FileLocation) -> list[str]:
+def names_beside(file: FileLocation) -> list[str]:
     """Return the names of the files in the folder of a file, in order."""
-    if isinstance(place, Path):
-        return sorted(path.name for path in place.parent.iterdir() if path.is_file())
-    folder = PurePosixPath(place.entry).parent
-    entries = map(PurePosixPath, _open_zip(place.archive).namelist())
+    if isinstance(file, Path):
+        return sorted(path.name for path in file.parent.iterdir() if path.is_file())
+    folder = PurePosixPath(file.entry).parent
+    entries = map(PurePosixPath, _open_zip(file.archive).namelist())
     return sorted(entry.name for entry in entries if entry.parent == folder)
 
 
-def beside(place: FileLocation, name: str) -> FileLocation:
+def beside(file: FileLocation, name: str) -> FileLocation:
     """Return the file with a relative name such as "data/walk.bin" seen from the folder of a file.
 
     Raises RecipeError for a name that leads out of this folder, and if there is no such file.
     """
-    parts = PurePosixPath(name).parts
-    if not parts or parts[0] == "/" or ".." in parts:
-        raise RecipeError(str(place), f"file {name!r}, expected a path below its folder")
-    if isinstance(place, Path):
-        found: FileLocation = place.parent / name
+    components = PurePosixPath(name).parts
+    if not components or components[0] == "/" or ".." in components:
+        raise RecipeError(str(file), f"file {name!r}, expected a path below its folder")
+    if isinstance(file, Path):
+        neighbour: FileLocation = file.parent / name
     else:
-        found = ZipMember(place.archive, str(PurePosixPath(place.entry).parent / name))
-    if not _is_file(found):
-        raise RecipeError(str(place), f"no file {name!r} beside it, expected one")
-    return found
+        neighbour = ZipMember(file.archive, str(PurePosixPath(file.entry).parent / name))
+    if not _is_file(neighbour):
+        raise RecipeError(str(file), f"no file {name!r} beside it, expected one")
+    return neighbour
 
 
 def find(folder: Path, name: str) -> FileLocation:
@@ -162,23 +164,26 @@ def find(folder: Path, name: str) -> FileLocation:
     If the file does not exist, takes.zip is searched for "takes/bvh/walk.bvh" and "bvh/walk.bvh".
     Raises RecipeError, naming every path tried, if none exists.
     """
-    parts = PurePosixPath(name).parts
-    if not parts or parts[0] == "/" or ".." in parts:
+    components = PurePosixPath(name).parts
+    if not components or components[0] == "/" or ".." in components:
         raise RecipeError(folder, f"file {name!r}, expected a path below the data folder")
-    places: list[FileLocation] = [folder / name]
-    archive = folder / f"{parts[0]}.zip"
-    if len(parts) > 1 and archive.is_file():
-        places += [ZipMember(archive, "/".join(parts)), ZipMember(archive, "/".join(parts[1:]))]
-    for place in places:
-        if _is_file(place):
-            return place
-    tried = ", ".join(str(place) for place in places)
+    candidates: list[FileLocation] = [folder / name]
+    archive = folder / f"{components[0]}.zip"
+    if len(components) > 1 and archive.is_file():
+        candidates += [
+            ZipMember(archive, "/".join(components)),
+            ZipMember(archive, "/".join(components[1:])),
+        ]
+    for candidate in candidates:
+        if _is_file(candidate):
+            return candidate
+    tried = ", ".join(str(candidate) for candidate in candidates)
     raise RecipeError(folder, f"no file {name!r}; tried {tried}")
 
 
-def _is_file(place: FileLocation) -> bool:
+def _is_file(file: FileLocation) -> bool:
     try:
-        return place.is_file()
+        return file.is_file()
     except OSError:  # a name that no file can have
         return False
 
@@ -199,24 +204,24 @@ def shipped_names() -> list[str]:
     return sorted(path.stem for path in RECIPES.glob("*.toml"))
 
 
-def recipe_file(given: Path, data: Path | None) -> Path:
+def recipe_file(argument: Path, data: Path | None) -> Path:
     """Return the recipe file of a command's argument: a path, or the name of a shipped recipe.
 
     data: folder of the motion data, which a shipped recipe needs. Raises InvalidField for an
     unknown name and for a shipped recipe without data.
     """
-    if given.suffix or len(given.parts) > 1 or given.exists():
-        return given
-    if given.name not in (known := shipped_names()):
-        shipped = ", ".join(known)
-        found = f"{given.name!r}{did_you_mean(given.name, known)}"
-        raise InvalidField("RECIPE", f"{found}, expected a TOML file or one of {shipped}")
+    if argument.suffix or len(argument.parts) > 1 or argument.exists():
+        return argument
+    if argument.name not in (names := shipped_names()):
+        shipped = ", ".join(names)
+        quoted = f"{argument.name!r}{did_you_mean(argument.name, names)}"
+        raise InvalidField("RECIPE", f"{quoted}, expected a TOML file or one of {shipped}")
     if data is None:
-        raise InvalidField("data", f"missing, expected the folder of the data of {given.name}")
-    return RECIPES / f"{given.name}.toml"
+        raise InvalidField("data", f"missing, expected the folder of the data of {argument.name}")
+    return RECIPES / f"{argument.name}.toml"
 
 
-def find_table(folder: Path, name: str, beside: Path | None = None) -> FileLocation:
+def find_table(folder: Path, name: str, recipe_folder: Path | None = None) -> FileLocation:
     """Return the table of clips in a data folder, else beside the recipe, else the shipped one.
 
     beside: folder of the recipe. Raises RecipeError, as `data_folder.find`, if none exists.
@@ -224,17 +229,21 @@ def find_table(folder: Path, name: str, beside: Path | None = None) -> FileLocat
     try:
         return find(folder, name)
     except RecipeError:
-        if beside is not None and ".." not in Path(name).parts and (beside / name).is_file():
-            return beside / name
+        if (
+            recipe_folder is not None
+            and ".." not in Path(name).parts
+            and (recipe_folder / name).is_file()
+        ):
+            return recipe_folder / name
         shipped = {path.relative_to(RECIPES).as_posix(): path for path in RECIPES.glob("*/*.csv")}
         if name not in shipped:
             raise
         return shipped[name]
 
 
-def table_notes(place: str) -> list[str]:
+def table_notes(table: str) -> list[str]:
     """Return a note on the use of a shipped table; none for a table of the data folder."""
-    if not Path(place).is_relative_to(RECIPES):
+    if not Path(table).is_relative_to(RECIPES):
         return []
-    name = Path(place).relative_to(RECIPES).as_posix()
+    name = Path(table).relative_to(RECIPES).as_posix()
     return [f"{name}: the data folder has no such table, the one that ships was used"]

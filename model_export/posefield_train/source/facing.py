@@ -66,42 +66,42 @@ class Evidence:
 
 
 def find_facing(
-    clips: Sequence[Clip], asked: Facing | None, roles: Mapping[str, str], cyclic: bool
+    clips: Sequence[Clip], facing: Facing | None, roles: Mapping[str, str], cyclic: bool
 ) -> tuple[float | None, tuple[str, ...]]:
     """Return the facing of a family's clips, which have one skeleton, and notes.
 
     The facing is in degrees to the left of the root's +z; None without one.
 
-    asked: of the recipe; None means +z. roles: joints by role. Raises FacingError if the motion
+    facing: of the recipe; None means +z. roles: joints by role. Raises FacingError if the motion
     contradicts it, or does not tell it.
     """
-    if asked == "none":
+    if facing == "none":
         return None, ()
-    body = hips_evidence(clips, roles, asked == "roles")
-    way = travel_evidence(clips, cyclic)
-    if asked in ("hips", "roles"):
-        return _measured(body, asked, "two joints of a left and a right side", way)
-    if asked == "travel":
-        degrees, notes = _measured(way, asked, "clips that travel in one direction")
+    body = hips_evidence(clips, roles, facing == "roles")
+    travel = travel_evidence(clips, cyclic)
+    if facing in ("hips", "roles"):
+        return _measured(body, facing, "two joints of a left and a right side", travel)
+    if facing == "travel":
+        degrees, notes = _measured(travel, facing, "clips that travel in one direction")
         _verify(body, degrees, "measured from the travel")
         return degrees, notes
-    stated = "+z, the default," if asked is None else asked
-    for evidence in (body, way):
-        _verify(evidence, AXES[asked or "+z"], f"stated as {stated}")
-    unknown = body is None and way is None and asked is None
+    stated = "+z, the default," if facing is None else facing
+    for evidence in (body, travel):
+        _verify(evidence, AXES[facing or "+z"], f"stated as {stated}")
+    unknown = body is None and travel is None and facing is None
     notes = ("nothing tells the facing: +z of the root is taken; say motion.facing",)
-    return AXES[asked or "+z"], notes if unknown else ()
+    return AXES[facing or "+z"], notes if unknown else ()
 
 
 def _measured(
-    evidence: Evidence | None, asked: str, needed: str, other: Evidence | None = None
+    evidence: Evidence | None, stated: str, needed: str, other: Evidence | None = None
 ) -> tuple[float, tuple[str, ...]]:
     """Return the axis of the evidence, degrees, and the notes."""
     if evidence is None:
-        raise FacingError(f"motion.facing: found {asked!r}, but no evidence; expected {needed}")
+        raise FacingError(f"motion.facing: found {stated!r}, but no evidence; expected {needed}")
     axis = evidence.axis
-    apart = _difference(evidence.mean, AXES[axis])
-    if abs(apart) > CLEAR_ANGLE:
+    deviation = _difference(evidence.mean, AXES[axis])
+    if abs(deviation) > CLEAR_ANGLE:
         raise FacingError(
             f"motion.facing: {evidence.source} {_side(evidence.mean)} of the root's +z, between "
             "two axes; expected at most 30 degrees from one: turn the root in the files"
@@ -117,24 +117,24 @@ def _verify(evidence: Evidence | None, degrees: float, origin: str) -> None:
     """Raise FacingError if clips contradict a facing."""
     if evidence is None:
         return
-    apart = np.abs(_difference(evidence.angles, degrees))
-    wrong = np.flatnonzero(apart > LARGEST_ANGLE)
+    deviations = np.abs(_difference(evidence.angles, degrees))
+    wrong = np.flatnonzero(deviations > LARGEST_ANGLE)
     if not len(wrong):
         return
-    said = f"{evidence.source} {_side(evidence.mean)} of the root's +z"
-    known = int(np.sum(np.isfinite(evidence.angles)))
-    own = evidence.axis
+    evidence_text = f"{evidence.source} {_side(evidence.mean)} of the root's +z"
+    count = int(np.sum(np.isfinite(evidence.angles)))
+    axis = evidence.axis
     if abs(_difference(evidence.mean, degrees)) <= LARGEST_ANGLE:
         first = int(wrong[0])
-        said += f", but in {len(wrong)} of {known} clips, such as this, "
-        said += f"{_side(evidence.angles[first])}"
+        evidence_text += f", but in {len(wrong)} of {count} clips, such as this, "
+        evidence_text += f"{_side(evidence.angles[first])}"
         hint = "files of one family have to face alike"
     else:
-        said += f" in {len(wrong)} of {known} clips"
-        hint = f"say motion.facing = '{own}'{evidence.alternative}"
+        evidence_text += f" in {len(wrong)} of {count} clips"
+        hint = f"say motion.facing = '{axis}'{evidence.alternative}"
     raise FacingError(
-        f"motion.facing: {origin} but {said}; expected at most {LARGEST_ANGLE:.0f} degrees "
-        f"between them: {hint}",
+        f"motion.facing: {origin} but {evidence_text}; expected at most {LARGEST_ANGLE:.0f} "
+        f"degrees between them: {hint}",
         int(wrong[0]),
     )
 
@@ -146,18 +146,20 @@ def hips_evidence(
 
     roles: joints by role; other joints are recognised by their names unless `only_roles`.
     """
-    own = clips[0].skeleton
-    named = {} if only_roles else joint_recognition.roles_of(own.names, own.parents)
-    known = {role: joint for role, joint in (named | dict(roles)).items() if joint in own.names}
+    joints = clips[0].skeleton
+    recognised = {} if only_roles else joint_recognition.roles_of(joints.names, joints.parents)
+    by_role = {
+        role: joint for role, joint in (recognised | dict(roles)).items() if joint in joints.names
+    }
     for pair in PAIRS:
-        sides = [known.get(f"{side}{pair}") for side in ("left", "right")]
+        sides = [by_role.get(f"{side}{pair}") for side in ("left", "right")]
         if not all(sides):
             continue
-        left, right = (own.names.index(str(side)) for side in sides)
+        left, right = (joints.names.index(str(side)) for side in sides)
         source = f"the line from {sides[1]!r} to {sides[0]!r} faces"
-        found = _evidence([_pair_vector(clip, left, right) for clip in clips], source)
-        if found is not None:
-            return found
+        evidence = _evidence([_pair_vector(clip, left, right) for clip in clips], source)
+        if evidence is not None:
+            return evidence
     return None
 
 
@@ -171,9 +173,9 @@ def travel_evidence(clips: Sequence[Clip], cyclic: bool) -> Evidence | None:
     if abs(vectors.sum()) < AGREEMENT * np.abs(vectors).sum():
         return None
     mean = float(np.degrees(np.angle(vectors.sum())))
-    way = float(np.mean(np.abs(vectors)))
+    distance = float(np.mean(np.abs(vectors)))
     # Single clips may turn or step aside: the family's direction counts.
-    source = f"the clips travel {way:.2f} m (mean)"
+    source = f"the clips travel {distance:.2f} m (mean)"
     sideways = ", or 'hips' for a body that moves sideways or backwards"
     return Evidence(np.full(len(clips), mean), mean, source, sideways)
 
@@ -208,20 +210,20 @@ def _pair_vector(clip: Clip, left: int, right: int) -> complex:
     if lengths.max() < 1e-6:
         return 0.0
     # Forward is left turned by a quarter: x to z, and z to -x.
-    ahead = (across[:, 0] - 1j * across[:, 2]) / np.maximum(lengths, 1e-6)
-    relative = ahead * np.exp(-1j * _upright_turn(clip))
+    forward = (across[:, 0] - 1j * across[:, 2]) / np.maximum(lengths, 1e-6)
+    relative = forward * np.exp(-1j * _upright_turn(clip))
     return complex(np.nanmean(relative)) if np.isfinite(relative).any() else 0.0
 
 
 def _travel_vector(clip: Clip) -> complex:
     """Return the way of the root, m; the argument is its angle to the left of the root's +z."""
-    way = clip.root_path[-1] - clip.root_path[0]
+    displacement = clip.root_path[-1] - clip.root_path[0]
     turn = _upright_turn(clip)
     turn = turn[np.isfinite(turn)]
     if not len(turn):
         return 0.0
     mean = np.mean(np.exp(1j * turn))
-    return complex((way[2] + 1j * way[0]) * np.exp(-1j * np.angle(mean)))
+    return complex((displacement[2] + 1j * displacement[0]) * np.exp(-1j * np.angle(mean)))
 
 
 def _difference(a: Floats | float, b: float) -> Floats:
@@ -244,13 +246,13 @@ def turn_basis(clip: Clip, degrees: float) -> Clip:
     if degrees == 0.0:
         return clip
     back = quat.from_axis_angle(UP, np.radians(-degrees))
-    own = clip.skeleton
+    joints = clip.skeleton
     rotations = clip.rotations.copy()
     rotations[..., 1:] = quat.rotate(back, rotations[..., 1:])
     turned = replace(
-        own,
-        offsets=quat.rotate(back, own.offsets),
-        tip_offsets=quat.rotate(back, own.tip_offsets),
+        joints,
+        offsets=quat.rotate(back, joints.offsets),
+        tip_offsets=quat.rotate(back, joints.tip_offsets),
     )
     return replace(
         clip,

@@ -70,8 +70,8 @@ def find_faults(positions: Positions, rate: float, rest: Floats) -> FrameFaults:
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=-1)
     leaps = find_leaps(steps, rate)
     from_rest = _way_from_rest(positions, rest)
-    kept = tuple(leap for leap in leaps if leap.frame > 0 or not from_rest)
-    return FrameFaults(from_rest, _repeated(steps, rate), kept)
+    motion_leaps = tuple(leap for leap in leaps if leap.frame > 0 or not from_rest)
+    return FrameFaults(from_rest, _repeated(steps, rate), motion_leaps)
 
 
 def find_leaps(steps: Floats, rate: float) -> list[Leap]:
@@ -95,16 +95,16 @@ def leaping_steps(steps: Floats, rate: float) -> tuple[Indices, Indices, Floats]
     # Few steps are long enough, so that the median is taken around these alone.
     frames, joints = np.nonzero(steps > FARTHER)
     around = np.clip(frames[:, None] + np.arange(-reach, reach + 1), 0, len(steps) - 1)
-    usual = np.median(steps[around, joints[:, None]], axis=1)
-    paces = np.maximum(usual, FARTHER / LEAP_FACTOR / 4)
-    own = steps[frames, joints]
-    kept = (own - paces > FARTHER) & (own > LEAP_FACTOR * paces)
-    return frames[kept], joints[kept], paces[kept]
+    medians = np.median(steps[around, joints[:, None]], axis=1)
+    paces = np.maximum(medians, FARTHER / LEAP_FACTOR / 4)
+    lengths = steps[frames, joints]
+    is_leap = (lengths - paces > FARTHER) & (lengths > LEAP_FACTOR * paces)
+    return frames[is_leap], joints[is_leap], paces[is_leap]
 
 
 def _way_from_rest(positions: Positions, rest: Floats) -> float:
     """Return how far the second pose (of F, J, 3) is from the first if that alone is at rest."""
-    first, following, after = (_distances(own) for own in (*positions[:2], positions[2]))
+    first, following, after = (_distances(pose) for pose in (*positions[:2], positions[2]))
     leaves = float(np.abs(following - first).max())
     goes_on = float(np.abs(after - following).max())
     is_rest = float(np.abs(first - _distances(rest)).max()) < AT_REST
@@ -121,13 +121,13 @@ def _repeated(steps: Floats, rate: float) -> tuple[int, ...]:
     farthest = steps.max(axis=1)
     same = farthest < REPEATED
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
-    found: list[int] = []
+    repeated: list[int] = []
     for first, end in edges.reshape(-1, 2).tolist():
         if first == 0 or end == len(same) or end - first > LONGEST_REPETITION * rate:
             continue
         if min(farthest[first - 1], farthest[end]) * rate > MOVING:
-            found += range(first + 1, end + 1)
-    return tuple(found)
+            repeated += range(first + 1, end + 1)
+    return tuple(repeated)
 
 
 def describe(
@@ -137,27 +137,27 @@ def describe(
 
     joints: their names or roles. left_out: whether frames at rest and clips across leaps were.
     """
-    found = []
+    sentences = []
     if faults.rests_first:
-        found.append(
+        sentences.append(
             f"frame 0 is the rest pose, {faults.from_rest:.2f} m from frame 1"
             f"{', and was left out' if left_out else ''}"
         )
     if faults.repeated:
         first = faults.repeated[0] / rate
-        found.append(
+        sentences.append(
             f"{_counted(len(faults.repeated), 'frame')} repeated while the body moves, the first "
             f"at {first:.2f} s: dropped frames"
         )
     if faults.leaps:
-        leap = max(faults.leaps, key=lambda own: own.distance)
+        leap = max(faults.leaps, key=lambda fault: fault.distance)
         what = "the whole body" if leap.whole else joints[leap.joint]
-        found.append(
+        sentences.append(
             f"{_counted(len(faults.leaps), 'leap')}, {what} by {leap.distance:.2f} m between "
             f"frames {leap.frame} and {leap.frame + 1}"
             f"{': clips across leaps were left out' if left_out else ''}"
         )
-    return found
+    return sentences
 
 
 def _counted(count: int, noun: str) -> str:

@@ -73,43 +73,43 @@ Tracks = Mapping[tuple[int, str], Track]
 
 def _read_tracks(document: GltfDocument, animation: Any) -> Tracks:
     """Return the curves of an animation; MotionFileError for those that break the format."""
-    found: dict[tuple[int, str], Track] = {}
+    tracks: dict[tuple[int, str], Track] = {}
     keys = 0
     for channel in animation.channels:
-        node, part = channel.target.node, channel.target.path
+        node, path = channel.target.node, channel.target.path
         document.expect_plain("an animation", channel.target)
-        if node is None or part not in KINDS:
+        if node is None or path not in KINDS:
             continue
-        if (node, part) in found or not 0 <= node < len(document.parts.nodes):
-            raise document.error(f"found the {part} of node {node} twice, expected one curve each")
+        if (node, path) in tracks or not 0 <= node < len(document.parts.nodes):
+            raise document.error(f"found the {path} of node {node} twice, expected one curve each")
         if not 0 <= channel.sampler < len(animation.samplers):
             raise document.error(f"names sampler {channel.sampler}, expected one of its own")
         sampler = animation.samplers[channel.sampler]
         document.expect_plain("an animation", animation, channel, sampler)
-        found[node, part] = _track(document, sampler, part)
-        keys += len(found[node, part].times)
+        tracks[node, path] = _track(document, sampler, path)
+        keys += len(tracks[node, path].times)
         if keys > MAX_KEYS:
             raise document.error(f"found {keys} keys or more, expected at most {MAX_KEYS}")
-    return found
+    return tracks
 
 
-def _track(document: GltfDocument, sampler: Any, part: str) -> Track:
+def _track(document: GltfDocument, sampler: Any, path: str) -> Track:
     times = gltf_rig.numbers(document, sampler.input, "SCALAR")[:, 0]
-    values = gltf_rig.numbers(document, sampler.output, KINDS[part])
-    is_rotation = part == "rotation"
+    values = gltf_rig.numbers(document, sampler.output, KINDS[path])
+    is_rotation = path == "rotation"
     if is_rotation:
         values = values[:, [3, 0, 1, 2]]
     kind = sampler.interpolation or "LINEAR"
     if kind not in ("LINEAR", "STEP", "CUBICSPLINE"):
         raise document.error(f"found interpolation {str(kind)[:20]!r}, expected one of glTF 2.0")
-    parts = 3 if kind == "CUBICSPLINE" else 1
-    count = parts * len(times)
-    if part == "weights" and len(values) % count == 0:
+    values_per_key = 3 if kind == "CUBICSPLINE" else 1
+    count = values_per_key * len(times)
+    if path == "weights" and len(values) % count == 0:
         values = values.reshape(count, -1)
     if len(values) != count or np.any(np.diff(times) <= 0.0):
         raise document.error(
-            f"found {len(times)} keys and {len(values)} values, expected {parts} values for each "
-            "of increasing times"
+            f"found {len(times)} keys and {len(values)} values, expected {values_per_key} values "
+            "for each of increasing times"
         )
     if kind == "CUBICSPLINE":
         before, values, after = values.reshape(len(times), 3, -1).swapaxes(0, 1)
@@ -121,7 +121,7 @@ MAX_POSES = 10_000_000
 """Limit of frames times joints, as for BVH."""
 
 
-def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> MotionFile:
+def read(content: bytes, source: str, read_neighbour: Beside, options: ReadOptions) -> MotionFile:
     """Return the motion of a .glb or .gltf file, in metres with Y up, as the format says.
 
     Raises MotionFileError for a file that is none, that has no skeleton, no animation or several
@@ -130,17 +130,17 @@ def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> M
     # pygltflib checks no types, so that wrong ones are found where they are used.
     wrong = TypeError, AttributeError, LookupError, ValueError, ArithmeticError
     with rest_joints.naming_faults(source, *wrong):
-        return _read(content, source, beside, options)
+        return _read(content, source, read_neighbour, options)
 
 
-def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> MotionFile:
-    document = gltf_rig.load(content, source, beside)
+def _read(content: bytes, source: str, read_neighbour: Beside, options: ReadOptions) -> MotionFile:
+    document = gltf_rig.load(content, source, read_neighbour)
     name, animation, notes = _chosen(document, options.animation)
     curves = _read_tracks(document, animation)
     joints = _joints(document, curves, options.skeleton)
     motion_file.expect_skeleton(source, joints.tree, options)
     moving = {*joints.nodes, *joints.outer}
-    tracks = {key: own for key, own in curves.items() if key[0] in moving and key[1] in PARTS}
+    tracks = {key: curves[key] for key in curves if key[0] in moving and key[1] in PARTS}
     if not tracks:
         raise document.error(f"animation {name!r} moves no joint, expected one of the skeleton")
     try:
@@ -155,7 +155,7 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
             f"found {len(times)} frames of {len(joints.nodes)} joints, expected at most "
             f"{MAX_POSES} poses of a joint"
         )
-    skeleton, rotations, translations, said = _plain(document, joints, tracks, times)
+    skeleton, rotations, translations, joint_notes = _plain(document, joints, tracks, times)
     weights = _weights(document, curves, times)
     return MotionFile(
         source,
@@ -167,36 +167,36 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
         evidence,
         metres_per_unit=1.0,
         up="y",
-        notes=(*notes, *joints.notes, *said, *motion_file.curve_notes(weights)),
+        notes=(*notes, *joints.notes, *joint_notes, *motion_file.curve_notes(weights)),
         curves=weights,
     )
 
 
-def _chosen(document: GltfDocument, wanted: str | None) -> tuple[str, Any, list[str]]:
+def _chosen(document: GltfDocument, requested: str | None) -> tuple[str, Any, list[str]]:
     """Return name and animation of the one that is wanted, or moves the skeleton; and notes."""
     animations = document.parts.animations
     if not animations:
         raise document.error("found no animation, a skeleton or mesh without motion, expected one")
-    names = [own.name or f"animation_{index}" for index, own in enumerate(animations)]
-    if wanted is not None:
-        chosen = motion_file.choice(names, wanted)
+    names = [candidate.name or f"animation_{index}" for index, candidate in enumerate(animations)]
+    if requested is not None:
+        chosen = motion_file.choice(names, requested)
         if chosen is None:
             listed = ", ".join(map(repr, names[:20]))
             raise document.error(
-                f"found the animations {listed}, expected one {wanted!r}, or a number from 1"
+                f"found the animations {listed}, expected one {requested!r}, or a number from 1"
             )
         return names[chosen], animations[chosen], []
-    found = _of_skeletons(document) if len(animations) > 1 else [0]
-    if len(found) > 1:
-        listed = ", ".join(f"{index + 1} {names[index]!r}" for index in found[:20])
+    candidates = _of_skeletons(document) if len(animations) > 1 else [0]
+    if len(candidates) > 1:
+        listed = ", ".join(f"{index + 1} {names[index]!r}" for index in candidates[:20])
         raise document.error(
-            f"found {len(found)} animations ({listed}), expected one: export each to a file of its "
-            "own, or give name or number of one (--animation, the column clips.animation)"
+            f"found {len(candidates)} animations ({listed}), expected one: export each to a file "
+            "of its own, or give name or number of one (--animation, the column clips.animation)"
         )
-    name = names[found[0]]
-    others = [repr(other) for index, other in enumerate(names) if index != found[0]]
-    said = f"animation {name!r} moves the skeleton: {', '.join(others[:20])} left out"
-    return name, animations[found[0]], [said] if others else []
+    name = names[candidates[0]]
+    unused = [repr(other) for index, other in enumerate(names) if index != candidates[0]]
+    note = f"animation {name!r} moves the skeleton: {', '.join(unused[:20])} left out"
+    return name, animations[candidates[0]], [note] if unused else []
 
 
 def _of_skeletons(document: GltfDocument) -> list[int]:
@@ -207,30 +207,34 @@ def _of_skeletons(document: GltfDocument) -> list[int]:
     """
     joints = {node for skin in document.parts.skins for node in skin.joints}
     animations = document.parts.animations
-    found = []
-    for index, own in enumerate(animations):
-        moved = {channel.target.node for channel in own.channels}
-        found += [index] if moved & joints or (not joints and len(moved) > 1) else []
-    if len(found) > 1:
-        curves = {index: _read_tracks(document, animations[index]) for index in found}
-        found = [index for index in found if _changing(curves[index])] or found
-    if len(found) > 1:
-        trees = {index: _joints(document, curves[index], None).tree for index in found}
+    indices = []
+    for index, animation in enumerate(animations):
+        nodes = {channel.target.node for channel in animation.channels}
+        indices += [index] if nodes & joints or (not joints and len(nodes) > 1) else []
+    if len(indices) > 1:
+        curves = {index: _read_tracks(document, animations[index]) for index in indices}
+        indices = [index for index in indices if _changing(curves[index])] or indices
+    if len(indices) > 1:
+        trees = {index: _joints(document, curves[index], None).tree for index in indices}
         is_person = joint_recognition.is_person
-        found = [index for index in found if is_person(*trees[index][1:])] or found
-    return found or list(range(len(animations)))
+        indices = [index for index in indices if is_person(*trees[index][1:])] or indices
+    return indices or list(range(len(animations)))
 
 
-def _joints(document: GltfDocument, curves: Tracks, wanted: str | None) -> GltfJoints:
+def _joints(document: GltfDocument, curves: Tracks, requested: str | None) -> GltfJoints:
     """Return the joints that curves move, or those with a name that is wanted."""
     groups = gltf_rig.skeletons(document)
-    animated = {node for node, part in curves if part in PARTS}
-    found = next((own for own in _moved(document, groups, curves, animated) if own), [])
-    if not found:
+    animated = {node for node, path in curves if path in PARTS}
+    candidates = next(
+        (members for members in _moved(document, groups, curves, animated) if members), []
+    )
+    if not candidates:
         return _animated_tree(document, animated)
-    trees = [gltf_rig.joint_tree(document, own) for own in found]
-    own = found[rest_joints.one_skeleton(document.source, trees, {wanted or ""})]
-    return gltf_rig.joints_of(document, own, [other for other in groups if other is not own])
+    trees = [gltf_rig.joint_tree(document, members) for members in candidates]
+    members = candidates[rest_joints.one_skeleton(document.source, trees, {requested or ""})]
+    return gltf_rig.joints_of(
+        document, members, [other for other in groups if other is not members]
+    )
 
 
 def _moved(
@@ -241,8 +245,8 @@ def _moved(
     animated: nodes with curves.
     """
     for nodes in (_changing(curves), animated):
-        yield [own for own in groups if nodes.intersection(own)]
-    yield [own for own in groups if animated <= {*document.ancestors(own[0])}]
+        yield [members for members in groups if nodes.intersection(members)]
+    yield [members for members in groups if animated <= {*document.ancestors(members[0])}]
 
 
 def _animated_tree(document: GltfDocument, animated: set[int]) -> GltfJoints:
@@ -252,42 +256,42 @@ def _animated_tree(document: GltfDocument, animated: set[int]) -> GltfJoints:
         raise document.error("found no skin and no tree of animated nodes, expected a skeleton")
     members: list[int] = []
     for node in document.below(root):
-        parts, above = document.parts.nodes[node], document.above.get(node)
-        if (node == root or above in members) and parts.mesh is None and parts.camera is None:
+        drawn, above = document.parts.nodes[node], document.above.get(node)
+        if (node == root or above in members) and drawn.mesh is None and drawn.camera is None:
             members.append(node)
     if len(members) < 2:
         raise document.error(
             f"found an animation of node {document.parts.nodes[root].name!r} without a skeleton, "
             "expected a skin or a tree of nodes"
         )
-    found = gltf_rig.joints_of(document, members)
-    said = "no skin: the tree of animated nodes was taken as the skeleton"
-    return replace(found, notes=(said, *found.notes))
+    joints = gltf_rig.joints_of(document, members)
+    note = "no skin: the tree of animated nodes was taken as the skeleton"
+    return replace(joints, notes=(note, *joints.notes))
 
 
 def _changing(curves: Tracks) -> set[int]:
     """Return the nodes whose transforms change over time."""
     return {
         node
-        for (node, part), own in curves.items()
-        if part in PARTS and np.ptp(own.values, axis=0).max() > SCALE_TOLERANCE
+        for (node, path), track in curves.items()
+        if path in PARTS and np.ptp(track.values, axis=0).max() > SCALE_TOLERANCE
     }
 
 
 def _weights(document: GltfDocument, curves: Tracks, times: Floats) -> Mapping[str, Floats]:
     """Return the weights (F,) of morph targets by name; those of one name and values once."""
-    found: dict[str, Floats] = {}
-    for (node, part), own in curves.items():
+    weights: dict[str, Floats] = {}
+    for (node, path), track in curves.items():
         mesh = document.parts.nodes[node].mesh
-        if part != "weights" or mesh is None:
+        if path != "weights" or mesh is None:
             continue
         stated = (document.parts.meshes[mesh].extras or {}).get("targetNames") or []
-        for index, values in enumerate(own.at(times).T):
+        for index, values in enumerate(track.at(times).T):
             name = str(stated[index]) if index < len(stated) else f"weight_{index}"
-            if name in found and not np.array_equal(found[name], values):
+            if name in weights and not np.array_equal(weights[name], values):
                 name = f"{document.node_name(node)}.{name}"
-            found[name] = values
-    return found
+            weights[name] = values
+    return weights
 
 
 def _plain(
@@ -295,7 +299,7 @@ def _plain(
 ) -> tuple[Skeleton, Rotations, Positions, tuple[str, ...]]:
     """Return the joints at the given times as rest_joints.plain_motion does."""
     nodes = [_sampled(document, node, tracks, times) for node in joints.nodes]
-    motion = Transform(*(np.stack(own, axis=1) for own in zip(*nodes, strict=True)))
+    motion = Transform(*(np.stack(components, axis=1) for components in zip(*nodes, strict=True)))
     for node in reversed(joints.outer):
         motion = motion.root_inside(_sampled(document, node, tracks, times))
     rest = joints.rest.root_inside(gltf_rig.outer_transform(document, joints.outer))
@@ -305,11 +309,11 @@ def _plain(
 def _sampled(document: GltfDocument, node: int, tracks: Tracks, times: Floats) -> Transform:
     """Return the transforms (F, ...) of a node."""
     still = gltf_rig.node_transform(document, node)
-    turns, places, scales = (
-        tracks[node, part].at(times) if (node, part) in tracks else np.tile(rest, (len(times), 1))
-        for part, rest in zip(PARTS, still, strict=True)
+    turns, translations, scales = (
+        tracks[node, path].at(times) if (node, path) in tracks else np.tile(rest, (len(times), 1))
+        for path, rest in zip(PARTS, still, strict=True)
     )
     lengths = np.linalg.norm(turns, axis=-1, keepdims=True)
     if np.any(lengths < 0.5):
         raise document.error(f"node {node} has rotations of length {lengths.min():.3g}, expected 1")
-    return Transform(turns / lengths, places, scales).unmirrored()
+    return Transform(turns / lengths, translations, scales).unmirrored()

@@ -71,7 +71,7 @@ class Example:
 
 
 def ingest(
-    recipe: Recipe, folder: Path, known: MotionFiles | None = None
+    recipe: Recipe, folder: Path, files_read: MotionFiles | None = None
 ) -> tuple[list[Example], list[str]]:
     """Return the examples of a recipe, and notes on assumptions and corrections.
 
@@ -81,7 +81,7 @@ def ingest(
     notes = list[str]()
     rows = clip_table.read(recipe, folder, notes)
     alone = recipe.curves is not None and recipe.curves.alone
-    files = {} if alone else read_files(rows, recipe.source, known)
+    files = {} if alone else read_files(rows, recipe.source, files_read)
     rate = recipe.source.rate
     curves = curve_files.find_curves(recipe.curves, rows, rate) if recipe.curves else ()
     notes += reader_notes(files)
@@ -94,16 +94,16 @@ def ingest(
     for row in rows:
         values = curve_files.read(row, recipe.curves, curves, rate) if recipe.curves else None
         if values and recipe.curves and recipe.curves.rate:
-            whole = curve_files.resting_clip(values, recipe.curves.rate)
+            file_clip = curve_files.resting_clip(values, recipe.curves.rate)
         else:
-            whole = wholes[row.motion]
-            whole = curve_files.with_curves(whole, values, row) if values else whole
-        cuts.append(cut_frames(whole, row))
+            file_clip = wholes[row.motion]
+            file_clip = curve_files.with_curves(file_clip, values, row) if values else file_clip
+        cuts.append(cut_frames(file_clip, row))
     wholes.clear()
     clips, lasts = [clip for clip, _ in cuts], [last for _, last in cuts]
     cuts.clear()
     shared: Sequence[Clip] = clips
-    files_of_rows, stretches = [row.place.name for row in rows], recipe.motion.bones == "stretch"
+    files_of_rows, stretches = [row.file.name for row in rows], recipe.motion.bones == "stretch"
     if recipe.skeleton.is_unified:
         try:
             shared, unified_notes = unified_clips.unify_recipe(
@@ -111,7 +111,7 @@ def ingest(
             )
         except TopologyError as fault:
             row = rows[fault.clip]
-            raise row.error(f"{row.place}: {fault}") from fault
+            raise row.error(f"{row.file}: {fault}") from fault
         notes += unified_notes
     left = list(reversed(shared))
     del shared, clips
@@ -130,11 +130,11 @@ def ingest(
             cyclic=motion.cyclic,
             directed=any(control.auto.quantity in directions for control in recipe.measured),
             roles={str(role): joint for role, joint in joints.items() if joint},
-            named=clip_joints.named_joints(recipe),
+            recipe_joints=clip_joints.named_joints(recipe),
         )
     except RigError as fault:
         row = rows[fault.clip]
-        raise row.error(f"{row.place}: {fault}") from fault
+        raise row.error(f"{row.file}: {fault}") from fault
     clips.reverse()
     canonical.return_freed_memory()
     examples, changes, positions = list[Example](), list[float](), list[Positions]()
@@ -156,47 +156,50 @@ def ingest(
             examples[0].clip.skeleton.names,
         )
     examples = [
-        replace(own, recording=recording)
-        for own, recording in zip(examples, recordings, strict=True)
+        replace(example, recording=recording)
+        for example, recording in zip(examples, recordings, strict=True)
     ]
     return examples, [*recording_notes, *notes]
 
 
 def read_files(
-    rows: Sequence[ClipRow], source: Source, known: MotionFiles | None = None
+    rows: Sequence[ClipRow], source: Source, files_read: MotionFiles | None = None
 ) -> dict[str, MotionFile]:
     """Return the motions of rows by their names, each content read once.
 
     Raises MotionFileError for a file that cannot be read and RecipeError for more than MAX_POSES in
     all. A file that states another unit or up axis than the source is overruled, with a note.
     """
-    known, files = known or MotionFiles(), dict[str, MotionFile]()
+    files_read, files = files_read or MotionFiles(), dict[str, MotionFile]()
     poses = 0
     for row in rows:
         if row.motion not in files:
-            files[row.motion] = known.read(row.place, ReadOptions(source.rate, row.animation))
+            files[row.motion] = files_read.read(row.file, ReadOptions(source.rate, row.animation))
             poses += files[row.motion].poses
         if poses > MAX_POSES:
             raise row.error(
-                f"found {poses} poses of a joint in the files up to {row.place}, expected at most "
+                f"found {poses} poses of a joint in the files up to {row.file}, expected at most "
                 f"{MAX_POSES}"
             )
     return {name: _as_stated(file, source, files.values()) for name, file in files.items()}
 
 
-def _as_stated(file: MotionFile, source: Source, others: Collection[MotionFile]) -> MotionFile:
+def _as_stated(file: MotionFile, source: Source, other_files: Collection[MotionFile]) -> MotionFile:
     """Return a file with the unit and up axis of the source, or its own where those fit better.
 
     Beside files that state no unit, whose unit the source says, one that states its own keeps it if
     its bones then are nearer to the length of theirs.
     """
-    silent = [_bone_length(other) for other in others if other.metres_per_unit is None]
+    silent = [_bone_length(other) for other in other_files if other.metres_per_unit is None]
     unit, up, stated = source.metres_per_unit, source.up, file.metres_per_unit
     if stated is None or not silent:
         return motion_file.overrule(file, ReadOptions(metres_per_unit=unit, up=up))
-    usual, own = unit * float(np.median(silent)), _bone_length(file)
-    apart = [abs(np.log(max(own * each, TINY) / max(usual, TINY))) for each in (stated, unit)]
-    if apart[0] >= apart[1]:
+    median, length = unit * float(np.median(silent)), _bone_length(file)
+    ratios = [
+        abs(np.log(max(length * candidate, TINY) / max(median, TINY)))
+        for candidate in (stated, unit)
+    ]
+    if ratios[0] >= ratios[1]:
         return motion_file.overrule(file, ReadOptions(metres_per_unit=unit, up=file.up or up))
     note = f"states a unit of {stated:g} m, kept: with it the bones are as long as those of others"
     return replace(file, up=file.up or up, notes=(*file.notes, note))
@@ -250,9 +253,9 @@ def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
     """
     last = len(clip) - 1 if row.last_frame is None else row.last_frame
     if last >= len(clip):
-        raise row.error(f"frame {last}, but {row.place} has frames 0 to {len(clip) - 1}")
+        raise row.error(f"frame {last}, but {row.file} has frames 0 to {len(clip) - 1}")
     if last <= row.first_frame:
-        raise row.error(f"{row.place} has frames 0 to {last}, expected two or more")
+        raise row.error(f"{row.file} has frames 0 to {last}, expected two or more")
     return clip.part(slice(row.first_frame, last + 1)), last
 
 
@@ -270,11 +273,12 @@ def stretch_notes(rows: Sequence[ClipRow], stretches: Sequence[float]) -> list[s
     count = int(np.sum(np.asarray(stretches) > RIGID_TOLERANCE))
     if not count:
         return []
-    most = f"bones stretch by up to {stretches[worst]:.4f} m"
+    largest = f"bones stretch by up to {stretches[worst]:.4f} m"
     if count == 1:
-        return [f"{rows[worst].place}: {most}; their mean is kept"]
+        return [f"{rows[worst].file}: {largest}; their mean is kept"]
     return [
-        f"{count} of {len(rows)} clips: {most}, the most in {rows[worst].place}; their mean is kept"
+        f"{count} of {len(rows)} clips: {largest}, the most in {rows[worst].file}; their mean is "
+        "kept"
     ]
 
 
@@ -283,17 +287,17 @@ def offset_notes(files: Mapping[str, MotionFile]) -> list[str]:
 
     files: motion files by place; those of other formats than BVH have no OFFSET.
     """
-    moved = {
-        place: tuple(file.skeleton.offsets[0].tolist())
-        for place, file in files.items()
+    offsets = {
+        name: tuple(file.skeleton.offsets[0].tolist())
+        for name, file in files.items()
         if file.format == BVH and file.skeleton.offsets[0].any()
     }
-    if not moved:
+    if not offsets:
         return []
-    place, offset = next(iter(moved.items()))
-    which = "" if len(moved) == 1 else f"{len(moved)} of {len(files)} files, the first of them "
+    name, offset = next(iter(offsets.items()))
+    which = "" if len(offsets) == 1 else f"{len(offsets)} of {len(files)} files, the first of them "
     return [
-        f"{which}{place}: the root's OFFSET is {offset} and has position channels, which were "
+        f"{which}{name}: the root's OFFSET is {offset} and has position channels, which were "
         "taken to replace it; say so as source.root_offset"
     ]
 
@@ -303,35 +307,35 @@ def reader_notes(files: Mapping[str, MotionFile]) -> list[str]:
 
     files: motion files by place.
     """
-    found: dict[str, list[str]] = {}
-    for place, file in files.items():
+    names_by_note: dict[str, list[str]] = {}
+    for name, file in files.items():
         for note in file.notes:
-            found.setdefault(note, []).append(place)
+            names_by_note.setdefault(note, []).append(name)
     return [
-        (note if len(places) == 1 else f"{len(places)} of {len(files)} files: {note}")
-        if len(places) > 1 or note.startswith((places[0], Path(places[0]).name))
-        else f"{Path(places[0]).name}: {note}"
-        for note, places in found.items()
+        (note if len(names) == 1 else f"{len(names)} of {len(files)} files: {note}")
+        if len(names) > 1 or note.startswith((names[0], Path(names[0]).name))
+        else f"{Path(names[0]).name}: {note}"
+        for note, names in names_by_note.items()
     ]
 
 
 def check_presets(recipe: Recipe, examples: Sequence[Example]) -> None:
     """Raise TrainingError for a preset outside the sampled ranges or of an unknown label."""
     points = np.stack([example.controls for example in examples])
-    least, most = points.min(axis=0), points.max(axis=0)
+    lowest, highest = points.min(axis=0), points.max(axis=0)
     for name, preset in recipe.presets.items():
         for index, control in enumerate(recipe.controls):
-            value, low, high = preset.values[control.name], least[index], most[index]
+            value, low, high = preset.values[control.name], lowest[index], highest[index]
             if not low <= value <= high:
                 raise TrainingError(
                     f"presets.{name}.{control.name}: found {value:g}, expected {low:g} to "
                     f"{high:g}, the sampled range"
                 )
         for label_set, label in preset.labels.items():
-            known = sorted({example.row.labels[label_set] for example in examples})
-            if label not in known:
+            labels = sorted({example.row.labels[label_set] for example in examples})
+            if label not in labels:
                 key = label_set if label_set == PERFORMER else f"labels.{label_set}"
                 raise TrainingError(
-                    f"presets.{name}.{key}: found {label!r}{did_you_mean(label, known)}, expected "
-                    f"one of {', '.join(known)}"
+                    f"presets.{name}.{key}: found {label!r}{did_you_mean(label, labels)}, expected "
+                    f"one of {', '.join(labels)}"
                 )

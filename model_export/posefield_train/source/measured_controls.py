@@ -34,16 +34,16 @@ def control_values(recipe: Recipe, row: ClipRow, clip: Clip, landmarks: Sequence
     """
     if not recipe.measured:
         return row.controls
-    typed, whole = iter(row.controls.tolist()), measured_quantities(clip)
+    typed, quantities = iter(row.controls.tolist()), measured_quantities(clip)
 
     def value(control: Control) -> float:
         if not isinstance(control, ControlMeasured):
             return float(next(typed))
         at = _landmark_time(recipe, control, landmarks)
-        place = replace(whole, landmark=(at or 0.0) * (len(clip) - 1))
-        found = measures.evaluate(control_measure(recipe, control, clip.skeleton), place)
+        moment = replace(quantities, landmark=(at or 0.0) * (len(clip) - 1))
+        measured = measures.evaluate(control_measure(recipe, control, clip.skeleton), moment)
         # Adding zero turns minus zero into zero.
-        return round(found, DECIMALS) + 0.0
+        return round(measured, DECIMALS) + 0.0
 
     return np.array([value(control) for control in recipe.controls])
 
@@ -61,8 +61,8 @@ def control_measure(
     if auto.quantity == "leg_length":
         return Measure(auto.quantity, _chain(control, recipe.leg_ends(auto), joints))
     names = auto.joint_names or recipe.leg_ends(auto)
-    own = tuple(joints.names.index(name) for name in names)
-    return Measure(auto.quantity, own, *_moment(auto, share))
+    indices = tuple(joints.names.index(name) for name in names)
+    return Measure(auto.quantity, indices, *_moment(auto, share))
 
 
 def card_measure(
@@ -84,8 +84,8 @@ def travel(roots: Floats, path: Floats) -> Floats:
     Its components are left and forward, m, and the change of heading, rad.
     """
     turned = quat.mul(roots[..., -1, :], quat.conj(roots[..., 0, :]))
-    way = path[..., -1, :] - path[..., 0, :]
-    return np.stack([way[..., 0], way[..., 2], quat.twist(turned, UP)], axis=-1)
+    displacement = path[..., -1, :] - path[..., 0, :]
+    return np.stack([displacement[..., 0], displacement[..., 2], quat.twist(turned, UP)], axis=-1)
 
 
 def bone_offsets(clip: Clip) -> Floats:
@@ -106,9 +106,9 @@ def measured_quantities(clip: Clip) -> MeasuredMotion:
 
 def moment_share(clip: Clip, joint: int, at: str) -> float:
     """Return the moment at which a joint is highest, lowest or farthest, as a share of the clip."""
-    seen = measured_quantities(clip).positions
+    positions = measured_quantities(clip).positions
     moment = MOMENT_NAMES[at]
-    frame = measures.moment_frame(Measure("height", (joint,), moment), seen, 0.0)
+    frame = measures.moment_frame(Measure("height", (joint,), moment), positions, 0.0)
     return frame / (len(clip) - 1)
 
 
@@ -117,8 +117,8 @@ def _landmark_time(
 ) -> float | None:
     """Return the time of the control's landmark; None if it uses none."""
     at = control.auto.at
-    own = at is not None and at not in TIME_NAMES
-    return landmarks[recipe.clips.landmarks.index(str(at))] if own else None
+    is_landmark = at is not None and at not in TIME_NAMES
+    return landmarks[recipe.clips.landmarks.index(str(at))] if is_landmark else None
 
 
 def _moment(auto: Auto, share: float) -> tuple[MeasureMoment | None, float | None]:
@@ -129,16 +129,16 @@ def _moment(auto: Auto, share: float) -> tuple[MeasureMoment | None, float | Non
             return "landmark", share
 
 
-def _chain(control: ControlMeasured, ends: Sequence[str], joints: Skeleton) -> tuple[int, ...]:
+def _chain(control: ControlMeasured, end_names: Sequence[str], joints: Skeleton) -> tuple[int, ...]:
     """Return the joints below the upper end down to the lower; their offsets are the bones."""
-    upper, lower = map(joints.names.index, ends)
+    upper, lower = map(joints.names.index, end_names)
     chain = [lower]
     while chain[-1] > upper and joints.parents[chain[-1]] != upper:
         chain.append(joints.parents[chain[-1]])
     if joints.parents[chain[-1]] != upper or lower == upper:
         raise TrainingError(
-            f"controls.{control.name}.auto: {ends[1]!r} does not hang below {ends[0]!r}, expected "
-            "the upper end of a leg and its lower"
+            f"controls.{control.name}.auto: {end_names[1]!r} does not hang below {end_names[0]!r}, "
+            "expected the upper end of a leg and its lower"
         )
     return tuple(reversed(chain))
 
@@ -153,14 +153,14 @@ def landmarks(row: ClipRow, last: int, columns: Sequence[str]) -> tuple[float, .
     last: its last frame in the file. columns: of the landmarks. Raises RecipeError for a landmark
     out of the clip, and for two that do not rise.
     """
-    named = [*zip(columns, row.landmarks, strict=True)]
-    for column, frame in named:
+    columns_and_frames = [*zip(columns, row.landmarks, strict=True)]
+    for column, frame in columns_and_frames:
         if not row.first_frame < frame < last:
             raise row.error(
                 f"column {column!r}: frame {frame} is out of the clip, expected one between its "
-                f"frames {row.first_frame} and {last} of {row.place.name}, without these two"
+                f"frames {row.first_frame} and {last} of {row.file.name}, without these two"
             )
-    for (before, earlier), (column, later) in pairwise(named):
+    for (before, earlier), (column, later) in pairwise(columns_and_frames):
         if later <= earlier:
             raise row.error(
                 f"column {column!r}: frame {later}, expected one after frame {earlier} of column "
@@ -178,7 +178,7 @@ def event_landmark(row: ClipRow, joint: str, at: str, share: float) -> float:
         return share
     end = "start" if share == 0.0 else "end"
     raise row.error(
-        f"{joint} is {at} at the {end} of {row.place.name}, expected a moment within the clip: cut "
+        f"{joint} is {at} at the {end} of {row.file.name}, expected a moment within the clip: cut "
         f"it longer, set event.at to '{end}', or name a column of clips.landmarks"
     )
 
@@ -194,9 +194,9 @@ def expect_same_order(
     for row, marks in zip(rows, landmarks, strict=True):
         order = np.argsort(marks).tolist()
         if order != expected or len(set(marks)) < len(marks):
-            found = ", ".join(f"{names[mark]} at {marks[mark]:.0%}" for mark in order)
+            listed = ", ".join(f"{names[mark]} at {marks[mark]:.0%}" for mark in order)
             raise row.error(
-                f"found {found} of {row.place.name}, expected the order of line "
+                f"found {listed} of {row.file.name}, expected the order of line "
                 f"{rows[0].line}, {', '.join(names[i] for i in expected)}"
             )
 

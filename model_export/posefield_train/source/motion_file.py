@@ -41,16 +41,16 @@ def rate_of_digits(frame_time: str) -> tuple[float, tuple[str, ...]]:
     A time such as 0.033 stands for all that are rounded or cut to its digits: of the usual rates
     among them the nearest is taken, whole ones first.
     """
-    written = Decimal(frame_time)
+    seconds = Decimal(frame_time)
     exact, digit = (
-        snapped_rate(float(written)),
-        float(Decimal(1).scaleb(int(written.as_tuple()[2]))),
+        snapped_rate(float(seconds)),
+        float(Decimal(1).scaleb(int(seconds.as_tuple()[2]))),
     )
-    least, most = 1.0 / (float(written) + digit), 1.0 / max(float(written) - 0.5 * digit, 1e-9)
-    if exact in (*USUAL_RATES, *BROADCAST_RATES) or most / least < 1.0 + RATE_TOLERANCE:
+    lowest, highest = 1.0 / (float(seconds) + digit), 1.0 / max(float(seconds) - 0.5 * digit, 1e-9)
+    if exact in (*USUAL_RATES, *BROADCAST_RATES) or highest / lowest < 1.0 + RATE_TOLERANCE:
         return exact, ()
     for rates in (USUAL_RATES, BROADCAST_RATES):
-        within = [rate for rate in rates if least < rate <= most]
+        within = [rate for rate in rates if lowest < rate <= highest]
         if within:
             rate = min(within, key=lambda rate: abs(rate - exact))
             return rate, (
@@ -69,7 +69,9 @@ def doubted_rate(rate: float) -> tuple[float | None, str]:
         return None, ""
     time = 1.0 / rate
     meant, reading = None, "no usual rate"
-    if time > 20.5 and any(abs(time - usual) < 0.005 * usual for usual in USUAL_RATES):
+    if time > 20.5 and any(
+        abs(time - usual_rate) < 0.005 * usual_rate for usual_rate in USUAL_RATES
+    ):
         meant, reading = time, f"{time:g} looks like the rate itself"
     elif LEAST_PLAUSIBLE <= 1000.0 / time <= USUAL_RATES[-1]:
         meant = rate_of_digits(f"{time / 1000.0:.6g}")[0]
@@ -139,11 +141,11 @@ AS_STATED = ReadOptions()
 """Nothing told: a file is read by what it states."""
 
 
-def choice(names: Sequence[str], wanted: str) -> int | None:
+def choice(names: Sequence[str], requested: str) -> int | None:
     """Return the index of the one of some names that is wanted, by name or number from 1."""
-    if names.count(wanted) == 1:
-        return names.index(wanted)
-    number = int(wanted) if wanted.isdecimal() else 0
+    if names.count(requested) == 1:
+        return names.index(requested)
+    number = int(requested) if requested.isdecimal() else 0
     return number - 1 if 1 <= number <= len(names) else None
 
 
@@ -158,8 +160,8 @@ def expect_skeleton(source: str, tree: JointTree, options: ReadOptions) -> None:
 def curve_notes(curves: Mapping[str, Floats]) -> list[str]:
     """Return a note on weights of blend shapes, which are no motion of joints."""
     listed = ", ".join(list(curves)[:20])
-    said = f"curves ({listed}) are no joints: only [curves] of a recipe reads them"
-    return [said] if curves else []
+    note = f"curves ({listed}) are no joints: only [curves] of a recipe reads them"
+    return [note] if curves else []
 
 
 LEAST_RATE = 10.0
@@ -203,8 +205,8 @@ def _refuse_uneven(keys: Floats) -> None:
         return
     frames = np.rint(spacing / step)
     lost = int(np.sum(frames - 1.0))
-    whole = np.all(np.abs(spacing - frames * step) <= EVEN * step * np.maximum(frames, 1.0))
-    if whole and frames.min() >= 1.0 and lost <= DROPPED * (len(keys) + lost):
+    is_regular = np.all(np.abs(spacing - frames * step) <= EVEN * step * np.maximum(frames, 1.0))
+    if is_regular and frames.min() >= 1.0 and lost <= DROPPED * (len(keys) + lost):
         first = float(keys[np.argmax(frames > 1.0)])
         raise UnevenKeys(
             f"found {lost} dropped frames of {len(keys) + lost} at {1.0 / step:.6g} a second, the "

@@ -39,25 +39,25 @@ class MotionFormat:
     several: bool = False
 
 
-def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
+def _read_acclaim(file: FileLocation, options: ReadOptions) -> MotionFile:
     """Return the motion of an AMC file with the ASF file beside it."""
-    beside = [name for name in data_folder.names_beside(place) if _suffix(name) == ".asf"]
-    stem = PurePosixPath(place.name).stem.lower()
-    own = [name for name in beside if stem.startswith(PurePosixPath(name).stem.lower())]
-    found = sorted(own, key=len)[-1:] or (beside if len(beside) == 1 else [])
-    if not found:
-        listed = ", ".join(beside[:10]) or "none"
+    skeletons = [name for name in data_folder.names_beside(file) if _suffix(name) == ".asf"]
+    stem = PurePosixPath(file.name).stem.lower()
+    matching = [name for name in skeletons if stem.startswith(PurePosixPath(name).stem.lower())]
+    candidates = sorted(matching, key=len)[-1:] or (skeletons if len(skeletons) == 1 else [])
+    if not candidates:
+        listed = ", ".join(skeletons[:10]) or "none"
         raise AcclaimError(
-            str(place),
+            str(file),
             f"found the skeletons {listed} beside it, expected one .asf file, or one whose name "
             "begins that of the motion",
         )
-    skeleton = acclaim.read_asf(data_folder.beside(place, found[0]))
-    motion = acclaim.read_amc(place, skeleton)
+    skeleton = acclaim.read_asf(data_folder.beside(file, candidates[0]))
+    motion = acclaim.read_amc(file, skeleton)
     clip = acclaim.to_clip(skeleton, motion, metres_per_unit=1.0, rate=1)
-    note = f"{place.name}: read with the skeleton {found[0]}"
+    note = f"{file.name}: read with the skeleton {candidates[0]}"
     return MotionFile(
-        str(place),
+        str(file),
         "Acclaim",
         clip.skeleton,
         clip.rotations,
@@ -68,40 +68,40 @@ def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
     )
 
 
-def _read_gltf(place: FileLocation, options: ReadOptions) -> MotionFile:
+def _read_gltf(file: FileLocation, options: ReadOptions) -> MotionFile:
     # pygltflib takes 0.1 s to import, and most folders hold no glTF.
     from posefield_train.source import gltf_motion
 
     def beside(name: str) -> bytes:
-        return data_folder.read(data_folder.beside(place, name), MAX_GLTF_BYTES, "a buffer")
+        return data_folder.read(data_folder.beside(file, name), MAX_GLTF_BYTES, "a buffer")
 
-    content = data_folder.read(place, MAX_GLTF_BYTES, "a glTF file")
-    return gltf_motion.read(content, str(place), beside, options)
+    content = data_folder.read(file, MAX_GLTF_BYTES, "a glTF file")
+    return gltf_motion.read(content, str(file), beside, options)
 
 
-def _read_usd(place: FileLocation, options: ReadOptions) -> MotionFile:
+def _read_usd(file: FileLocation, options: ReadOptions) -> MotionFile:
     from posefield_train.source import usd_motion
 
-    if isinstance(place, Path):
+    if isinstance(file, Path):
         # USD's own error of a file that cannot be read names no reason.
         try:
-            place.open("rb").close()
+            file.open("rb").close()
         except OSError as fault:
-            raise MotionFileError(str(place), f"cannot be read: {fault.strerror}") from fault
-        return usd_motion.read(place, str(place), options)
+            raise MotionFileError(str(file), f"cannot be read: {fault.strerror}") from fault
+        return usd_motion.read(file, str(file), options)
     # USD opens files by name only; references to other files of the archive are not found.
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder, place.name)
-        with place.open("rb") as packed, copy.open("wb") as plain:
+        copy = Path(folder, file.name)
+        with file.open("rb") as packed, copy.open("wb") as plain:
             shutil.copyfileobj(packed, plain)
-        return usd_motion.read(copy, str(place), options)
+        return usd_motion.read(copy, str(file), options)
 
 
 FORMATS = (
     MotionFormat(
         "BVH",
         (".bvh",),
-        lambda place, _: bvh.motion_file(bvh.read(place)),
+        lambda file, _: bvh.motion_file(bvh.read(file)),
         "the rate; neither unit nor up axis",
     ),
     MotionFormat("Acclaim", (".amc",), _read_acclaim, "neither unit, up axis nor rate"),
@@ -117,7 +117,7 @@ FORMATS = (
     ),
 )
 """Formats that are read, by the suffix of the file's name."""
-SUFFIXES = {suffix: own for own in FORMATS for suffix in own.suffixes}
+SUFFIXES = {suffix: motion_format for motion_format in FORMATS for suffix in motion_format.suffixes}
 
 REFUSED = {
     ".fbx": "FBX is read through Blender: posefield convert FILE.fbx -o FILE.bvh",
@@ -134,32 +134,32 @@ REFUSED = {
 """Formats that are refused, with the way out."""
 
 
-def read(place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
+def read(file: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
     """Return the motion of a file by the suffix of its name.
 
     Raises MotionFileError for a format that is not read, with the way out, for an animation chosen
     in a format with one motion a file, and for a file that cannot be read.
     """
-    suffix = _suffix(place.name)
-    own = SUFFIXES.get(suffix)
-    if own is None:
-        known = ", ".join(SUFFIXES)
-        said = REFUSED.get(suffix, f"found the suffix {suffix!r}, expected one of {known}")
-        raise MotionFileError(str(place), said)
-    if options.animation is not None and not own.several:
+    suffix = _suffix(file.name)
+    motion_format = SUFFIXES.get(suffix)
+    if motion_format is None:
+        suffixes = ", ".join(SUFFIXES)
+        fault = REFUSED.get(suffix, f"found the suffix {suffix!r}, expected one of {suffixes}")
+        raise MotionFileError(str(file), fault)
+    if options.animation is not None and not motion_format.several:
         raise MotionFileError(
-            str(place),
-            f"found animation {options.animation!r}, but {own.name} files hold one motion: "
-            "expected an empty cell",
+            str(file),
+            f"found animation {options.animation!r}, but {motion_format.name} files hold one "
+            "motion: expected an empty cell",
         )
-    file = overrule(own.read(place, options), options)
-    _, doubt = doubted_rate(file.rate) if file.rate else (None, "")
-    return replace(file, notes=(*file.notes, doubt)) if doubt else file
+    motion = overrule(motion_format.read(file, options), options)
+    _, doubt = doubted_rate(motion.rate) if motion.rate else (None, "")
+    return replace(motion, notes=(*motion.notes, doubt)) if doubt else motion
 
 
-def reason(fault: FileError, place: Path) -> str:
+def reason(fault: FileError, file: Path) -> str:
     """Return why a file was refused, without its name where the fault is in the file itself."""
-    if fault.path != str(place):
+    if fault.path != str(file):
         return str(fault)
     return fault.message if fault.line is None else f"line {fault.line}: {fault.message}"
 
@@ -176,13 +176,13 @@ def find_files(folder: Path) -> list[Path]:
 def find_refused(folder: Path) -> dict[Path, str]:
     """Return the files below a folder in formats that are refused, each with the way out."""
     # A skeleton of Acclaim is read with the motion beside it.
-    known = {suffix: said for suffix, said in REFUSED.items() if suffix != ".asf"}
-    return {path: known[_suffix(path.name)] for path in _files_with(folder, known)}
+    reasons = {suffix: way_out for suffix, way_out in REFUSED.items() if suffix != ".asf"}
+    return {path: reasons[_suffix(path.name)] for path in _files_with(folder, reasons)}
 
 
 def _files_with(folder: Path, suffixes: Container[str]) -> list[Path]:
-    found = (path for path in folder.rglob("*") if _suffix(path.name) in suffixes)
-    return sorted(path for path in found if not path.is_dir())
+    paths = (path for path in folder.rglob("*") if _suffix(path.name) in suffixes)
+    return sorted(path for path in paths if not path.is_dir())
 
 
 @dataclass
@@ -197,16 +197,16 @@ class MotionFiles:
     _kept: "OrderedDict[tuple[str, ReadOptions], MotionFile]" = field(default_factory=OrderedDict)
     _poses: int = 0
 
-    def read(self, place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
+    def read(self, file: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
         """Return the motion of a file, as `read`."""
-        key = (str(place), options)
-        found = self._kept.pop(key, None)
-        if found is None:
-            found = read(place, options)
-            self._poses += found.poses
-        self._kept[key] = found
-        most = self.most_poses
-        while most is not None and len(self._kept) > 1 and self._poses > most:
+        key = (str(file), options)
+        motion = self._kept.pop(key, None)
+        if motion is None:
+            motion = read(file, options)
+            self._poses += motion.poses
+        self._kept[key] = motion
+        limit = self.most_poses
+        while limit is not None and len(self._kept) > 1 and self._poses > limit:
             _, oldest = self._kept.popitem(last=False)
             self._poses -= oldest.poses
-        return found
+        return motion

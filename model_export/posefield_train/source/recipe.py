@@ -91,10 +91,10 @@ def recipe_error(
         )
         for key, message in listed[:MAX_LISTED]
     ]
-    first, *others = errors
+    first, *further = errors
     if len(listed) > MAX_LISTED:
-        others.append(RecipeError(path, f"{len(listed) - MAX_LISTED} further mistakes"))
-    return RecipeError(path, "\n".join([first.message, *map(str, others)]), first.line)
+        further.append(RecipeError(path, f"{len(listed) - MAX_LISTED} further mistakes"))
+    return RecipeError(path, "\n".join([first.message, *map(str, further)]), first.line)
 
 
 def key_lines(text: str) -> dict[Key, int]:
@@ -120,40 +120,44 @@ def key_lines(text: str) -> dict[Key, int]:
 
 def _mistake(form: type[BaseModel], error: ErrorDetails) -> tuple[Key, str]:
     """Return the key of a mistake and the message about it."""
-    key: Key = tuple(part for part in error["loc"] if part not in (COLUMN_TAG, MEASURED))
-    message, found = error["msg"], ""
+    key: Key = tuple(
+        component for component in error["loc"] if component not in (COLUMN_TAG, MEASURED)
+    )
+    message, quoted = error["msg"], ""
     match error["type"]:
         case "value_error":
-            own = error["ctx"]["error"]
-            key, message = key + getattr(own, "keys", ()), str(own)
+            fault = error["ctx"]["error"]
+            key, message = key + getattr(fault, "keys", ()), str(fault)
         case "missing":
             pass
         case "extra_forbidden":
-            known = _known_keys(form, error["loc"][:-1])
-            hint = did_you_mean(str(key[-1]), known)
-            found = f"{hint}{_quote_input(error['input'])}; expected some of {', '.join(known)}"
+            keys = _known_keys(form, error["loc"][:-1])
+            hint = did_you_mean(str(key[-1]), keys)
+            quoted = f"{hint}{_quote_input(error['input'])}; expected some of {', '.join(keys)}"
         case _:
-            found = _quote_input(error["input"])
-    return key, f"{'.'.join(map(str, key)) or 'recipe'}: {message}{found}"
+            quoted = _quote_input(error["input"])
+    return key, f"{'.'.join(map(str, key)) or 'recipe'}: {message}{quoted}"
 
 
-def _quote_input(given: Any) -> str:
+def _quote_input(value: Any) -> str:
     """Return the given value for a message, cut to SHOWN characters."""
-    shown = repr(given)
-    return f", found {shown if len(shown) <= SHOWN else f'{shown[:SHOWN]}...'}"
+    text = repr(value)
+    return f", found {text if len(text) <= SHOWN else f'{text[:SHOWN]}...'}"
 
 
 def _known_keys(form: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
     """Return the keys that a table accepts, by the location of an error."""
     kinds = [form]
-    for part in loc:
-        if part in (COLUMN_TAG, MEASURED):
-            wanted = "column" if part == COLUMN_TAG else "auto"
-            kinds = [kind for kind in kinds if wanted in kind.model_fields]
-        elif isinstance(part, str):
+    for component in loc:
+        if component in (COLUMN_TAG, MEASURED):
+            field_name = "column" if component == COLUMN_TAG else "auto"
+            kinds = [kind for kind in kinds if field_name in kind.model_fields]
+        elif isinstance(component, str):
             # A name that is no field is a key of a table with free keys.
-            fields = [kind.model_fields[part] for kind in kinds if part in kind.model_fields]
-            kinds = [each for one in fields for each in _models(one.annotation)] or kinds
+            fields = [
+                kind.model_fields[component] for kind in kinds if component in kind.model_fields
+            ]
+            kinds = [model for one in fields for model in _models(one.annotation)] or kinds
     return [field.alias or name for kind in kinds for name, field in kind.model_fields.items()]
 
 
@@ -161,7 +165,7 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     """Return the models that an annotation mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [each for part in get_args(annotation) for each in _models(part)]
+    return [model for argument in get_args(annotation) for model in _models(argument)]
 
 
 class Recipe(RecipePart):
@@ -232,8 +236,8 @@ class Recipe(RecipePart):
     @property
     def landmark_names(self) -> list[str]:
         """Return the columns of the landmarks, and the event's moment if it is found in clips."""
-        found = [self.event.at] if self.event and self.event.is_found else []
-        return [*self.clips.landmarks, *found]
+        event_names = [self.event.at] if self.event and self.event.is_found else []
+        return [*self.clips.landmarks, *event_names]
 
     def joint_with(self, role: Role) -> str | None:
         """Return the joint with a role; None if the recipe does not tell it."""
@@ -275,8 +279,8 @@ class Recipe(RecipePart):
         for index, control in enumerate(self.controls):
             if isinstance(control, ControlMeasured):
                 auto = control.auto
-                given = auto, self.motion, self.clips.landmarks, self.leg_ends(auto)
-                for key, fault in measurement_faults(*given):
+                arguments = auto, self.motion, self.clips.landmarks, self.leg_ends(auto)
+                for key, fault in measurement_faults(*arguments):
                     raise KeyFault(f"{fault} (control {control.name})", "controls", index, *key)
         check_event(self.event, self.size, self.clips.landmarks)
         check_landmarks(self.clips.landmarks)
@@ -332,14 +336,14 @@ def _rename_former_keys(path: Path, text: str, tables: dict[str, Any]) -> tuple[
 
 def read_accepted(path: Path) -> Recipe:
     """Return the recipe of a TOML file; RecipeError also for one that no person accepted."""
-    found = read(path)
-    if not found.accepted:
+    recipe = read(path)
+    if not recipe.accepted:
         raise RecipeError(
             path,
             "accepted = false: look at its clips, then accept it with posefield review "
             f"{path.parent} --accept NUMBER, or write accepted = true",
         )
-    return found
+    return recipe
 
 
 def json_schema() -> str:
@@ -381,10 +385,10 @@ def check_label_sets(clips: Clips, kriging: Kriging) -> None:
                 "found 'performer', but clips.performer names no column", "kriging", "label"
             )
         if name != PERFORMER and name not in clips.labels:
-            known = (PERFORMER, *clips.labels)
+            label_sets = (PERFORMER, *clips.labels)
             raise KeyFault(
-                f"found {name!r}{did_you_mean(name, known)}, expected 'performer' or a name of "
-                f"clips.labels {[*clips.labels]}",
+                f"found {name!r}{did_you_mean(name, label_sets)}, expected 'performer' or a name "
+                f"of clips.labels {[*clips.labels]}",
                 *("kriging", "label"),
             )
     unused = [name for name in clips.labels if name not in kriging.label]
@@ -418,8 +422,8 @@ def check_presets(
     names = [control.name for control in controls]
     for name, preset in presets.items():
         if sorted(preset.values) != sorted(names):
-            found = ", ".join(preset.values) or "nothing"
-            raise KeyFault(f"found {found}, expected a value for each of {names}", "presets", name)
+            listed = ", ".join(preset.values) or "nothing"
+            raise KeyFault(f"found {listed}, expected a value for each of {names}", "presets", name)
         for label_set, label in preset.labels.items():
             if label_set not in kriging.label:
                 raise KeyFault(
@@ -446,8 +450,10 @@ def measurement_faults(
             "ends elsewhere it depends on the cut",
         )
     if quantity in ("speed", "stride_length") and motion.root == "in_place":
-        found = f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
-        yield ("auto", "quantity"), found
+        yield (
+            ("auto", "quantity"),
+            f"found {quantity!r} and motion.root = 'in_place', expected one that travels",
+        )
     if auto.at is not None and (fault := _moment_fault(auto.at, landmarks)):
         yield ("auto", "at"), fault
     if quantity == "step_length" and len(leg_ends) != 2:
@@ -487,9 +493,9 @@ def check_landmarks(landmarks: Sequence[str]) -> None:
 
 def _moment_fault(at: str, landmarks: list[str]) -> str | None:
     """Return the fault of an unknown moment; None for a known one."""
-    known = (*TIME_NAMES, *landmarks)
-    if at in known:
+    moments_known = (*TIME_NAMES, *landmarks)
+    if at in moments_known:
         return None
     moments = ", ".join(map(repr, TIME_NAMES))
     expected = f"expected {moments} or a column of clips.landmarks {landmarks}"
-    return f"found {at!r}{did_you_mean(at, known)}, {expected}"
+    return f"found {at!r}{did_you_mean(at, moments_known)}, {expected}"

@@ -224,8 +224,8 @@ class Kriging(RecipePart):
 
     @field_validator("label", mode="before", json_schema_input_type=Text | list[Text])
     @classmethod
-    def _read_one_label(cls, found: object) -> object:
-        return [found] if isinstance(found, str) else found
+    def _read_one_label(cls, label: object) -> object:
+        return [label] if isinstance(label, str) else label
 
     @field_validator("label")
     @classmethod
@@ -348,12 +348,12 @@ class Size(RecipePart):
     @property
     def budgets(self) -> dict[str, float]:
         """Return the given budgets, m, by name: rms, p99, effector."""
-        given = {
+        centimetres = {
             "rms": self.rms_budget_cm,
             "p99": self.p99_budget_cm,
             "effector": self.effector_budget_cm,
         }
-        return {name: 0.01 * budget for name, budget in given.items() if budget is not None}
+        return {name: 0.01 * budget for name, budget in centimetres.items() if budget is not None}
 
     @model_validator(mode="after")
     def _check_size(self) -> "Size":
@@ -361,8 +361,10 @@ class Size(RecipePart):
         if self.ranks is None and not self.budgets:
             raise ValueError(f"found neither, expected either ranks or budgets ({keys})")
         if self.ranks is not None and (self.budgets or "cost" in self.model_fields_set):
-            found = sorted(self.model_fields_set)
-            raise ValueError(f"found {found}, expected either ranks or budgets ({keys}) and a cost")
+            keys_set = sorted(self.model_fields_set)
+            raise ValueError(
+                f"found {keys_set}, expected either ranks or budgets ({keys}) and a cost"
+            )
         return self
 
 

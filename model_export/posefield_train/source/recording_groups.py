@@ -18,8 +18,8 @@ SEPARATORS = ("_", ".", "-", " ")
 def mirrored_joints(names: tuple[str, ...]) -> tuple[int, ...]:
     """Return the index (J,) of each joint's counterpart on the other side, or its own."""
     rights = _right_by_left(names)
-    others = {**rights, **{right: left for left, right in rights.items()}}
-    return tuple(names.index(others.get(name, name)) for name in names)
+    counterparts = {**rights, **{right: left for left, right in rights.items()}}
+    return tuple(names.index(counterparts.get(name, name)) for name in names)
 
 
 def right_joints(names: tuple[str, ...]) -> list[int]:
@@ -29,12 +29,12 @@ def right_joints(names: tuple[str, ...]) -> list[int]:
 
 
 def _right_by_left(names: tuple[str, ...]) -> dict[str, str]:
-    there, found = set(names), dict[str, str]()
+    there, rights = set(names), dict[str, str]()
     for name in names:
         right = next((other for other in _right_names(name) if other in there), None)
-        if right is not None and right not in found.values():
-            found[name] = right
-    return found
+        if right is not None and right not in rights.values():
+            rights[name] = right
+    return rights
 
 
 def _right_names(name: str) -> Iterator[str]:
@@ -87,31 +87,31 @@ class FrameIndex:
     order: Indices
     heights: Floats
 
-    def like(self, wanted: Annotated[Floats, "_ features"]) -> Iterator[tuple[int, int]]:
+    def like(self, query: Annotated[Floats, "_ features"]) -> Iterator[tuple[int, int]]:
         """Yield clip and frame of all frames from which on the features may be the wanted ones.
 
         They are compared at CHECKED of the frames that the clip and the wanted ones have.
         """
-        height = _mean_heights(wanted[:1])[0]
+        height = _mean_heights(query[:1])[0]
         first, last = np.searchsorted(self.heights, [height - SAME, height + SAME])
         near = np.sort(self.order[first:last])
-        common = np.minimum(self.counts[self.owners[near]] - self.frames[near], len(wanted)) - 1
+        common = np.minimum(self.counts[self.owners[near]] - self.frames[near], len(query)) - 1
         for share in CHECKED:
-            ahead = (share * common).astype(int)
-            apart = np.linalg.norm(self.features[near + ahead] - wanted[ahead], axis=1)
-            near, common = near[apart < SAME], common[apart < SAME]
-        for found in near:
-            yield int(self.owners[found]), int(self.frames[found])
+            offsets = (share * common).astype(int)
+            distances = np.linalg.norm(self.features[near + offsets] - query[offsets], axis=1)
+            near, common = near[distances < SAME], common[distances < SAME]
+        for frame in near:
+            yield int(self.owners[frame]), int(self.frames[frame])
 
 
 def index_frames(features: Sequence[Floats]) -> FrameIndex:
     """Return the index of the frames of clips with features (F, 2 J) each."""
-    lengths = [len(own) for own in features]
-    whole = np.concatenate(features)
-    heights = _mean_heights(whole)
+    lengths = [len(rows) for rows in features]
+    joined = np.concatenate(features)
+    heights = _mean_heights(joined)
     order = np.argsort(heights, kind="stable")
     return FrameIndex(
-        whole,
+        joined,
         np.array(lengths),
         np.repeat(np.arange(len(lengths)), lengths),
         np.concatenate([np.arange(length) for length in lengths]),
@@ -173,14 +173,14 @@ def _overlaps(motions: Motions, swapped: list[int]) -> Iterator[ClipPair]:
         ways = {"shares frames with": (features[second], motion)}
         if swapped != list(range(joints)):
             ways["mirrors"] = features[second][:, other], _mirrored(motion, swapped)
-        for relation, (own, moved) in ways.items():
-            known = {second}
-            for first, start in index.like(own):
+        for relation, (rows, positions) in ways.items():
+            related = {second}
+            for first, start in index.like(rows):
                 # Two clips that begin together are found from both.
-                if first in known or (start == 0 and first > second):
+                if first in related or (start == 0 and first > second):
                     continue
-                if _same_frames(motions[first][start:], moved):
-                    known.add(first)
+                if _same_frames(motions[first][start:], positions):
+                    related.add(first)
                     yield ClipPair(first, second, relation)
 
 
@@ -207,8 +207,8 @@ def _same_frames(
     turned = b.copy()
     turned[..., x] = np.cos(angle) * b[..., x] + np.sin(angle) * b[..., z]
     turned[..., z] = np.cos(angle) * b[..., z] - np.sin(angle) * b[..., x]
-    apart = np.sqrt(np.mean(np.sum(np.square(a - turned), axis=-1), axis=-1))
-    return bool(apart.max() < SAME)
+    distances = np.sqrt(np.mean(np.sum(np.square(a - turned), axis=-1), axis=-1))
+    return bool(distances.max() < SAME)
 
 
 def _continuations(motions: Motions) -> Iterator[ClipPair]:
@@ -229,9 +229,9 @@ def _continuations(motions: Motions) -> Iterator[ClipPair]:
         steady = _rms(steps - step) < STEADY * pace
         same = _rms(starts[:, 0] - last) < SAME
         follows = _rms(starts[:, 0] - last - step) < FOLLOWS * pace
-        for found in np.flatnonzero(steady & (same | follows)):
-            if able[found] != first:
-                yield ClipPair(first, able[found], "continues")
+        for number in np.flatnonzero(steady & (same | follows)):
+            if able[number] != first:
+                yield ClipPair(first, able[number], "continues")
 
 
 def _rms(moves: Annotated[Floats, "*clips joints 3"]) -> Annotated[Floats, "*clips"]:
@@ -240,18 +240,18 @@ def _rms(moves: Annotated[Floats, "*clips joints 3"]) -> Annotated[Floats, "*cli
 
 
 def find_recordings(
-    files: Sequence[str], named: Sequence[str], motions: Motions, joints: tuple[str, ...]
+    files: Sequence[str], names: Sequence[str], motions: Motions, joints: tuple[str, ...]
 ) -> tuple[list[str], list[str]]:
     """Return the recording of each clip, as the place of a file, and notes on groups of clips.
 
     Clips of one file are of one recording, and so are clips that share frames, mirror or continue
-    each other. files: of each clip. named: names of clips in notes. motions: joint positions (F, J,
+    each other. files: of each clip. names: of clips in notes. motions: joint positions (F, J,
     3), m, of each clip as captured. joints: their names.
     """
     pairs = find_pairs(motions, mirrored_joints(joints))
-    apart = [pair for pair in pairs if files[pair.first] != files[pair.second]]
-    recordings = connected(files, apart)
-    return recordings, [*_pair_notes(named, apart), *_file_notes(files)]
+    pairs_of_files = [pair for pair in pairs if files[pair.first] != files[pair.second]]
+    recordings = connected(files, pairs_of_files)
+    return recordings, [*_pair_notes(names, pairs_of_files), *_file_notes(files)]
 
 
 def connected(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
@@ -275,15 +275,15 @@ def connected(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
 STATE_RECORDINGS = "clips.recording states recordings"
 
 
-def _pair_notes(named: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
+def _pair_notes(names: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
     """Return a note for each relation of clips of different files."""
     notes = []
     for relation in ("mirrors", "shares frames with", "continues"):
-        own = [pair for pair in pairs if pair.relation == relation]
-        if not own:
+        related = [pair for pair in pairs if pair.relation == relation]
+        if not related:
             continue
-        clips = len({clip for pair in own for clip in (pair.first, pair.second)})
-        second, first = named[own[0].second], named[own[0].first]
+        clips = len({clip for pair in related for clip in (pair.first, pair.second)})
+        second, first = names[related[0].second], names[related[0].first]
         more = f"; {clips} clips have such a counterpart" if clips > 2 else ""
         notes.append(
             f"{second} {relation} {first}{more}: such clips are left out together as one recording "

@@ -27,17 +27,17 @@ def count_dummies(clips: Sequence[Clip]) -> int:
     """
 
     def is_static(clip: Clip) -> bool:
-        parts = clip.rotations[:, joint], clip.translations[:, joint]
-        return max(float(np.ptp(part, axis=0).max()) for part in parts) < STATIC
+        channels = clip.rotations[:, joint], clip.translations[:, joint]
+        return max(float(np.ptp(channel, axis=0).max()) for channel in channels) < STATIC
 
     def slides(clip: Clip) -> bool:
         """Return whether the joint slides over the floor upright and at one height."""
         upright = np.abs(clip.rotations[:, joint][:, [1, 3]]).max() < STATIC
         return bool(upright and np.ptp(clip.translations[:, joint] @ UP) < RIGID)
 
-    own = clips[0].skeleton
+    joints = clips[0].skeleton
     count = joint = 0
-    while own.parents.count(joint) == 1 and joint not in own.tip_joints:
+    while joints.parents.count(joint) == 1 and joint not in joints.tip_joints:
         if not all(is_static(clip) or slides(clip) for clip in clips):
             break
         joint += 1
@@ -53,22 +53,22 @@ def collapse_roots(clip: Clip, count: int) -> Clip:
     """
     if not count:
         return clip
-    own = clip.skeleton
+    joints = clip.skeleton
     chain = (-1, *range(count))
-    places, turns = skeleton.forward_kinematics(
+    positions, turns = skeleton.forward_kinematics(
         chain, clip.rotations[:, : count + 1], clip.translations[:, : count + 1]
     )
-    rest = own.offsets[count:].copy()
-    rest[0] = own.offsets[: count + 1].sum(axis=0)
+    rest = joints.offsets[count:].copy()
+    rest[0] = joints.offsets[: count + 1].sum(axis=0)
     smaller = Skeleton(
-        own.names[count:],
-        (-1, *(parent - count for parent in own.parents[count + 1 :])),
+        joints.names[count:],
+        (-1, *(parent - count for parent in joints.parents[count + 1 :])),
         rest,
-        tuple(joint - count for joint in own.tip_joints),
-        own.tip_offsets,
+        tuple(joint - count for joint in joints.tip_joints),
+        joints.tip_offsets,
     )
     rotations, translations = clip.rotations[:, count:].copy(), clip.translations[:, count:].copy()
-    rotations[:, 0], translations[:, 0] = turns[:, -1], places[:, -1]
+    rotations[:, 0], translations[:, 0] = turns[:, -1], positions[:, -1]
     return Clip(smaller, quat.normalize(rotations), translations, clip.rate, clip.curves)
 
 
@@ -115,13 +115,15 @@ def body_size(clip: Clip) -> float:
 
 def find_stretch(clips: Sequence[Clip]) -> Stretch | None:
     """Return the largest stretch of the clips of one skeleton; None if it is within the limit."""
-    apart = np.stack([_stretches(clip).max(axis=0) for clip in clips])
-    clip, joint = map(int, np.unravel_index(np.argmax(apart), apart.shape))
-    limit = STRETCH_SHARE * float(np.median([body_size(each) for each in clips]))
-    if apart[clip, joint] <= max(limit, 1e-4):
+    stretches = np.stack([_stretches(clip).max(axis=0) for clip in clips])
+    clip, joint = map(int, np.unravel_index(np.argmax(stretches), stretches.shape))
+    limit = STRETCH_SHARE * float(
+        np.median([body_size(clip_of_family) for clip_of_family in clips])
+    )
+    if stretches[clip, joint] <= max(limit, 1e-4):
         return None
     cause = _likely_cause(clips[clip], joint, limit)
-    return Stretch(clip, joint, float(apart[clip, joint]), limit, cause)
+    return Stretch(clip, joint, float(stretches[clip, joint]), limit, cause)
 
 
 def _stretches(clip: Clip) -> Annotated[Floats, "frames joints"]:
@@ -133,23 +135,23 @@ def _stretches(clip: Clip) -> Annotated[Floats, "frames joints"]:
 
 def _likely_cause(clip: Clip, joint: int, limit: float) -> str:
     """Return the likely cause of a joint's stretch, and what to do about it."""
-    apart = _stretches(clip)
-    own = clip.skeleton
-    beyond = apart.max(axis=0) > limit
-    if np.mean(apart[:, joint] > limit) < FEW_FRAMES:
+    stretches = _stretches(clip)
+    joints = clip.skeleton
+    beyond = stretches.max(axis=0) > limit
+    if np.mean(stretches[:, joint] > limit) < FEW_FRAMES:
         return "it does so in few frames, as after a marker was lost: repair them or cut them off"
     if np.mean(beyond[1:]) > MANY_BONES:
         return "most bones do, as in a solve without a fixed skeleton: solve it with rigid bones"
-    if joint not in own.parents:
+    if joint not in joints.parents:
         return (
             "it has no children, as a prop or a target of inverse kinematics: leave it out with "
             "motion.drop_joints"
         )
-    if own.parents[joint] == 0:
-        others = [own.names[j] for j, p in enumerate(own.parents) if p == 0 and j != joint]
-        beside = f" besides {', '.join(others)}" if others else ""
+    if joints.parents[joint] == 0:
+        siblings = [joints.names[j] for j, p in enumerate(joints.parents) if p == 0 and j != joint]
+        listed = f" besides {', '.join(siblings)}" if siblings else ""
         return (
-            f"it looks like the body's own root{beside}: leave the others out with "
+            f"it looks like the body's own root{listed}: leave the others out with "
             "motion.drop_joints, so that it becomes the root"
         )
     return "its position channels carry motion: bake it into rotations"
@@ -190,18 +192,18 @@ def _split(offsets: Floats) -> tuple[int, int, tuple[int, int], float] | None:
 
     The clips that are like one of them are compared with those that are not.
     """
-    usual = float(np.sqrt(np.mean(np.sum(np.square(offsets), axis=-1))))
-    apart = np.stack([_distances(offsets, one) for one in offsets])
-    alike = apart <= OTHER_BODY * usual
+    size = float(np.sqrt(np.mean(np.sum(np.square(offsets), axis=-1))))
+    distances = np.stack([_distances(offsets, one) for one in offsets])
+    alike = distances <= OTHER_BODY * size
     first = int(np.argmax(alike.sum(axis=1)))
-    others = np.flatnonzero(~alike[first])
-    if len(others) < 2:
+    different = np.flatnonzero(~alike[first])
+    if len(different) < 2:
         return None
-    second = int(others[np.argmax(alike[others].sum(axis=1))])
+    second = int(different[np.argmax(alike[different].sum(axis=1))])
     count = int(alike[second].sum())
     if count < 2:
         return None
-    return first, second, (int(alike[first].sum()), count), float(apart[first, second])
+    return first, second, (int(alike[first].sum()), count), float(distances[first, second])
 
 
 def _distances(offsets: Floats, one: Floats) -> Floats:
@@ -223,7 +225,7 @@ def leg_length(joints: Skeleton, roles: Mapping[str, str], bones: Floats) -> flo
 
     roles: joints by role. bones (J,): length of the bone that leads to each joint.
     """
-    known = []
+    lengths = []
     for side in ("left", "right"):
         if not {f"{side}UpperLeg", f"{side}Foot"} <= roles.keys():
             continue
@@ -232,8 +234,8 @@ def leg_length(joints: Skeleton, roles: Mapping[str, str], bones: Floats) -> flo
         while joint > top:
             length += float(bones[joint])
             joint = joints.parents[joint]
-        known += [length] if joint == top and length else []
-    return float(np.mean(known)) if known else None
+        lengths += [length] if joint == top and length else []
+    return float(np.mean(lengths)) if lengths else None
 
 
 def size_notes(joints: Skeleton, bones: Floats) -> list[str]:
@@ -269,19 +271,19 @@ def normalize(
     cyclic: bool,
     directed: bool,
     roles: Mapping[str, str],
-    named: Collection[str],
+    recipe_joints: Collection[str],
 ) -> tuple[list[Clip], float | None, list[str]]:
     """Return the clips of one skeleton in the basis of their facing, without dummy roots.
 
     The facing is in degrees to the left of the root's +z, None for a family without one; notes
     follow. performers, files: names by clip. stretches: bones may stretch. directed: controls
-    depend on the facing. roles: joints by role. named: joints that the recipe names. Raises
+    depend on the facing. roles: joints by role. recipe_joints: those that it names. Raises
     RigError for a rest pose without extent, bones that stretch, two bodies under one name, and a
     facing that the motion contradicts.
     """
     names = clips[0].skeleton.names
     count = count_dummies(clips)
-    gone = set(named) & set(names[:count])
+    gone = set(recipe_joints) & set(names[:count])
     if gone:
         raise RigError(
             f"the recipe names {', '.join(map(repr, sorted(gone)))}, but "

@@ -74,8 +74,8 @@ class _RestAlignment:
         if child not in self.topology.names:
             return _turn_between(self.of_parent(joint, X), self.of_parent(joint, Y))
         bone = self.towards(joint, self.topology.index(child)), direction
-        beside = Y if abs(direction[0]) > 0.5 else X
-        return _turn_between(bone, self.hinge(joint) or self.of_parent(joint, beside))
+        second_axis = Y if abs(direction[0]) > 0.5 else X
+        return _turn_between(bone, self.hinge(joint) or self.of_parent(joint, second_axis))
 
     def local(self, joint: int, vectors: Floats) -> Floats:
         """Return the mean (3,) of world vectors (F, 3) in the frame of a joint."""
@@ -83,14 +83,14 @@ class _RestAlignment:
 
     def towards(self, joint: int, target: int) -> Floats:
         """Return the mean vector (3,) from a joint to another in the former's frame."""
-        places = self.motion.positions
-        return self.local(joint, places[:, target] - places[:, joint])
+        positions = self.motion.positions
+        return self.local(joint, positions[:, target] - positions[:, joint])
 
     def across(self, role: str, joint: int) -> Floats:
         """Return the mean vector from the right to the left joint of a role in a joint's frame."""
         left, right = (self.topology.index(side + role) for side in ("left", "right"))
-        places = self.motion.positions
-        return self.local(joint, places[:, left] - places[:, right])
+        positions = self.motion.positions
+        return self.local(joint, positions[:, left] - positions[:, right])
 
     def above(self, joint: int) -> Floats:
         """Return the mean vector to the first joint of the trunk that is farther up."""
@@ -119,9 +119,9 @@ class _RestAlignment:
         if role not in HINGES:
             return None
         limb = ELBOWS if role in ELBOWS else KNEES
-        ends = (*limb, HINGES[role])
+        roles = (*limb, HINGES[role])
         first, middle, last = (
-            self.motion.positions[:, self.topology.index(side + r)] for r in ends
+            self.motion.positions[:, self.topology.index(side + r)] for r in roles
         )
         normals = quat.cross(_units(middle - first), _units(last - middle))
         axis = self.local(joint, normals)
@@ -160,16 +160,16 @@ def _turn_between(first: Directions, second: Directions) -> Floats:
     first, second: a direction in a joint's frame, of any length, and in the canonical frame. Where
     the second says nothing, the smallest turn of the first is taken.
     """
-    own, common = (_basis(first[at], second[at]) for at in (0, 1))
-    if own is None or common is None:
+    local_axes, canonical_axes = (_basis(first[at], second[at]) for at in (0, 1))
+    if local_axes is None or canonical_axes is None:
         return smallest_turns(first[0][None], first[1][None])[0]
-    return np.asarray(quat.from_matrix(common @ own.T))
+    return np.asarray(quat.from_matrix(canonical_axes @ local_axes.T))
 
 
-def _basis(along: Floats, beside: Floats) -> Floats | None:
+def _basis(along: Floats, second: Floats) -> Floats | None:
     """Return axes (3, 3) as columns: along, the rest of beside, and their normal; None if equal."""
     x = _units(along)
-    rest = _units(beside) - (_units(beside) @ x) * x
+    rest = _units(second) - (_units(second) @ x) * x
     if np.linalg.norm(x) < 0.5 or np.linalg.norm(rest) < 1e-3:
         return None
     y = _units(rest)
@@ -188,14 +188,14 @@ def smallest_turns(a: Floats, b: Floats) -> Floats:
 
 def mean_turns(topology: Topology, motions: Sequence[JointMotion]) -> Floats:
     """Return the turns (J, 4) from a body's frames in the files to its canonical ones."""
-    whole = JointMotion(
+    joined = JointMotion(
         np.concatenate([one.positions for one in motions]),
         np.concatenate([one.turns for one in motions]),
     )
     turns = np.zeros((len(topology.names), 4))
     turns[:, 0] = 1.0
     for joint in range(len(topology.names)):
-        turns[joint] = _RestAlignment(topology, whole, turns).turn(joint)
+        turns[joint] = _RestAlignment(topology, joined, turns).turn(joint)
     return turns
 
 
@@ -219,8 +219,8 @@ class SkeletonKind:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Return the joints that no role and no chain has."""
-        kept = self.joints.kept
-        return tuple(name for at, name in enumerate(self.skeleton.names) if at not in kept)
+        joints_used = self.joints.kept
+        return tuple(name for at, name in enumerate(self.skeleton.names) if at not in joints_used)
 
 
 @dataclass(frozen=True)
@@ -249,10 +249,10 @@ def unify(clips: Sequence[Clip], stated: StatedRoles) -> UnifiedClips:
     bodies = [kind.joints for kind in kinds]
     topology = common_topology.common_topology(bodies)
     points = common_topology.joint_points(bodies, lengths, topology)
-    found = dict[int, Clip]()
-    for kind, places in zip(kinds, points, strict=True):
-        motions = {at: joint_motion(clips[at], places) for at in kind.clips}
-        aimed = _aimed_bones(kind.skeleton, topology, places)
+    unified = dict[int, Clip]()
+    for kind, kind_points in zip(kinds, points, strict=True):
+        motions = {at: joint_motion(clips[at], kind_points) for at in kind.clips}
+        aimed = _aimed_bones(kind.skeleton, topology, kind_points)
         for group in _bodies(clips, kind.clips):
             # The axes of a body from poses spread over its clips.
             poses = []
@@ -263,8 +263,8 @@ def unify(clips: Sequence[Clip], stated: StatedRoles) -> UnifiedClips:
                 poses.append(JointMotion(motion.positions[picked], motion.turns[picked]))
             turns = mean_turns(topology, poses)
             for at in group:
-                found[at] = _unified(clips[at], topology, motions[at], turns, aimed)
-    ordered = tuple(found[at] for at in range(len(clips)))
+                unified[at] = _unified(clips[at], topology, motions[at], turns, aimed)
+    ordered = tuple(unified[at] for at in range(len(clips)))
     return UnifiedClips(ordered, topology, tuple(kinds), tuple(points))
 
 
@@ -273,26 +273,26 @@ def _find_kinds(clips: Sequence[Clip], stated: StatedRoles) -> list[SkeletonKind
     groups: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
     for at, clip in enumerate(clips):
         groups.setdefault((clip.skeleton.names, clip.skeleton.parents), []).append(at)
-    known = {name for names, _ in groups for name in names}
-    unknown = sorted({name for names in stated.values() for name in names} - known)
+    names_of_files = {name for names, _ in groups for name in names}
+    unknown = sorted({name for names in stated.values() for name in names} - names_of_files)
     if unknown:
         raise TopologyError(f"skeleton.roles: no file has joint {', '.join(map(repr, unknown))}")
-    found = []
-    for own in groups.values():
-        first = clips[own[0]].skeleton
+    kinds = []
+    for indices in groups.values():
+        first = clips[indices[0]].skeleton
         try:
-            found.append(
-                SkeletonKind(first, tuple(own), common_topology.role_joints(first, stated))
+            kinds.append(
+                SkeletonKind(first, tuple(indices), common_topology.role_joints(first, stated))
             )
         except TopologyError as fault:
-            raise TopologyError(str(fault), own[0]) from fault
-    return found
+            raise TopologyError(str(fault), indices[0]) from fault
+    return kinds
 
 
-def _bodies(clips: Sequence[Clip], own: Sequence[int]) -> list[list[int]]:
+def _bodies(clips: Sequence[Clip], indices: Sequence[int]) -> list[list[int]]:
     """Return the clips of one skeleton by bodies with the same rest pose, in their order."""
     groups: list[tuple[Floats, list[int]]] = []
-    for at in own:
+    for at in indices:
         offsets = clips[at].translations.mean(axis=0)[1:]
         for rest, members in groups:
             if np.linalg.norm(rest - offsets) <= SAME_REST * np.linalg.norm(rest):
@@ -303,20 +303,22 @@ def _bodies(clips: Sequence[Clip], own: Sequence[int]) -> list[list[int]]:
     return [members for _, members in groups]
 
 
-def joint_motion(clip: Clip, places: Mapping[str, JointPoint]) -> JointMotion:
+def joint_motion(clip: Clip, points_by_name: Mapping[str, JointPoint]) -> JointMotion:
     """Return positions and orientations of a topology's joints in a clip of a file."""
     positions, turns = skeleton.forward_kinematics(
         clip.skeleton.parents, clip.rotations, clip.translations
     )
-    points = list(places.values())
+    points = list(points_by_name.values())
     shares = np.array([point.share for point in points])[:, None]
-    joints, ends = ([getattr(point, name) for point in points] for name in ("joint", "following"))
-    placed = positions[:, joints] + shares * (positions[:, ends] - positions[:, joints])
+    joints, following = (
+        [getattr(point, name) for point in points] for name in ("joint", "following")
+    )
+    placed = positions[:, joints] + shares * (positions[:, following] - positions[:, joints])
     return JointMotion(placed, turns[:, joints])
 
 
 def _aimed_bones(
-    own: Skeleton, topology: Topology, places: Mapping[str, JointPoint]
+    joints: Skeleton, topology: Topology, points: Mapping[str, JointPoint]
 ) -> list[tuple[int, int, Floats]]:
     """Return the bones on which a joint was left out: their ends, and direction (3,) at rest.
 
@@ -332,13 +334,13 @@ def _aimed_bones(
     return [
         (topology.index(name), topology.index(end), direction)
         for name, end, direction in bones
-        if not is_rigid(own, places[name], places[end])
+        if not is_rigid(joints, points[name], points[end])
     ]
 
 
-def is_rigid(own: Skeleton, point: JointPoint, following: JointPoint) -> bool:
+def is_rigid(joints: Skeleton, point: JointPoint, following: JointPoint) -> bool:
     """Return whether a point keeps its place in the frame of another by the tree alone."""
-    is_child = following.share == 0.0 and own.parents[following.joint] == point.joint
+    is_child = following.share == 0.0 and joints.parents[following.joint] == point.joint
     return following.joint == point.joint or is_child
 
 
@@ -351,16 +353,16 @@ def _unified(
 ) -> Clip:
     """Return a clip on a topology. turns (J, 4): from the files' frames to the canonical ones."""
     frames = quat.mul(motion.turns, quat.conj(turns))
-    places = motion.positions
+    positions = motion.positions
     for joint, end, direction in aimed:
-        ahead = places[:, end] - places[:, joint]
-        swings = smallest_turns(quat.rotate(frames[:, joint], direction), ahead)
+        bones = positions[:, end] - positions[:, joint]
+        swings = smallest_turns(quat.rotate(frames[:, joint], direction), bones)
         frames[:, joint] = quat.mul(swings, frames[:, joint])
-    rotations, translations = frames.copy(), places.copy()
+    rotations, translations = frames.copy(), positions.copy()
     for joint, parent in list(enumerate(topology.parents))[1:]:
         back = quat.conj(frames[:, parent])
         rotations[:, joint] = quat.mul(back, frames[:, joint])
-        translations[:, joint] = quat.rotate(back, places[:, joint] - places[:, parent])
+        translations[:, joint] = quat.rotate(back, positions[:, joint] - positions[:, parent])
     offsets = translations.mean(axis=0)
     offsets[0] = 0.0
     return replace(
@@ -386,21 +388,21 @@ def unify_recipe(
     where a joint was left out on it. Raises TopologyError for a skeleton that lacks a role, and for
     such a change.
     """
-    found = unify(clips, stated)
+    unified = unify(clips, stated)
     if not stretches:
-        _expect_rigid(found)
-    return found.clips, [*_kind_notes(clips, files, found), *_lack_notes(files, found)]
+        _expect_rigid(unified)
+    return unified.clips, [*_kind_notes(clips, files, unified), *_lack_notes(files, unified)]
 
 
-def _expect_rigid(found: UnifiedClips) -> None:
+def _expect_rigid(unified: UnifiedClips) -> None:
     """Raise TopologyError for a joint that moves against its parent since one was left out."""
-    stretch = skeleton_checks.find_stretch(found.clips)
+    stretch = skeleton_checks.find_stretch(unified.clips)
     if stretch is None:
         return
-    number = next(at for at, kind in enumerate(found.kinds) if stretch.clip in kind.clips)
-    kind, places, topology = found.kinds[number], found.points[number], found.topology
+    number = next(at for at, kind in enumerate(unified.kinds) if stretch.clip in kind.clips)
+    kind, points, topology = unified.kinds[number], unified.points[number], unified.topology
     name, parent = topology.names[stretch.joint], topology.names[topology.parents[stretch.joint]]
-    if is_rigid(kind.skeleton, places[parent], places[name]):
+    if is_rigid(kind.skeleton, points[parent], points[name]):
         return
     raise TopologyError(
         f"skeleton.topology: joints between {parent} and {name} are left out, since other files "
@@ -411,19 +413,19 @@ def _expect_rigid(found: UnifiedClips) -> None:
     )
 
 
-def _kind_notes(clips: Sequence[Clip], files: Sequence[str], found: UnifiedClips) -> list[str]:
+def _kind_notes(clips: Sequence[Clip], files: Sequence[str], unified: UnifiedClips) -> list[str]:
     """Return the note on each kind of skeleton: joints left out, and how far the others moved."""
-    names = found.topology.names
+    names = unified.topology.names
     limbs = np.array([name in LIMB_ROLES for name in names])
     notes = []
-    for kind, places in zip(found.kinds, found.points, strict=True):
+    for kind, points in zip(unified.kinds, unified.points, strict=True):
         gaps = np.concatenate(
             [
-                _distances_to(found.clips[at], joint_motion(clips[at], places).positions)
+                _distances_to(unified.clips[at], joint_motion(clips[at], points).positions)
                 for at in kind.clips
             ]
         )
-        limb, trunk = (100 * np.percentile(gaps[:, own], FAR) for own in (limbs, ~limbs))
+        limb, trunk = (100 * np.percentile(gaps[:, columns], FAR) for columns in (limbs, ~limbs))
         which = f"{len(kind.clips)} of {len(clips)} clips, such as {files[kind.clips[0]]}: "
         notes.append(
             f"{which}{len(kind.skeleton)} joints became {len(names)} by their roles"
@@ -436,8 +438,8 @@ def _kind_notes(clips: Sequence[Clip], files: Sequence[str], found: UnifiedClips
 def _named(left_out: Sequence[str]) -> str:
     """Return the joints that are left out as a part of a sentence."""
     more = len(left_out) - MOST_NAMED
-    told = ", ".join(left_out[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-    return f", without {told}" if left_out else ""
+    listed = ", ".join(left_out[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return f", without {listed}" if left_out else ""
 
 
 def _distances_to(clip: Clip, positions: Floats) -> Floats:
@@ -448,12 +450,12 @@ def _distances_to(clip: Clip, positions: Floats) -> Floats:
     return np.asarray(np.linalg.norm(placed - positions, axis=-1))
 
 
-def _lack_notes(files: Sequence[str], found: UnifiedClips) -> list[str]:
+def _lack_notes(files: Sequence[str], unified: UnifiedClips) -> list[str]:
     """Return the note on roles that some skeletons have and others lack."""
-    everyone = {role for kind in found.kinds for role in kind.joints.limbs}
+    everyone = {role for kind in unified.kinds for role in kind.joints.limbs}
     notes = []
     for role in LIMB_ROLES:
-        lacking = [kind for kind in found.kinds if role not in kind.joints.limbs]
+        lacking = [kind for kind in unified.kinds if role not in kind.joints.limbs]
         if role in everyone and lacking:
             count = sum(len(kind.clips) for kind in lacking)
             notes.append(

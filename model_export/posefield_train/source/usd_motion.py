@@ -44,14 +44,14 @@ class SkelMotion(SkelJoints):
         """Return joints at rest and at time codes (F,), the root in the stage's world; notes."""
         tree = self.tree()
         world = self.world(codes if self.moving_parents() else codes[:1])
-        first = Transform(*(part[0] for part in world))
+        first = Transform(*(component[0] for component in world))
         frame = None
         if not (self.query.HasRestPose() or self.query.HasBindPose()):
-            frame = Transform(*(part[0] for part in self._samples(codes[:1], None)[0]))
+            frame = Transform(*(component[0] for component in self._samples(codes[:1], None)[0]))
         local, rest, notes = self.rest(tree.parents, first, frame)
         motion, lacking = self._samples(codes, local)
-        said = f"{self.path} has no {' and '.join(lacking)}: those at rest were taken"
-        notes += [said] if lacking else []
+        note = f"{self.path} has no {' and '.join(lacking)}: those at rest were taken"
+        notes += [note] if lacking else []
         return tree, rest.root_inside(first), motion.root_inside(world), notes
 
     def curves(self, codes: Sequence[float]) -> Mapping[str, Floats]:
@@ -59,7 +59,7 @@ class SkelMotion(SkelJoints):
         prim = UsdSkel.Animation(self.animation.GetPrim())
         names = [str(name) for name in prim.GetBlendShapesAttr().Get() or ()]
         values = [prim.GetBlendShapeWeightsAttr().Get(code) for code in codes]
-        if not names or any(own is None or len(own) != len(names) for own in values):
+        if not names or any(weights is None or len(weights) != len(names) for weights in values):
             return {}
         return dict(zip(names, np.array(values, float).T, strict=True))
 
@@ -71,16 +71,16 @@ class SkelMotion(SkelJoints):
         still: of joints and parts that it does not have.
         """
         order = [str(path) for path in self.query.GetJointOrder()]
-        own = [str(path) for path in self.animation.GetJointOrder()]
-        known = [(order.index(path), column) for column, path in enumerate(own) if path in order]
-        if not known:
+        paths = [str(path) for path in self.animation.GetJointOrder()]
+        pairs = [(order.index(path), column) for column, path in enumerate(paths) if path in order]
+        if not pairs:
             raise self.opened.error(f"{self.path} moves no joint of {self.prim.GetPath()}")
-        targets, columns = map(list, zip(*known, strict=True))
-        prim, parts, lacking = self.animation.GetPrim(), list[Floats](), list[str]()
+        targets, columns = map(list, zip(*pairs, strict=True))
+        prim, components, lacking = self.animation.GetPrim(), list[Floats](), list[str]()
         for index, name in enumerate(("rotations", "translations", "scales")):
             values = [prim.GetAttribute(name).Get(code) for code in codes]
             is_missing = values[0] is None
-            if still is None and (is_missing or len(known) < len(order)):
+            if still is None and (is_missing or len(pairs) < len(order)):
                 raise self.opened.error(
                     f"{self.prim.GetPath()} has neither restTransforms nor bindTransforms, "
                     f"expected one of them: {self.path} leaves out joints or {name}"
@@ -91,18 +91,18 @@ class SkelMotion(SkelJoints):
                 full[:] = still[index]
             lacking += [name] if is_missing else []
             for code, row, value in zip(codes, full, () if is_missing else values, strict=False):
-                if len(value) != len(own):
+                if len(value) != len(paths):
                     raise self.opened.error(
                         f"{self.path} has {len(value)} {name} at time code {code:g}, expected "
-                        f"{len(own)}, one for each joint"
+                        f"{len(paths)}, one for each joint"
                     )
                 own_values = np.array(value, float)[columns]
                 row[targets] = own_values[:, [3, 0, 1, 2]] if width == 4 else own_values
-            parts.append(full)
-        lengths = np.linalg.norm(parts[0], axis=-1, keepdims=True)
-        if not np.all(np.isfinite(parts[1])) or not np.all(lengths > 0.5):
+            components.append(full)
+        lengths = np.linalg.norm(components[0], axis=-1, keepdims=True)
+        if not np.all(np.isfinite(components[1])) or not np.all(lengths > 0.5):
             raise self.opened.error(f"{self.path} has broken numbers")
-        return Transform(parts[0] / lengths, *parts[1:]).unmirrored(), lacking
+        return Transform(components[0] / lengths, *components[1:]).unmirrored(), lacking
 
 
 MAX_POSES = 10_000_000
@@ -142,13 +142,13 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
         )
     # The samples themselves, where the rate is theirs.
     exact = (codes if options.rate is None else times * pace).tolist()
-    tree, rest, moved, said = motion.posed_joints(exact)
+    tree, rest, posed, joint_notes = motion.posed_joints(exact)
     motion_file.expect_skeleton(source, tree, options)
-    skeleton, rotations, places, more = rest_joints.plain_motion(source, tree, rest, moved)
+    skeleton, rotations, translations, more = rest_joints.plain_motion(source, tree, rest, posed)
     curves, stage = motion.curves(exact), opened.stage
     begin, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
     if stage.HasAuthoredTimeCodeRange() and (codes[0] < begin or codes[-1] > end):
-        said.append(
+        joint_notes.append(
             f"the stage states the time codes {begin:g} to {end:g}: all samples, {codes[0]:g} to "
             f"{codes[-1]:g}, were read"
         )
@@ -159,12 +159,12 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
         "USD",
         skeleton,
         rotations,
-        places,
+        translations,
         rate,
         evidence,
         metres_per_unit=float(UsdGeom.GetStageMetersPerUnit(stage)) if has_unit else None,
         up=("z" if is_z_up else "y") if stage.HasAuthoredMetadata("upAxis") else None,
-        notes=(*notes, *said, *more, *motion_file.curve_notes(curves)),
+        notes=(*notes, *joint_notes, *more, *motion_file.curve_notes(curves)),
         curves=curves,
     )
 
@@ -181,46 +181,52 @@ def _chosen(opened: SkelStage, options: ReadOptions) -> tuple[SkelMotion, list[s
             f"found the skeleton {skeletons[0].GetPath()} without a SkelAnimation, expected one"
         )
     bound = {prim: _bound_animation(opened, prim) for prim in skeletons}
-    found = _animations(opened, animations, options.animation)
-    if len(found) > 1:
-        found = [own for own in found if own.GetPath() in bound.values()] or found
-    if len(found) > 1:
-        found = [own for own in found if _moves(opened, own)] or found
-    paths = [own.GetPath() for own in found]
+    candidates = _animations(opened, animations, options.animation)
+    if len(candidates) > 1:
+        candidates = [
+            query for query in candidates if query.GetPath() in bound.values()
+        ] or candidates
+    if len(candidates) > 1:
+        candidates = [query for query in candidates if _moves(opened, query)] or candidates
+    paths = [query.GetPath() for query in candidates]
     owners = [prim for prim in skeletons if bound[prim] in paths]
-    if len(found) > 1 and not owners:
+    if len(candidates) > 1 and not owners:
         listed = ", ".join(map(str, paths[:SHOWN]))
         raise opened.error(
-            f"found {len(found)} animations ({listed}), expected one: export each to a file of its "
-            "own, or give path or number of one (--animation, the column clips.animation)"
+            f"found {len(candidates)} animations ({listed}), expected one: export each to a file "
+            "of its own, or give path or number of one (--animation, the column clips.animation)"
         )
-    tokens = UsdSkel.Animation(found[0]).GetJointsAttr().Get() or ()
-    named = {str(token).rpartition("/")[2] for token in tokens}
+    tokens = UsdSkel.Animation(candidates[0]).GetJointsAttr().Get() or ()
+    joint_names = {str(token).rpartition("/")[2] for token in tokens}
     prim, notes = opened.skeleton(
-        owners or skeletons, {options.skeleton or ""} if owners else named
+        owners or skeletons, {options.skeleton or ""} if owners else joint_names
     )
-    animation = next((own for own in found if own.GetPath() == bound[prim]), found[0])
-    others = [str(own.GetPath()) for own in animations if own != animation]
-    if options.animation is None and others:
-        said = f"{animation.GetPath()} moves {prim.GetPath()}: {', '.join(others[:SHOWN])} left out"
-        notes.append(said)
-    own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
-    if not own:
+    animation = next(
+        (query for query in candidates if query.GetPath() == bound[prim]), candidates[0]
+    )
+    unused = [str(query.GetPath()) for query in animations if query != animation]
+    if options.animation is None and unused:
+        note = f"{animation.GetPath()} moves {prim.GetPath()}: {', '.join(unused[:SHOWN])} left out"
+        notes.append(note)
+    query = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
+    if not query:
         raise opened.error(f"{animation.GetPath()} names no joints, expected those of a skeleton")
-    return SkelMotion(opened, prim, opened.query(prim), own), notes
+    return SkelMotion(opened, prim, opened.query(prim), query), notes
 
 
-def _animations(opened: SkelStage, animations: list[Any], wanted: str | None) -> list[Any]:
+def _animations(opened: SkelStage, animations: list[Any], requested: str | None) -> list[Any]:
     """Return the animation with a path, name or number from 1, or all."""
-    if wanted is None:
+    if requested is None:
         return animations
     paths = [str(prim.GetPath()) for prim in animations]
-    is_path = wanted.startswith("/")
+    is_path = requested.startswith("/")
     names = paths if is_path else [prim.GetName() for prim in animations]
-    chosen = motion_file.choice(names, wanted)
+    chosen = motion_file.choice(names, requested)
     if chosen is None:
         listed = ", ".join(paths[:SHOWN])
-        raise opened.error(f"found the animations {listed}, expected one {wanted!r}, or a number")
+        raise opened.error(
+            f"found the animations {listed}, expected one {requested!r}, or a number"
+        )
     return [animations[chosen]]
 
 
@@ -233,8 +239,8 @@ def _moves(opened: SkelStage, animation: Any) -> bool:
 def _bound_animation(opened: SkelStage, skeleton: Any) -> Any:
     """Return the path of the animation that a skeleton is bound to, or None."""
     query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(skeleton))
-    own = query.GetAnimQuery() if query else None
-    return own.GetPrim().GetPath() if own else None
+    animation = query.GetAnimQuery() if query else None
+    return animation.GetPrim().GetPath() if animation else None
 
 
 def _codes_per_second(opened: SkelStage, notes: list[str]) -> float:

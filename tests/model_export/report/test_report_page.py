@@ -108,7 +108,7 @@ def hostile(trained, exported):
     card = replace(exported.card, name=MARKUP, description=MARKUP, controls=controls)
     worst = int(np.argmax(trained.left_out_errors))
     examples = list(trained.examples)
-    row = replace(examples[worst].row, place=Path(f"{MARKUP}.bvh"), performer=MARKUP)
+    row = replace(examples[worst].row, file=Path(f"{MARKUP}.bvh"), performer=MARKUP)
     examples[worst] = replace(examples[worst], row=row)
     return replace(trained, examples=tuple(examples)), replace(exported, card=card)
 
@@ -174,7 +174,7 @@ def test_two_reports_of_a_model_differ_only_in_the_times(
 
 
 def test_no_date_and_no_path_is_in_the_report(rendered, page, trained):
-    folder = str(trained.examples[0].row.place.parent)
+    folder = str(trained.examples[0].row.file.parent)
     for content in (rendered.html, rendered.json, *page.charts):
         assert not re.search(rb"20\d\d-\d\d-\d\d", content)
         assert folder.encode() not in content
