@@ -90,7 +90,8 @@ def lifts(
     first, last = (lowest[rows.flat(swings.rows, end)] for end in outer_frames)
     begin, end = (stance_rows.places(feet, floor, swings.rows, edge) for edge in outer_frames)
     smallest_lift = feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
-    highest = _highest_lift(swings.lengths / rows.rates[swings.rows])
+    # A parabola: how high a foot is lifted at most in the duration of its swing.
+    highest = LIFT_ACCELERATION * (swings.lengths / rows.rates[swings.rows]) ** 2 / 8.0
     smallest_lift = np.where(swings.inner(rows), np.minimum(smallest_lift, highest), smallest_lift)
     smallest_lift = np.where(np.minimum(first, last) < -UNEVEN, 0.0, smallest_lift)
     share, durations = _shares(swings, feet)
@@ -201,11 +202,6 @@ def _led_distances(stances: Runs, feet: FootRows, led: Mask) -> tuple[Indices, I
         np.where((before >= 0) & (last >= start), first_frames - 1 - last, far),
         np.where((after < len(frames)) & (first < stop), first - last_frames, far),
     )
-
-
-def _highest_lift(seconds: float | Floats) -> float | Floats:
-    """Return how high a foot is lifted at most in a swing of a duration, m: by a parabola."""
-    return LIFT_ACCELERATION * seconds**2 / 8.0
 
 
 def _lift_shares(share: Frames, seconds: float | Frames) -> Frames:

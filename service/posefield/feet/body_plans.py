@@ -277,7 +277,8 @@ class _Bodies:
             cancellation.check()
             beyond = two_bone.beyond(needs, np.tile(limit, legs))
             shorter = stance_rows.shortened(stances, beyond, feet.rows)
-            rows = stance_rows.changed_rows(stances, shorter, feet.rows)
+            lost = stances.mask(feet.rows) & ~shorter.mask(feet.rows)
+            rows = np.unique(feet.rows.groups.group[lost])
             if not len(rows):
                 break
             changed = np.isin(feet.rows.groups.group, rows)

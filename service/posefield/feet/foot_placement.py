@@ -60,7 +60,7 @@ def foot_paths(plans: Sequence[FeetPlan]) -> list[tuple[FootPaths, FootPaths]]:
 
 
 def place_grids(
-    plans: Sequence[FeetPlan], rotations: Annotated[np.ndarray, "frames joints 4"]
+    plans: Sequence[FeetPlan], rotations: Annotated[np.ndarray, "frames joints 4"] | None = None
 ) -> tuple[Points, FootPaths, FootPaths]:
     """Place the feet of motions with the same limbs in all frames of their grids.
 
@@ -71,7 +71,8 @@ def place_grids(
     before, after = np.empty((2, len(placing.at_frames), len(plans[0].character.legs), 3))
     for foot, (leg, end) in enumerate(placing.limb_ends()):
         cancellation.check()
-        placing.turns(leg, end).apply(leg, rotations)
+        if rotations is not None:
+            placing.turns(leg, end).apply(leg, rotations)
         if foot < before.shape[1]:
             before[:, foot], after[:, foot] = placing.foot_path(leg, end)
     return placing.shift, before, after
@@ -124,11 +125,9 @@ def _place_alike(
 
 
 def _paths_alike(plans: Sequence[FeetPlan]) -> list[tuple[FootPaths, FootPaths]]:
-    placing, legs = _Placing.on_grids(plans), plans[0].character.legs
-    before, after = np.empty((2, len(placing.at_frames), len(legs), 3))
-    for foot, (leg, end) in zip(range(len(legs)), placing.limb_ends(), strict=False):
-        before[:, foot], after[:, foot] = placing.foot_path(leg, end)
-    return list(zip(placing.groups.split(before), placing.groups.split(after), strict=True))
+    _, before, after = place_grids(plans)
+    groups = frame_groups.of_lengths([plan.lowered for plan in plans])
+    return list(zip(groups.split(before), groups.split(after), strict=True))
 
 
 @dataclass(frozen=True)

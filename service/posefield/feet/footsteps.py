@@ -71,7 +71,7 @@ class Led:
         up, down = (np.where(self.root, 0.0, np.inf) for _ in range(2))
         for limb, frames in zip(limbs, exact, strict=True):
             if frames.any():
-                higher, lower = two_bone.room(poses, [limb])
+                higher, lower = two_bone.room(poses, limb)
                 up = np.minimum(up, np.where(frames, higher, np.inf))
                 down = np.minimum(down, np.where(frames, lower, np.inf))
         return up, down

@@ -13,9 +13,9 @@ from posefield.common.frame_groups import FrameGroups
 from posefield.common.units import Bones, Floats
 from posefield.motion import skeleton
 
-Points = Annotated[Floats, "*characters frames 3"]
-Turns = Annotated[Floats, "*characters frames 4"]
-Values = Annotated[Floats, "*characters frames"]
+Points = Annotated[Floats, "frames 3"]
+Turns = Annotated[Floats, "frames 4"]
+Values = Annotated[Floats, "frames"]
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,18 @@ class Limb:
 
 @dataclass(frozen=True)
 class LimbPoses:
-    """Some limbs of one character in F poses, or of N characters (N, F).
+    """Some limbs of one character in F poses.
 
     parents: of the compact skeleton. joints: of the whole skeleton, by compact joint. bones:
-    offsets (..., C, 3), m. positions: (..., F, C, 3), m. orientations: (..., F, C, 4). groups: of
-    the frames of several motions, whose bones are (M, C, 3); None for the frames of one motion.
+    offsets (C, 3), m. positions: (F, C, 3), m. orientations: (F, C, 4). groups: of the frames of
+    several motions, whose bones are (M, C, 3); None for the frames of one motion.
     """
 
     joints: tuple[int, ...]
     parents: tuple[int, ...]
-    bones: Annotated[Floats, "*owners chain 3"]
-    positions: Annotated[Floats, "*characters frames chain 3"]
-    orientations: Annotated[Floats, "*characters frames chain 4"]
+    bones: Annotated[Floats, "*motions chain 3"]
+    positions: Annotated[Floats, "frames chain 3"]
+    orientations: Annotated[Floats, "frames chain 4"]
     groups: FrameGroups | None = None
 
     @cached_property
@@ -53,19 +53,19 @@ class LimbPoses:
         return {joint: index for index, joint in enumerate(self.joints)}
 
     def position(self, joint: int) -> Points:
-        """Return the positions (..., F, 3), m, of a joint of the whole skeleton."""
+        """Return the positions (F, 3), m, of a joint of the whole skeleton."""
         return self.positions[..., self._places[joint], :]
 
     def orientation(self, joint: int) -> Turns:
-        """Return the orientations (..., F, 4) of a joint of the whole skeleton."""
+        """Return the orientations (F, 4) of a joint of the whole skeleton."""
         return self.orientations[..., self._places[joint], :]
 
     def parent_orientation(self, joint: int) -> Turns:
-        """Return the orientations (..., F, 4) of a joint's parent."""
+        """Return the orientations (F, 4) of a joint's parent."""
         return self.orientations[..., self.parents[self._places[joint]], :]
 
-    def length(self, joint: int) -> Annotated[Floats, "*owners"]:
-        """Return the length (..., 1) of the bone that ends at a joint, m; (F,) for groups."""
+    def length(self, joint: int) -> Annotated[Floats, "_"]:
+        """Return the length (1,) of the bone that ends at a joint, m; (F,) for groups."""
         lengths: Floats = np.linalg.norm(self.bones[..., self._places[joint], :], axis=-1)
         return lengths[..., None] if self.groups is None else lengths[self.groups.group]
 
@@ -80,8 +80,8 @@ class LimbPoses:
         )
         return [LimbPoses(self.joints, self.parents, *motion) for motion in motions]
 
-    def mean(self, values: Points) -> Annotated[Floats, "*characters _ 3"]:
-        """Return the mean (..., 1, 3) of values (..., F, 3) over a motion; (F, 3) for groups."""
+    def mean(self, values: Points) -> Annotated[Floats, "_ 3"]:
+        """Return the mean (1, 3) of values (F, 3) over a motion; (F, 3) for groups."""
         if self.groups is None:
             return np.asarray(np.mean(values, axis=-2, keepdims=True))
         return self.groups.means(values)[self.groups.group]
@@ -101,7 +101,11 @@ def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
         for first in (1, 0)
         if len(chain) > first + 3
     ]
-    scores = [_similarity(bones, limb) for limb in candidates]
+    scores = []
+    for limb in candidates:
+        lengths = [math.hypot(*bones[joint].tolist()) for joint in (limb.middle, limb.lower)]
+        # The shorter bone over the longer one.
+        scores.append(min(lengths) / max(lengths) if max(lengths) > 0.0 else 0.0)
     return candidates[int(np.argmax(scores))] if max(scores, default=0.0) > 0.0 else None
 
 
@@ -115,20 +119,6 @@ def find_kept_limb(parents: Sequence[int], bones: Bones, joint: int) -> Limb | N
         return None
     below = skeleton.descendant_matrix(tuple(parents))[limb.upper].sum()
     return limb if 2 * below < len(parents) else None
-
-
-def evaluate_poses(
-    parents: Sequence[int],
-    bones: Annotated[Floats, "*characters joints 3"],
-    limbs: Sequence[Limb],
-    rotations: Annotated[Floats, "*characters frames joints 4"],
-    roots: Points,
-) -> LimbPoses:
-    """Return the poses of the limbs and of the joints above them.
-
-    bones: (..., J, 3), m. rotations: (..., F, J, 4). roots: (..., F, 3), m.
-    """
-    return evaluate_joints(parents, bones, [limb.tip for limb in limbs], rotations, roots)
 
 
 def evaluate_motions(
@@ -165,12 +155,15 @@ def join(motions: Sequence[LimbPoses]) -> LimbPoses:
 
 def evaluate_joints(
     parents: Sequence[int],
-    bones: Annotated[Floats, "*characters joints 3"],
+    bones: Annotated[Floats, "joints 3"],
     tips: Sequence[int],
-    rotations: Annotated[Floats, "*characters frames joints 4"],
+    rotations: Annotated[Floats, "frames joints 4"],
     roots: Points,
 ) -> LimbPoses:
-    """Return the poses of joints and of those above them; arguments as for `evaluate_poses`."""
+    """Return the poses of joints and of those above them.
+
+    bones: (J, 3), m. rotations: (F, J, 4). roots: (F, 3), m.
+    """
     joints, compact_parents = _compact(parents, tips)
     arms = bones[..., list(joints), :]
     translations = skeleton.translations(arms, roots)
@@ -190,9 +183,3 @@ def _compact(
     joints = tuple(sorted(needed))
     indices = {joint: index for index, joint in enumerate(joints)}
     return joints, tuple(indices.get(parents[joint], -1) for joint in joints)
-
-
-def _similarity(bones: Bones, limb: Limb) -> float:
-    """Return the shorter of the limb's two bones over the longer one."""
-    lengths = [math.hypot(*bones[joint].tolist()) for joint in (limb.middle, limb.lower)]
-    return min(lengths) / max(lengths) if max(lengths) > 0.0 else 0.0

@@ -292,12 +292,6 @@ def shortened(stances: Runs, beyond: Mask, rows: FrameRows) -> Runs:
     return Runs(row, begins, begins + pieces.lengths).sort()
 
 
-def changed_rows(before: Runs, after: Runs, rows: FrameRows) -> Annotated[Indices, "changed"]:
-    """Return the rows whose stances `after` lack frames that they had before."""
-    lost = before.mask(rows) & ~after.mask(rows)
-    return np.asarray(np.unique(rows.groups.group[lost]))
-
-
 # A foot stands where its contact is more likely than not. Probabilities are rounded, so that two
 # machines whose last digits differ plan the same steps.
 STANDING, DECIMALS = 0.5, 6

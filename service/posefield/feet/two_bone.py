@@ -32,23 +32,21 @@ LEAST_ACROSS = 0.3
 
 @dataclass(frozen=True)
 class LimbTurns:
-    """Local rotations (..., F, 4) of the three joints of a limb."""
+    """Local rotations (F, 4) of the three joints of a limb."""
 
     upper: Turns
     middle: Turns
     lower: Turns
 
-    def apply(
-        self, limb: Limb, rotations: Annotated[Floats, "*characters frames joints 4"]
-    ) -> None:
-        """Write the rotations of the limb's joints into poses (..., F, J, 4)."""
+    def apply(self, limb: Limb, rotations: Annotated[Floats, "frames joints 4"]) -> None:
+        """Write the rotations of the limb's joints into poses (F, J, 4)."""
         rotations[..., limb.upper, :] = self.upper
         rotations[..., limb.middle, :] = self.middle
         rotations[..., limb.lower, :] = self.lower
 
 
 def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
-    """Return the distance (..., F), m, up to which the end of a limb follows its target exactly."""
+    """Return the distance (F,), m, up to which the end of a limb follows its target exactly."""
     length = poses.length(limb.middle) + poses.length(limb.lower)
     source = np.linalg.norm(poses.position(limb.lower) - poses.position(limb.upper), axis=-1)
     reach: Values = np.maximum(source, REACH * length - SOFTNESS)
@@ -58,9 +56,9 @@ def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
 def soften(
     distance: Values,
     firm: Values,
-    length: float | Annotated[Floats, "*characters _"] | Annotated[Floats, "_"],
+    length: float | Annotated[Floats, "_"] | Annotated[Floats, "_"],
 ) -> Values:
-    """Return distances (..., F), m, that exceed the firm reach softly, and never the length.
+    """Return distances (F,), m, that exceed the firm reach softly, and never the length.
 
     Beyond a they are a + s (1 - exp(-(d - a) / s)), where s is at most 5 mm.
     """
@@ -71,9 +69,9 @@ def soften(
 
 
 def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points:
-    """Return the vectors (..., F, 3), m, from the upper joint of a limb to where its end comes.
+    """Return the vectors (F, 3), m, from the upper joint of a limb to where its end comes.
 
-    shift: movement (..., F, 3), m, of the upper joint from its place in the poses. target: (..., F,
+    shift: movement (F, 3), m, of the upper joint from its place in the poses. target: (F,
     3), m; it is approached along its direction if it is out of reach.
     """
     above, below = poses.length(limb.middle), poses.length(limb.lower)
@@ -88,7 +86,7 @@ def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points
 def solve(poses: LimbPoses, limb: Limb, end: Points) -> LimbTurns:
     """Return the rotations with which the end of a limb comes where it is wanted.
 
-    end: vectors (..., F, 3), m, from the limb's upper joint. The end's orientation is kept.
+    end: vectors (F, 3), m, from the limb's upper joint. The end's orientation is kept.
     """
     above, below = poses.length(limb.middle), poses.length(limb.lower)
     upper, middle = poses.position(limb.upper), poses.position(limb.middle)
@@ -118,7 +116,7 @@ def shortest_turn(
 
 
 def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
-    """Return the unit vectors (..., F, 3), orthogonal to the limb, towards which its middle bends.
+    """Return the unit vectors (F, 3), orthogonal to the limb, towards which its middle bends.
 
     Where a limb is nearly straight its plane is that of its mean bend, about one axis of its upper
     bone, as that of a knee; so is that of a leg that bends a little the other way.
@@ -148,10 +146,10 @@ def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
 
 
 def _towards_middle(side: Points, chord: Points, bone: Points, towards: Points) -> Points:
-    """Return the vectors (..., F, 3) towards which a limb bends, where it is folded to its middle.
+    """Return the vectors (F, 3) towards which a limb bends, where it is folded to its middle.
 
     The ends of a folded limb are so near each other that their direction turns by any angle in a
-    frame, and its plane with it; its middle moves as the limb does. bone: to it (..., F, 3), m.
+    frame, and its plane with it; its middle moves as the limb does. bone: to it (F, 3), m.
     """
     size = np.linalg.norm(bone, axis=-1, keepdims=True)
     distance = np.linalg.norm(chord, axis=-1, keepdims=True)
@@ -175,11 +173,11 @@ Lowering = Annotated[Floats, "frames"]
 
 
 def need(
-    poses: LimbPoses, leg: Limb, target: Points, sunk: float | Annotated[Floats, "*characters _"]
+    poses: LimbPoses, leg: Limb, target: Points, sunk: float | Annotated[Floats, "_"]
 ) -> Values:
-    """Return how much lower a leg needs the pelvis to be (..., F), m; infinite out of reach.
+    """Return how much lower a leg needs the pelvis to be (F,), m; infinite out of reach.
 
-    target: of the leg's end (..., F, 3), m. sunk: by how much the pelvis is lowered already, m.
+    target: of the leg's end (F, 3), m. sunk: by how much the pelvis is lowered already, m.
     """
     offset = poses.position(leg.upper) - np.asarray(sunk)[..., None] * UP - target
     level = np.sum(np.square(offset * (1.0 - UP)), axis=-1)
@@ -188,19 +186,12 @@ def need(
     return np.where(room < 0.0, np.inf, np.maximum(offset @ UP - highest, 0.0))
 
 
-def room(poses: LimbPoses, limbs: Sequence[Limb]) -> tuple[Frames, Frames]:
-    """Return how far the pelvis may be raised, and lowered (F,), m, for limbs to keep their ends.
-
-    Both are positive, and infinite without limbs.
-    """
-    count = len(poses.positions)
-    up, down = np.full(count, np.inf), np.full(count, np.inf)
-    for limb in limbs:
-        offset = poses.position(limb.upper) - poses.position(limb.lower)
-        level = np.sum(np.square(offset * (1.0 - UP)), axis=-1)
-        reach = np.sqrt(np.maximum(np.square(firm_reach(poses, limb)) - level, 0.0))
-        up, down = np.minimum(up, reach - offset @ UP), np.minimum(down, reach + offset @ UP)
-    return np.maximum(up, 0.0), np.maximum(down, 0.0)
+def room(poses: LimbPoses, limb: Limb) -> tuple[Frames, Frames]:
+    """Return how far the pelvis may be raised, and lowered (F,), m, for a limb to keep its end."""
+    offset = poses.position(limb.upper) - poses.position(limb.lower)
+    level = np.sum(np.square(offset * (1.0 - UP)), axis=-1)
+    reach = np.sqrt(np.maximum(np.square(firm_reach(poses, limb)) - level, 0.0))
+    return np.maximum(reach - offset @ UP, 0.0), np.maximum(reach + offset @ UP, 0.0)
 
 
 def lower(needs: Sequence[Lowering], limit: Lowering, rows: FrameRows) -> Lowering:
@@ -245,6 +236,6 @@ def _covered(needed: Lowering, rows: FrameRows, half: int) -> Lowering:
 
 
 def beyond(needed: Values, limit: Values) -> Booleans:
-    """Return whether a leg needs more than the pelvis can be lowered (..., F)."""
+    """Return whether a leg needs more than the pelvis can be lowered (F,)."""
     is_beyond: Booleans = needed > limit + 1e-9
     return is_beyond

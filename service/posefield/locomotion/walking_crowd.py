@@ -116,25 +116,22 @@ def crowd_of_plan(
         Placement(plan.roots[:, 0], plan.headings[:, 0]),
         np.arange(characters),
         _batches(session, plan.relative_to_start(), levels, make or motions),
-        {**_facts(session, plan), "level_shares": _level_shares(session, levels)},
+        _facts(session, plan, levels),
         tuple(curve.name for curve in session.card.curves),
     )
 
 
-def _facts(session: Session, plan: LocomotionPlan) -> dict[str, Any]:
+def _facts(session: Session, plan: LocomotionPlan, levels: LevelSchedule) -> dict[str, Any]:
     card = session.card
+    counts = np.bincount(levels.levels.ravel(), minlength=len(card.levels))
     low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
     outside = np.any((plan.controls < low) | (plan.controls > high), axis=-1)
     return {
         "model": f"{card.name}@{session.digest}",
         **plan.labels.facts(plan.who),
         "outside_share": float(np.mean(outside)),
+        "level_shares": [float(f"{share:.4g}") for share in counts / levels.levels.size],
     }
-
-
-def _level_shares(session: Session, levels: LevelSchedule) -> list[float]:
-    counts = np.bincount(levels.levels.ravel(), minlength=len(session.card.levels))
-    return [float(f"{share:.4g}") for share in counts / levels.levels.size]
 
 
 def _batches(
@@ -354,7 +351,11 @@ def build_crowd(
     parameters that the model or the limits do not permit.
     """
     gait = gait.with_labels(order.labels)
-    plan = _build_plan(gait, order)
+    span = order.seconds, order.fps, order.seed
+    if order.routes:
+        plan = plan_routes(gait, order.routes, *span)
+    else:
+        plan = plan_random(gait, order.motions or order.count, *span)
     levels = _build_schedule(model, plan, order)
     crowd = crowd_of_plan(gait.session, plan, levels, make)
     if order.motions is None:
@@ -362,13 +363,6 @@ def build_crowd(
     # The characters reuse the motions in turn.
     stands = paths.initial_placement(order.count, order.seed)
     return replace(crowd, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
-
-
-def _build_plan(gait: Gait, order: CrowdOrder) -> LocomotionPlan:
-    span = order.seconds, order.fps, order.seed
-    if order.routes:
-        return plan_routes(gait, order.routes, *span)
-    return plan_random(gait, order.motions or order.count, *span)
 
 
 def _build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:

@@ -147,8 +147,12 @@ def _moved(
 
 def _poses(character: Character, passage: Passage, limb: Limb, rows: range) -> LimbPoses:
     frames = slice(rows.start, rows.stop)
-    return limbs.evaluate_poses(
-        character.parents, character.bones, [limb], passage.rotations[frames], passage.roots[frames]
+    return limbs.evaluate_joints(
+        character.parents,
+        character.bones,
+        [limb.tip],
+        passage.rotations[frames],
+        passage.roots[frames],
     )
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -122,16 +121,11 @@ class SkeletonMatch:
     turns: Annotated[Floats, "joints 4"]
     notes: tuple[str, ...] = ()
 
-    @cached_property
-    def is_identity(self) -> bool:
-        """Say whether rotations stay as they are."""
-        return bool(np.all(self.turns == quat.IDENTITY))
-
     def rotations(
         self, source: Annotated[Floats, "*poses joints 4"]
     ) -> Annotated[Floats, "*poses joints 4"]:
         """Return local rotations (..., J, 4) of the target whose bones point as in the source."""
-        if self.is_identity:
+        if np.all(self.turns == quat.IDENTITY):
             return source
         turned = quat.mul(source, self.turns)
         above = self.turns[list(self.parents[1:])]

@@ -141,7 +141,8 @@ class _Cycle:
 
     def evaluate(self, rotations: Rotations, roots: RootPath) -> LimbPoses:
         """Return the limbs in poses (F, J, 4) with roots (F, 3), m."""
-        return limbs.evaluate_poses(self.parents, self.bones, self.legs, rotations, roots)
+        tips = [leg.tip for leg in self.legs]
+        return limbs.evaluate_joints(self.parents, self.bones, tips, rotations, roots)
 
     @cached_property
     def roots(self) -> RootPath:
@@ -250,10 +251,13 @@ def _stand(
     stances = np.array([standing.ball for standing in stood])
     balls = stances.real.mean() + 1j * _sides(poses, cycle.legs, stances.imag)
     ankles = [standing.ankle(complex(ball)) for standing, ball in zip(stood, balls, strict=True)]
-    heights = [
-        _root_height(poses.position(leg.upper)[0], ankle, standing.chord)
-        for leg, ankle, standing in zip(cycle.legs, ankles, stood, strict=True)
-    ]
+    heights = []
+    for leg, ankle, standing in zip(cycle.legs, ankles, stood, strict=True):
+        # The height of the root at which the leg has its length; it is at 0 here.
+        hip = poses.position(leg.upper)[0]
+        level = float(np.sum(np.square((hip - ankle) * (1.0 - UP))))
+        up = math.sqrt(max(standing.chord**2 - level, 0.0))
+        heights.append(float((ankle - hip) @ UP) + up)
     poses = cycle.evaluate(rotations[None], (root + min(heights) * UP)[None])
     for leg, ankle, standing in zip(cycle.legs, ankles, stood, strict=True):
         turns = two_bone.solve(poses, leg, ankle - poses.position(leg.upper))
@@ -278,12 +282,3 @@ def _sides(
     width = 0.5 * (hips[0] - hips[1] + walked[0] - walked[1])
     sides: Floats = np.array([0.5, -0.5]) * width + float(poses.position(0)[0] @ LEFT)
     return sides
-
-
-def _root_height(hip: Vector, ankle: Vector, chord: float) -> float:
-    """Return the height of the root, m, at which a leg has a length, m.
-
-    hip: (3,), m, with the root at height 0.
-    """
-    level = float(np.sum(np.square((hip - ankle) * (1.0 - UP))))
-    return float((ankle - hip) @ UP) + math.sqrt(max(chord**2 - level, 0.0))

@@ -210,4 +210,5 @@ def _stand(
 
 
 def _poses(pose: StandingPose, rotations: Rotations, roots: RootPath) -> LimbPoses:
-    return limbs.evaluate_poses(pose.parents, pose.bones, pose.legs, rotations, roots)
+    tips = [leg.tip for leg in pose.legs]
+    return limbs.evaluate_joints(pose.parents, pose.bones, tips, rotations, roots)

@@ -74,7 +74,7 @@ def test_limbs_are_chosen_by_feet_and_exact_joints():
 def test_the_end_reaches_its_target_and_keeps_its_orientation(rng):
     rotations, roots = poses(rng)
     before, oriented = forward(rotations, roots)
-    found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
+    found = limbs.evaluate_joints(PARENTS, BONES, [LEG.tip], rotations, roots)
     shift = np.tile([0.0, -0.03, 0.0], (30, 1))
     target = before[:, 4] + 0.02 * rng.normal(size=(30, 3)) + [0.0, 0.05, 0.0]
     end = two_bone.reach(found, LEG, shift, target)
@@ -90,7 +90,7 @@ def test_the_end_reaches_its_target_and_keeps_its_orientation(rng):
 def test_a_limb_out_of_reach_is_never_stretched(rng):
     rotations, roots = poses(rng)
     before, _ = forward(rotations, roots)
-    found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
+    found = limbs.evaluate_joints(PARENTS, BONES, [LEG.tip], rotations, roots)
     far = before[:, 4] + [0.0, -0.5, 0.3]
     length = np.linalg.norm(two_bone.reach(found, LEG, np.zeros((30, 3)), far), axis=-1)
     whole = np.linalg.norm(BONES[3]) + np.linalg.norm(BONES[4])
@@ -116,7 +116,7 @@ def test_a_knee_that_is_overstretched_bends_to_its_front_in_a_kick_too():
     # A knee that bends, is overstretched while the leg is level, and bends again.
     rotations[:, LEG.middle] = flexed(bend)
     roots = np.tile([0.0, 0.95, 0.0], (101, 1))
-    own = limbs.evaluate_poses(PARENTS, BONES, [LEG], rotations, roots)
+    own = limbs.evaluate_joints(PARENTS, BONES, [LEG.tip], rotations, roots)
     end = 0.9 * (own.position(LEG.lower) - own.position(LEG.upper))
     turned = moved(rotations, LEG, two_bone.solve(own, LEG, end))
     positions, _ = forward(turned, roots)
@@ -134,7 +134,7 @@ def folded_leg(flexion):
     rotations[:, LEG.upper] = quat.mul(aside, flexed(np.full(count, -1.6)))
     rotations[:, LEG.middle] = flexed(flexion)
     roots = np.tile([0.0, 0.45, 0.0], (count, 1))
-    return rotations, limbs.evaluate_poses(PARENTS, BONES, [LEG], rotations, roots), roots
+    return rotations, limbs.evaluate_joints(PARENTS, BONES, [LEG.tip], rotations, roots), roots
 
 
 def test_a_knee_that_is_folded_does_not_turn_over_when_its_foot_is_placed():
