@@ -15,11 +15,12 @@ from family import Family
 from paper import precomputation
 from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
+from posefield.kriging.kriging_model import Hyper
 from posefield.motion import skeleton
 from posefield_train.graph import truncation_cost
 from posefield_train.graph.truncation_cost import ParetoFront, RankCost, RankTriple
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.tensor.decoder import Decoder
 from posefield_train.tensor.hosvd import TuckerTensor
 

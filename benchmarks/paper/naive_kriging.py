@@ -15,9 +15,10 @@ from scipy.optimize import least_squares
 from paper import variogram
 from paper.variogram import RANGES, ExperimentalVariogram, VariogramModel
 from posefield.common.units import Floats, PointControls, PoseVectors
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_graph import COVARIANCES
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.onnx_graph import GraphBuilder
 
 VariogramFitter = Callable[[ExperimentalVariogram, str], VariogramModel]

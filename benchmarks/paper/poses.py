@@ -16,7 +16,7 @@ from scipy import linalg
 from paper import kernels
 from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
-from posefield_train.kriging import universal_kriging
+from posefield.kriging import kriging_model
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -134,6 +134,6 @@ def lu_factors(systems: Floats) -> tuple[Floats, Floats, Floats]:
 def system(field: UniversalKriging) -> Floats:
     """Return the kriging system (m, m) of one frame with linear drift."""
     n, drift = len(field.samples), np.insert(field.samples, 0, 1.0, axis=1)
-    near = universal_kriging.covariances(field.hyper, field.samples, field.samples)
+    near = kriging_model.covariances(field.hyper, field.samples, field.samples)
     corner = np.zeros((drift.shape[1], drift.shape[1]))
     return np.block([[near + field.hyper.nugget * np.eye(n), drift], [drift.T, corner]])

@@ -9,9 +9,10 @@ from paper import naive_kriging as per_frame
 from paper import variogram
 from paper.naive_kriging import NaiveKriging, VariogramFitter
 from posefield.common.units import Floats
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.align import time_alignment
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.tensor import hosvd, motion_tensor
 from posefield_train.tensor.hosvd import TuckerTensor
 

@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Indices, SampleControls, SampleValues
-from posefield_train.kriging import universal_kriging
+from posefield.kriging import kriging_model
 from posefield_train.kriging.kriging_graph import COVARIANCES
 
 LAGS = 15
@@ -44,7 +44,7 @@ class VariogramModel:
 
 def residuals(samples: SampleControls, values: SampleValues, drift: int) -> SampleValues:
     """Return the residuals of values (n, m) at samples (n, d) after least squares on the drift."""
-    functions = universal_kriging.drift(samples, samples.shape[1], drift)
+    functions = kriging_model.drift(samples, samples.shape[1], drift)
     coefficients, *_ = np.linalg.lstsq(functions, values, rcond=None)
     return values - functions @ coefficients
 

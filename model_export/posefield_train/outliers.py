@@ -10,13 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from posefield.common.errors import TrainingError
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import UP, Floats
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper
 from posefield.motion import skeleton
 from posefield.motion.clip import Clip
 from posefield_train.graph.trained_model import Outlier, TrainedModel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source import clip_joints, frame_faults, measured_controls, recording_groups
 from posefield_train.source.clip_joints import ForeignBones, apart
 from posefield_train.source.control_sources import Auto, Control, ControlMeasured
@@ -118,9 +119,9 @@ def measure_outliers(hyper: Hyper, samples: SamplePoints, motions: Floats) -> Ou
     of its neighbours.
     """
     outside: list[int] = []
-    judged = _measure(hyper, samples, motions, outside)
+    measured = _measure(hyper, samples, motions, outside)
     while len(outside) < MAX_OUTLIER_SHARE * len(motions):
-        times = judged.times.copy()
+        times = measured.times.copy()
         times[outside] = 0.0
         worst = int(np.argmax(times))
         if (
@@ -129,8 +130,8 @@ def measure_outliers(hyper: Hyper, samples: SamplePoints, motions: Floats) -> Ou
         ):
             break
         outside.append(worst)
-        judged = _measure(hyper, samples, motions, outside)
-    return judged
+        measured = _measure(hyper, samples, motions, outside)
+    return measured
 
 
 def robust_deviations(values: Floats) -> Floats:
@@ -146,19 +147,13 @@ def _measure(
 ) -> OutlierDistances:
     inside = np.delete(np.arange(len(motions)), outside)
     left_out = np.zeros((len(motions), len(motions)))
-    left_out[np.ix_(inside, inside)] = _left_out(hyper, samples, inside)
+    left_out[np.ix_(inside, inside)] = universal_kriging.leave_out_samples(hyper, samples, inside)
     for clip in outside:
         with_it = np.append(inside, clip)
-        left_out[clip, with_it] = _left_out(hyper, samples, with_it)[-1]
+        left_out[clip, with_it] = universal_kriging.leave_out_samples(hyper, samples, with_it)[-1]
     distances = np.linalg.norm(left_out @ motions, axis=1)
-    times = distances / np.sqrt(
-        universal_kriging.left_out_variances(hyper, samples.points, left_out)
-    )
+    times = distances / np.sqrt(kriging_model.left_out_variances(hyper, samples.points, left_out))
     return OutlierDistances(left_out, distances, times / np.median(times[inside]), tuple(outside))
-
-
-def _left_out(hyper: Hyper, samples: SamplePoints, indices: Indices) -> Floats:
-    return universal_kriging.leave_out_samples(hyper, samples, indices)
 
 
 # A transform is reported if undoing it reduces the distance below this share.
@@ -328,11 +323,11 @@ class _OutlierSearch:
             yield Outlier(clip, "far", evidence)
 
     def _nearest(self, clip: int) -> str:
-        apart = np.linalg.norm(self.motions - self.motions[clip], axis=1)
-        apart[clip] = np.inf
-        nearest = int(np.argmin(apart))
+        gaps = np.linalg.norm(self.motions - self.motions[clip], axis=1)
+        gaps[clip] = np.inf
+        nearest = int(np.argmin(gaps))
         clip_name = self.trained.examples[nearest].row.named
-        return f"most like it is {clip_name}, {_cm(apart[nearest])} away"
+        return f"most like it is {clip_name}, {_cm(gaps[nearest])} away"
 
     def transformed_clips(self) -> Iterator[Outlier]:
         """Yield clips that would fit better mirrored, turned or with sides exchanged."""

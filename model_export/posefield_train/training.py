@@ -11,7 +11,6 @@ import numpy as np
 
 from posefield.common import atomic_files
 from posefield.common.units import Floats
-from posefield.motion.curves import Curve
 from posefield.motion.skeleton import Skeleton
 from posefield_train import outliers
 from posefield_train.align import phase_alignment, time_alignment, travel
@@ -19,7 +18,6 @@ from posefield_train.align.time_alignment import AlignedClips, Refinement
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.contacts import contact_model
-from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import onnx_export, truncation_cost, warped_errors
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.onnx_export import ExportedModel
@@ -169,12 +167,6 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
     return tuple(sorted(examples, key=key))
 
 
-def _curves(examples: Sequence[Example]) -> tuple[Curve, ...]:
-    """Return the curves of the family."""
-    curves = examples[0].clip.curves
-    return curves.curves if curves else ()
-
-
 def _vectorize(
     recipe: Recipe, examples: Sequence[Example], weights: Floats, jobs: Jobs
 ) -> _VectorizedClips:
@@ -187,12 +179,12 @@ def _vectorize(
     if recipe.motion.cyclic:
         aligned, travels["travel"] = travel.remove_travel(aligned)
     offsets = np.stack([example.offsets for example in examples])
-    parents = examples[0].clip.skeleton.parents
+    parents, curves = examples[0].clip.skeleton.parents, examples[0].clip.curves
     numbers, chart, noticed = motion_tensor.pose_vectors(aligned, parents, offsets)
     if samples.inducing is not None:
         aligned = aligned.without_poses()
     tensor = motion_tensor.build_tensor(
-        numbers, chart, parents, offsets, weights, _curves(examples)
+        numbers, chart, parents, offsets, weights, curves.curves if curves else ()
     )
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
     findings = jumps + noticed
@@ -360,17 +352,11 @@ def _assemble(
     return FloatModel(
         KrigingBank(*ranges, clips.labels, solved, other_models, sill, (), fits.power_law, event),
         timing,
-        _decoder(tensor, reduced, blend),
+        Decoder(
+            reduced, tensor.mean, tensor.unwhiten, tensor.chart, event=blend, curves=tensor.curves
+        ),
         fits.proportions,
         Travel(recipe.motion.frames, len(tensor.chart.means)) if recipe.motion.cyclic else None,
-    )
-
-
-def _with_contacts(model: FloatModel, contacts: FittedContacts | None) -> FloatModel:
-    if contacts is None:
-        return model
-    return replace(
-        model, bank=replace(model.bank, contacts=contacts.kriging), contacts=contacts.table
     )
 
 
@@ -381,12 +367,6 @@ def _event_blend(
         return None
     weights = event_weights(recipe.motion.frames, reference.event_frame.frame, recipe.motion.cyclic)
     return build_blend(COEFFICIENTS, weights, reduced.core, reduced.bases[1])
-
-
-def _decoder(tensor: MotionTensor, reduced: TuckerTensor, blend: EventBlend | None) -> Decoder:
-    return Decoder(
-        reduced, tensor.mean, tensor.unwhiten, tensor.chart, event=blend, curves=tensor.curves
-    )
 
 
 def _fit_and_truncate(
@@ -412,9 +392,12 @@ def _fit_and_truncate(
     warps = (model.timing, clips.aligned.logs)
     hyper = fits.pose.hyper
     contacts, notes = contact_model.fit_contacts(recipe, examples, clips.samples, hyper, warps)
+    if contacts:
+        bank = replace(model.bank, contacts=contacts.kriging)
+        model = replace(model, bank=bank, contacts=contacts.table)
     return TrainedModel(
         recipe,
-        _with_contacts(model, contacts),
+        model,
         tuple(examples),
         clips.samples,
         _mean_skeleton(examples, clips.offsets),

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging import coefficient_models, kriging_tuning
 from posefield_train.kriging.kriging_bank import ConstantModel
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.kriging.universal_kriging import UniversalKriging as Field
 from posefield_train.source.recipe_sections import Kriging
 

@@ -9,10 +9,10 @@ from families import sample_walk
 from posefield.common.errors import ExportRefused, ModelError
 from posefield.inference import onnx_runtime, session
 from posefield.inference.onnx_runtime import CONTACTS
+from posefield.kriging import kriging_model
 from posefield.model_file import model_card
 from posefield_train.contacts import contact_labels, contact_model
 from posefield_train.graph import onnx_export
-from posefield_train.kriging import universal_kriging
 
 # The graph computes in float32; a label rises within one canonical frame.
 SINGLE = 1e-4
@@ -120,7 +120,7 @@ def test_left_out_clips_agree_with_their_labels(walk, labels):
     assert accuracy.agreement > 0.97
     assert accuracy.brier < 0.03
     pose, samples = walk.pose.hyper, walk.samples
-    left_out = universal_kriging.leave_out(pose, samples.points, samples.groups)
+    left_out = kriging_model.leave_out(pose, samples.points, samples.groups)
     rows = labels.reshape(len(labels), -1)
     straight = [
         1.0 - np.mean((np.clip(rows - left_out @ rows, 0, 1)[i] > 0.5) != rows[i])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from minimal import SKELETON, small_clip
 
+from posefield.kriging.kriging_model import Hyper
 from posefield.motion import quat
 from posefield_train import outliers
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source import clip_joints, recording_groups
 
 HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)

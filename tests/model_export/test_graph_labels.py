@@ -12,11 +12,11 @@ from running import bank_values, outputs
 
 from posefield.common.errors import ExportRefused
 from posefield.inference import session
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import ConstantModel, KrigingBank
 from posefield_train.kriging.kriging_graph import COVARIANCES
-from posefield_train.kriging.universal_kriging import Hyper
 
 SAMPLES, CONTROLS, BATCH = 25, 3, 40
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import TrainingError
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_graph import COVARIANCES
-from posefield_train.kriging.universal_kriging import Hyper
 
 # The systems here have condition numbers below 1e5.
 TOLERANCE = 1e-9
@@ -66,7 +67,7 @@ def test_weights_add_up_to_one_and_reproduce_the_drift(hyper, samples, points):
     assert far(weights.sum(axis=1), 1.0) < TOLERANCE
     away = far(weights @ samples, points)
     assert away < TOLERANCE if hyper.drifts == (1,) else away > 1e-2
-    near = universal_kriging.covariances(hyper, points, samples)
+    near = kriging_model.covariances(hyper, points, samples)
     assert far(near.sum(axis=1), 1.0) > 1e-2
 
 
@@ -84,8 +85,8 @@ def test_order_of_samples_does_not_matter(hyper, samples, values, points, rng):
 def test_variance_is_that_of_the_error_of_the_weights(hyper, samples, values, points):
     field = universal_kriging.solve(hyper, samples, values)
     w = field.weights(points)
-    own = universal_kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
-    cross = universal_kriging.covariances(hyper, points, samples)
+    own = kriging_model.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
+    cross = kriging_model.covariances(hyper, points, samples)
     expected = 1.0 - 2.0 * np.sum(w * cross, axis=1) + np.sum((w @ own) * w, axis=1)
     assert far(field.variance(points), expected) < TOLERANCE
     simple = 1.0 - np.sum(cross @ np.linalg.inv(own) * cross, axis=1)
@@ -94,10 +95,10 @@ def test_variance_is_that_of_the_error_of_the_weights(hyper, samples, values, po
 
 def test_weights_are_the_best_unbiased_ones(hyper, samples, values, points, rng):
     field = universal_kriging.solve(hyper, samples, values)
-    own = universal_kriging.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
-    cross = universal_kriging.covariances(hyper, points, samples)
+    own = kriging_model.covariances(hyper, samples, samples) + hyper.nugget * np.eye(30)
+    cross = kriging_model.covariances(hyper, points, samples)
     best = field.weights(points)
-    functions = universal_kriging.drift(samples, 3, max(hyper.drifts))
+    functions = kriging_model.drift(samples, 3, max(hyper.drifts))
     free = np.linalg.qr(functions, mode="complete")[0][:, functions.shape[1] :]
 
     def error(w):
@@ -132,16 +133,16 @@ TAKES = np.repeat(ALONE, [5, 4, 3, 3, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, 1] + 14 *
 
 @pytest.mark.parametrize("groups", [ALONE, TAKES], ids=["alone", "takes"])
 def test_leaving_out_in_closed_form_is_what_leaving_out_gives(hyper, samples, values, groups):
-    matrix = universal_kriging.leave_out(hyper, samples, groups)
+    matrix = kriging_model.leave_out(hyper, samples, groups)
     residuals, variances = left_out_one_by_one(hyper, samples, values, groups)
     assert far(matrix @ values, residuals) < TOLERANCE
-    own = np.sum((matrix @ universal_kriging.noisy(hyper, samples)) * matrix, axis=1)
+    own = np.sum((matrix @ kriging_model.noisy(hyper, samples)) * matrix, axis=1)
     assert far(own, variances) < TOLERANCE
     # Negative controls: nothing left out, and others left out together.
     fitted = values - universal_kriging.solve(hyper, samples, values).predict(samples)
     assert far(fitted, residuals) > 1e-2
     other = TAKES if groups is ALONE else ALONE
-    assert far(universal_kriging.leave_out(hyper, samples, other) @ values, residuals) > 1e-2
+    assert far(kriging_model.leave_out(hyper, samples, other) @ values, residuals) > 1e-2
 
 
 def check(samples, degree=1, nugget_is_zero=False, names=NAMES):

@@ -9,14 +9,13 @@ from running import bank_values, outputs
 from scipy.optimize import check_grad
 
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import LabelKernel
+from posefield.kriging.kriging_model import Hyper, LabelKernel
 from posefield_train import training
 from posefield_train.kriging import sample_points, thinning, universal_kriging
 from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import LeaveOneOutLoss, TuningProblem
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source import ingest
 
 SETS = {"performer": ("ann", "bob", "cy"), "style": ("calm", "tired")}
@@ -75,7 +74,7 @@ def test_covariance_is_stationary_with_offsets_and_a_trend(hyper, laid):
 def test_a_performer_left_out_is_a_stranger(hyper, laid, named, rng):
     values = rng.normal(size=(COUNT, 3))
     _, groups = np.unique([own["performer"] for own in named], return_inverse=True)
-    found = universal_kriging.leave_out(hyper, laid, groups) @ values
+    found = kriging_model.leave_out(hyper, laid, groups) @ values
     for performer in range(3):
         own = groups == performer
         field = universal_kriging.solve(hyper, laid[~own], values[~own])

@@ -7,10 +7,10 @@ import pytest
 from running import bank_values, outputs
 from test_graph_labels import HIGH, LOW, asked, labelled_bank, mixed
 
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging import kriging_bank, thinning
 from posefield_train.kriging.kriging_bank import PowerLaw
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper
 
 POSE = Hyper("matern52", (0,), np.array([0.5, 0.5, 0.5]), 0.1, 1.0)
 LAW = PowerLaw(np.array([0.8, 0.0, -0.6]), np.array([0.75, 1.0, 0.1]))

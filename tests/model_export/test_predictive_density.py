@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from label_kernels import performers
 
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging import (
     coefficient_models,
     kriging_tuning,
@@ -19,7 +21,6 @@ from posefield_train.kriging.tuning_loss import (
     PredictiveDensityLoss,
     TuningProblem,
 )
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe import Kriging
 
 COUNT, TAKES, PEOPLE = 30, 12, 3
@@ -46,10 +47,10 @@ def take_density(laid, values, recording):
     """Squared residual in units of its covariance, and the logarithm of the determinant."""
     own = laid.groups == recording
     known, asked = laid.points[~own], laid.points[own]
-    inverse = np.linalg.inv(universal_kriging.noisy(HYPER, known))
-    near = universal_kriging.covariances(HYPER, asked, known)
+    inverse = np.linalg.inv(kriging_model.noisy(HYPER, known))
+    near = kriging_model.covariances(HYPER, asked, known)
     left = 1.0 - near @ inverse.sum(axis=1)
-    spread = universal_kriging.noisy(HYPER, asked) - near @ inverse @ near.T
+    spread = kriging_model.noisy(HYPER, asked) - near @ inverse @ near.T
     spread += np.outer(left, left) / inverse.sum()
     field = universal_kriging.solve(HYPER, known, values[~own])
     missed = (values[own] - field.predict(asked))[:, 0]

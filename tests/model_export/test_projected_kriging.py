@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.graph import trained_card
 from posefield_train.kriging import (
     coefficient_models,
@@ -15,7 +16,7 @@ from posefield_train.kriging import (
 )
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.kriging.universal_kriging import Hyper, ProjectedProcess
+from posefield_train.kriging.universal_kriging import ProjectedProcess
 from posefield_train.source.recipe_sections import Kriging
 
 SAME = 1e-8

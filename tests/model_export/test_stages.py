@@ -7,13 +7,13 @@ import pytest
 from numpy.random import PCG64, Generator
 from running import bank_values, outputs
 
+from posefield.kriging.kriging_model import Hyper
 from posefield.motion import quat
 from posefield.motion.quat import CHARTS
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.onnx_graph import LevelTables
 from posefield_train.tensor import decoder_graph, hosvd
 from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from label_kernels import performers, vary
 
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import PRIORS, SCALE_PRIOR, LeaveOneOutLoss, TuningProblem
-from posefield_train.kriging.universal_kriging import Hyper
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     samples = rng.uniform(-1.0, 1.0, size=(400, 2))
     hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 0.0)
     root = np.linalg.cholesky(
-        universal_kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400)
+        kriging_model.covariances(hyper, samples, samples) + 0.1 * np.eye(400)
     )
     values = np.sqrt(2.5) * root @ rng.normal(size=(400, 6))
     found = kriging_tuning.evaluate_fixed(hyper, alone(samples), values)
@@ -186,7 +187,7 @@ def test_groups_are_left_out_together(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
     laid = labelled(samples, people)
     found = kriging_tuning.evaluate_fixed(LABELLED, laid, values)
-    residuals = universal_kriging.leave_out(LABELLED, laid.points, people[1]) @ values
+    residuals = kriging_model.leave_out(LABELLED, laid.points, people[1]) @ values
     assert np.max(np.abs(found.residuals - residuals)) < 1e-9
     from_mean = np.empty((50, 2))
     for recording in range(TAKES):

@@ -6,9 +6,9 @@ import pytest
 from gstools.krige import Universal
 from scipy.interpolate import RBFInterpolator
 
-from posefield.kriging.kriging_model import RATE52
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import RATE52, Hyper
 from posefield_train.kriging import kriging_graph, universal_kriging
-from posefield_train.kriging.universal_kriging import Hyper
 
 TOLERANCE = 1e-9
 NUGGET = 0.05
@@ -109,7 +109,7 @@ def test_groups_left_out_are_what_scipy_predicts_from_the_rest(samples, values, 
     scales = np.array([0.8, 1.1, 0.9, 1.4])
     groups = np.repeat(np.arange(10), 4)
     hyper = Hyper("gaussian", drifts, scales, NUGGET, 0.0)
-    found = universal_kriging.leave_out(hyper, samples, groups) @ values
+    found = kriging_model.leave_out(hyper, samples, groups) @ values
     given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": NUGGET}
     for group in range(10):
         own = groups == group
@@ -120,5 +120,5 @@ def test_groups_left_out_are_what_scipy_predicts_from_the_rest(samples, values, 
             for degree in drifts
         ]
         assert np.max(np.abs(found[own] - values[own] + np.mean(predicted, axis=0))) < TOLERANCE
-    alone = universal_kriging.leave_out(hyper, samples, np.arange(40)) @ values
+    alone = kriging_model.leave_out(hyper, samples, np.arange(40)) @ values
     assert np.max(np.abs(found - alone)) > 1e-2

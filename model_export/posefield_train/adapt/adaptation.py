@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import half_ranges
+from posefield.kriging.kriging_model import Hyper, half_ranges
 from posefield.model_file.model_card import PERFORMER
 from posefield.motion.contact_detection import FootContact
 from posefield_train.adapt import canonical_clips
@@ -27,7 +27,7 @@ from posefield_train.kriging import coefficient_models, sample_points, universal
 from posefield_train.kriging.coefficient_models import SAME_BONE
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, KrigingBank
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.source.ingest import Example
 from posefield_train.tensor import hosvd, motion_tensor
 from posefield_train.tensor.decoder import Decoder, EventBlend, Proportions, build_blend
@@ -377,8 +377,8 @@ def _left_out_errors(
     """
     old = adaptable.model.bank
     hyper, points, k = samples.hyper(old.pose.hyper), samples.samples.points, len(clips.examples)
-    left_out = universal_kriging.leave_out(hyper, points, samples.samples.groups)
-    variances = universal_kriging.left_out_variances(hyper, points, left_out)[-k:]
+    left_out = kriging_model.leave_out(hyper, points, samples.samples.groups)
+    variances = kriging_model.left_out_variances(hyper, points, left_out)[-k:]
     residuals = left_out[-k:] @ extended.full.motions
     frames = extended.tensor.values.shape[1]
     mean_squares = np.sum(np.square(residuals), axis=1) / (extended.tensor.weight * frames)
@@ -394,7 +394,7 @@ def _travel_residuals(old: KrigingBank, samples: ExtendedSamples, new: Floats) -
     field, values = old.other_models["travel"], np.vstack([old.sample_values("travel"), new])
     if isinstance(field, UniversalKriging):
         hyper, groups = samples.hyper(field.hyper), samples.samples.groups
-        left_out = universal_kriging.leave_out(hyper, samples.samples.points, groups)
+        left_out = kriging_model.leave_out(hyper, samples.samples.points, groups)
         return left_out[-len(new) :] @ values
     return samples.samples.from_mean(values)[-len(new) :]
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices
+from posefield.kriging import kriging_model
 from posefield.motion.clip import assemble
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.curves import CurveValues
@@ -18,7 +19,7 @@ from posefield_train.align.time_alignment import FINE, AlignedClips, CanonicalTi
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import single_threaded
-from posefield_train.kriging import sample_points, universal_kriging
+from posefield_train.kriging import sample_points
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.source import canonical, clip_joints
 from posefield_train.source.canonical import Finding
@@ -61,8 +62,8 @@ class AdaptableModel:
         Sigma compares motions after time warping, which leaves less of an error.
         """
         pose, sill = self.model.bank.pose, self.model.bank.sill
-        left_out = universal_kriging.leave_out(pose.hyper, pose.samples, self.groups)
-        variances = universal_kriging.left_out_variances(pose.hyper, pose.samples, left_out)
+        left_out = kriging_model.leave_out(pose.hyper, pose.samples, self.groups)
+        variances = kriging_model.left_out_variances(pose.hyper, pose.samples, left_out)
         return float(np.mean(np.square(self.left_out) / variances)) / sill if sill else 1.0
 
     @property

@@ -16,6 +16,7 @@ from posefield.common.errors import ModelError
 from posefield.common.units import Floats, Indices
 from posefield.inference import reduced_motion
 from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper
 from posefield.model_file import checked_file, onnx_file
 from posefield.model_file.model_card import ModelCard
 from posefield_train.adapt.canonical_clips import AdaptableModel
@@ -32,7 +33,7 @@ from posefield_train.kriging.kriging_bank import (
     KrigingBank,
     PowerLaw,
 )
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.tensor.decoder import (
     Decoder,
     EventBlend,

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from posefield.common.units import ClipFrames, Floats
+from posefield.kriging.kriging_model import Hyper
 from posefield.motion import quat
 from posefield.motion.contact_detection import FootContact
 from posefield_train.align.warp import CanonicalTiming
@@ -14,7 +15,7 @@ from posefield_train.contacts import contact_labels
 from posefield_train.contacts.contact_labels import ClipContacts
 from posefield_train.kriging import coefficient_models, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.onnx_graph import GraphBuilder
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe

@@ -4,9 +4,8 @@ Core and bases of a level are leading parts of the finer one's. Ranks are chosen
 error table, samples by the errors of the outputs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -31,38 +30,21 @@ from posefield_train.tensor.truncation_error import EventFrame, TruncationRefere
 TAIL_RATIO = 5.0
 
 
-@dataclass(frozen=True)
-class LevelErrors:
-    """Errors of joints relative to the model before truncation; statistics are computed on access.
+def _pose_errors(gaps: Floats) -> Floats:
+    """Return the root mean square (Q,) over the joints of each pose, m, of distances (Q, J)."""
+    return np.sqrt(np.mean(np.square(gaps), axis=1))
 
-    gaps: distances (Q, J), m.
-    """
 
-    gaps: Floats
+STATISTICS: dict[str, Callable[[Floats], float]] = {
+    "rms": lambda gaps: float(np.sqrt(np.mean(np.square(_pose_errors(gaps))))),
+    "p99": lambda gaps: float(np.quantile(gaps, 0.99)),
+    "max": lambda gaps: float(gaps.max()),
+    "pose": lambda gaps: float(_pose_errors(gaps).max()),
+}
+"""Statistics, m, of distances (Q, J) of joints from the model before truncation, by name.
 
-    @property
-    def rms(self) -> float:
-        """Return the root mean square, m."""
-        return float(np.sqrt(np.mean(np.square(self._poses))))
-
-    @property
-    def p99(self) -> float:
-        """Return the 99th percentile, m."""
-        return float(np.quantile(self.gaps, 0.99))
-
-    @property
-    def max(self) -> float:
-        """Return the largest distance, m."""
-        return float(self.gaps.max())
-
-    @property
-    def pose(self) -> float:
-        """Return the largest root mean square over the joints of one pose, m."""
-        return float(self._poses.max())
-
-    @cached_property
-    def _poses(self) -> Floats:
-        return np.sqrt(np.mean(np.square(self.gaps), axis=1))
+pose: the worst pose's root mean square over its joints.
+"""
 
 
 @dataclass(frozen=True)
@@ -82,51 +64,40 @@ class LevelTest:
     points: Floats
     at_event: Floats
 
-    def outputs(self, model: FloatModel, level: int) -> "LevelOutputs":
-        """Return a level's outputs at the test inputs."""
-        return LevelOutputs(self, model, level, model.fields(self.controls, self.labels, level))
-
     def keeps(self, model: FloatModel, allowed: dict[str, float]) -> bool:
         """Return True if the last level stays within the allowed errors over its moving joints.
 
-        allowed: errors, m, by name in `LevelErrors`, and of the effector.
+        allowed: errors, m, by name in STATISTICS, and of the effector.
         """
-        last = len(model.decoder.coarse)
-        answers = self.outputs(model, last)
-        errors = answers.errors(model.decoder.level_sizes[last].joints)
-        if "rms" in allowed and errors.pose > TAIL_RATIO * allowed["rms"]:
+        level = len(model.decoder.coarse)
+        fields = model.fields(self.controls, self.labels, level)
+        gaps = self.gaps(model, level, fields, model.decoder.level_sizes[level].joints)
+        if "rms" in allowed and STATISTICS["pose"](gaps) > TAIL_RATIO * allowed["rms"]:
             return False
         joints = {name: limit for name, limit in allowed.items() if name != "effector"}
-        if any(getattr(errors, name) > limit for name, limit in joints.items()):
+        if any(STATISTICS[name](gaps) > limit for name, limit in joints.items()):
             return False
-        effector = answers.effector if "effector" in allowed else None
+        effector = self.effector(model, level, fields) if "effector" in allowed else None
         return effector is None or effector <= allowed["effector"]
 
+    def gaps(
+        self, model: FloatModel, level: int, fields: dict[str, Floats], joints: Sequence[int]
+    ) -> Floats:
+        """Return the distances (Q, J + C), m, of some joints and all curves at a level.
 
-@dataclass(frozen=True)
-class LevelOutputs:
-    """Outputs of a level at the test inputs. fields: kriged values (Q, m) by name."""
+        fields: kriged values (Q, m) at the test inputs, by name.
+        """
+        outputs = model.outputs_at_times(fields, self.times, level)
+        points = outputs.points(self.parents, model.decoder.curves)[:, 0]
+        gaps = np.linalg.norm(points - self.points, axis=-1)
+        return gaps[:, [*joints, *range(len(self.parents), gaps.shape[1])]]
 
-    test: LevelTest
-    model: FloatModel
-    level: int
-    fields: dict[str, Floats]
-
-    def errors(self, joints: Sequence[int]) -> LevelErrors:
-        """Return the errors over some joints and all curves."""
-        outputs = self.model.outputs_at_times(self.fields, self.test.times, self.level)
-        points = outputs.points(self.test.parents, self.model.decoder.curves)[:, 0]
-        gaps = np.linalg.norm(points - self.test.points, axis=-1)
-        return LevelErrors(gaps[:, [*joints, *range(len(self.test.parents), gaps.shape[1])]])
-
-    @property
-    def effector(self) -> float | None:
+    def effector(self, model: FloatModel, level: int, fields: dict[str, Floats]) -> float | None:
         """Return the RMS distance, m, of the event's joint at the event; None without event."""
-        test = self.test
-        if test.moment is None:
+        if self.moment is None:
             return None
-        positions = _event_positions(self.model, self.fields, self.level, test.moment, test.parents)
-        return float(np.sqrt(np.mean(np.sum(np.square(positions - test.at_event), axis=-1))))
+        positions = _event_positions(model, fields, level, self.moment, self.parents)
+        return float(np.sqrt(np.mean(np.sum(np.square(positions - self.at_event), axis=-1))))
 
 
 def level_test(trained: TrainedModel, questions: int) -> LevelTest:
@@ -233,7 +204,9 @@ class LevelBuilder:
         )
         # The last level's error relative to the full model belongs to its sigma.
         bank, last = chosen.bank, len(chosen.bank.coarse)
-        error = self.draft_test.outputs(chosen, last).errors(range(len(chosen.decoder.means))).rms
+        test, all_joints = self.draft_test, range(len(chosen.decoder.means))
+        fields = chosen.fields(test.controls, test.labels, last)
+        error = STATISTICS["rms"](test.gaps(chosen, last, fields, all_joints))
         rank = chosen.decoder.level_sizes[last].ranks[2]
         weights = self.thinning_data.weights(bank.columns(last), rank, error)
         return replace(chosen, bank=replace(bank, coarse=(*bank.coarse[:-1], weights)))
@@ -242,9 +215,10 @@ class LevelBuilder:
         """Return the description of a level of a model."""
         size = model.decoder.level_sizes[level]
         numbers = truncation_cost.count_numbers(model, level)
-        answers = self.final_test.outputs(model, level)
-        errors = answers.errors(range(len(model.decoder.means)))
-        effector = answers.effector
+        test = self.final_test
+        fields = model.fields(test.controls, test.labels, level)
+        gaps = test.gaps(model, level, fields, range(len(model.decoder.means)))
+        effector = test.effector(model, level, fields)
         return Level(
             size.ranks,
             model.bank.columns(level),
@@ -252,10 +226,7 @@ class LevelBuilder:
             numbers,
             4 * numbers,
             truncation_cost.count_operations(model, level),
-            rms=rounded(errors.rms),
-            p99=rounded(errors.p99),
-            max=rounded(errors.max),
-            pose=rounded(errors.pose),
+            **{name: rounded(statistic(gaps)) for name, statistic in STATISTICS.items()},
             effector=None if effector is None else rounded(effector),
             event=0 if level else model.bank.event_columns,
         )

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import ClipBones, Floats, SampleControls, SampleValues
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.jobs import Jobs
 from posefield_train.kriging import kriging_tuning, sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, PowerLawFit
@@ -22,7 +23,6 @@ from posefield_train.kriging.tuning_loss import (
     PredictiveDensityLoss,
     TuningProblem,
 )
-from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe_sections import Kriging
 from posefield_train.tensor.decoder import COEFFICIENTS, Proportions, event_distances
 from posefield_train.tensor.hosvd import TuckerTensor

@@ -26,9 +26,9 @@ from posefield.common.units import (
     Values,
 )
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import half_ranges
+from posefield.kriging.kriging_model import Hyper, half_ranges
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.onnx_graph import REGISTER, GraphBuilder
 
 # Controls over a smaller ratio are nearly linear in their logarithms.

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from posefield.common.units import Floats, PerSample, SampleValues
-from posefield.kriging.kriging_model import LabelKernel
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import Hyper, LabelKernel
 from posefield_train.jobs import Jobs, SerialJobs, ordered_results
 from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
@@ -17,7 +18,6 @@ from posefield_train.kriging.tuning_loss import (
     Parameter,
     TuningProblem,
 )
-from posefield_train.kriging.universal_kriging import Hyper
 
 # The loss has several minima, between a smooth field and one of independent samples.
 STARTS = ((0.5, 0.1), (0.25, 0.03), (1.0, 0.3))
@@ -50,7 +50,7 @@ class TunedKriging:
 def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> TunedKriging:
     """Return the model of given parameters with its leave-one-out residuals."""
     left_out = universal_kriging.leave_out_samples(hyper, samples)
-    variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
+    variances = kriging_model.left_out_variances(hyper, samples.points, left_out)
     residuals, total = left_out @ values, _total(samples, values)
     if len(values) <= sample_points.LARGEST_DENSE:
         squares = np.sum(np.square(residuals), axis=1)

@@ -15,11 +15,10 @@ from scipy.special import expit
 
 from posefield.common.units import Booleans, Floats, Indices, SampleMatrix, SampleValues
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import LabelKernel
-from posefield_train.kriging import sample_points, universal_kriging
+from posefield.kriging.kriging_model import Hyper, LabelKernel
+from posefield_train.kriging import sample_points
 from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper
 
 
 @dataclass(frozen=True)
@@ -202,9 +201,9 @@ class LeaveOneOutLoss:
         """Return the sample block (n, n) of the inverse of the kriging system."""
         points, degree = self.problem.samples.points, max(hyper.drifts)
         inverse: Floats = np.asarray(
-            np.linalg.inv(universal_kriging.noisy(hyper, points)), dtype=np.float64
+            np.linalg.inv(kriging_model.noisy(hyper, points)), dtype=np.float64
         )
-        functions = universal_kriging.drift(points, len(hyper.scales), degree)
+        functions = kriging_model.drift(points, len(hyper.scales), degree)
         return kriging_model.sample_block(inverse, functions)
 
     def _weighted(self, residuals: Floats) -> Floats:

@@ -26,12 +26,7 @@ from posefield.common.units import (
     SampleValues,
 )
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import Hyper as Hyper
-from posefield.kriging.kriging_model import covariances as covariances
-from posefield.kriging.kriging_model import drift as drift
-from posefield.kriging.kriging_model import leave_out as leave_out
-from posefield.kriging.kriging_model import left_out_variances as left_out_variances
-from posefield.kriging.kriging_model import noisy as noisy
+from posefield.kriging.kriging_model import Hyper
 from posefield_train.kriging.sample_points import SamplePoints
 
 
@@ -83,7 +78,7 @@ def solve(hyper: Hyper, samples: Samples, values: SampleValues) -> UniversalKrig
     n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
     weighing = kriging_model.weight_matrix(hyper, samples)
     toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
-    form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
+    form = toward + toward.T - weighing @ kriging_model.noisy(hyper, samples) @ weighing.T
     return UniversalKriging(hyper, samples, weighing @ values, weighing, form)
 
 
@@ -92,8 +87,8 @@ def values(
 ) -> SampleValues:
     """Return the sample values (n, m) for dual weights (n + k, m): the system times the weights."""
     n, degree = len(samples), max(hyper.drifts)
-    functions = drift(samples, len(hyper.scales), degree)
-    return noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
+    functions = kriging_model.drift(samples, len(hyper.scales), degree)
+    return kriging_model.noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
 
 
 def check_samples(
@@ -119,7 +114,10 @@ def check_samples(
                 f"control {name!r} has the value {column[0]:g} in all {count} samples, expected "
                 "at least two values; leave it out of the recipe"
             )
-    if np.linalg.matrix_rank(drift(samples, len(names), degree)) < 1 + len(names) * degree:
+    if (
+        np.linalg.matrix_rank(kriging_model.drift(samples, len(names), degree))
+        < 1 + len(names) * degree
+    ):
         raise TrainingError(f"controls {names}: one of them follows linearly from the others")
     if nugget_is_zero:
         _, first, inverse = np.unique(samples, axis=0, return_index=True, return_inverse=True)
@@ -266,7 +264,7 @@ def leave_out_samples(
     indices = np.arange(len(samples.points)) if chosen is None else chosen
     points, groups = samples.points[indices], samples.groups[indices]
     if samples.inducing is None:
-        return leave_out(hyper, points, groups)
+        return kriging_model.leave_out(hyper, points, groups)
     process = ProjectedProcess(hyper, points, samples.points[samples.inducing])
     return process.leave_out(groups)
 

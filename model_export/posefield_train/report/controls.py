@@ -11,6 +11,7 @@ from scipy.stats import spearmanr
 from posefield.common.units import Floats
 from posefield.inference import session
 from posefield.kriging import support
+from posefield.kriging.kriging_model import Hyper
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion import measures
 from posefield.question.model_question import SuggestQuestion
@@ -20,7 +21,7 @@ from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging.kriging_bank import POSE
-from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.report import page
 from posefield_train.report.page import Section, Table, draw_chart, percent, short_label
 

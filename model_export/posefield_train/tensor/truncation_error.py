@@ -64,7 +64,9 @@ class TruncationReference:
     def evaluate(self, reduced: TuckerTensor) -> TruncationErrors:
         """Return the fidelity of a truncation of this tensor."""
         distances = self._distances(reduced)
-        return TruncationErrors(distances.rms, distances.p99, distances.max, distances.effector)
+        rms, p99, largest = (self._statistic(name, distances) for name in ("rms", "p99", "max"))
+        effector = self._statistic("effector", distances) if self.event_frame else None
+        return TruncationErrors(rms, p99, largest, effector)
 
     def strain(self, reduced: TuckerTensor, budgets: Mapping[str, float]) -> float:
         """Return the largest ratio of an error of a truncation to its budget.
@@ -72,14 +74,27 @@ class TruncationReference:
         budgets: m, by name in `TruncationErrors`.
         """
         distances = self._distances(reduced)
-        return max(getattr(distances, name) / budget for name, budget in budgets.items())
+        return max(self._statistic(name, distances) / limit for name, limit in budgets.items())
 
-    def _distances(self, reduced: TuckerTensor) -> "_Distances":
+    def _statistic(self, name: str, gaps: Annotated[Floats, "clips frames points"]) -> float:
+        """Return one of `TruncationErrors` of distances (N, T, J), m."""
+        if name == "rms":
+            squares = np.mean(np.square(gaps), axis=(0, 1))
+            return float(np.sqrt(np.average(squares, weights=self.weights)))
+        if name == "p99":
+            return float(np.quantile(gaps, 0.99))
+        if name == "max":
+            return float(gaps.max())
+        event = self.event_frame
+        if event is None:
+            raise ValueError("effector without an event")
+        return float(np.sqrt(np.mean(np.square(gaps[:, event.frame, event.joint]))))
+
+    def _distances(self, reduced: TuckerTensor) -> Annotated[Floats, "clips frames points"]:
         blocks = [
             self._block_distances(reduced, rows) for rows in canonical.clip_blocks(len(self.points))
         ]
-        distances = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        return _Distances(distances, self.weights, self.event_frame)
+        return blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
 
     def _block_distances(
         self, reduced: TuckerTensor, rows: slice
@@ -92,38 +107,6 @@ class TruncationReference:
         gaps = _joint_positions(self.tensor, restored, self.parents, self.offsets[rows])
         gaps -= self.points[rows]
         return np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
-
-
-@dataclass(frozen=True)
-class _Distances:
-    """Distances (N, T, J), m, with the statistics of `TruncationErrors`, computed on access."""
-
-    gaps: Annotated[Floats, "clips frames points"]
-    weights: Annotated[Floats, "points"]
-    event_frame: EventFrame | None
-
-    @property
-    def rms(self) -> float:
-        squares = np.mean(np.square(self.gaps), axis=(0, 1))
-        return float(np.sqrt(np.average(squares, weights=self.weights)))
-
-    @property
-    def p99(self) -> float:
-        return float(np.quantile(self.gaps, 0.99))
-
-    @property
-    def max(self) -> float:
-        return float(self.gaps.max())
-
-    @property
-    def effector(self) -> float | None:
-        if self.event_frame is None:
-            return None
-        return float(
-            np.sqrt(
-                np.mean(np.square(self.gaps[:, self.event_frame.frame, self.event_frame.joint]))
-            )
-        )
 
 
 def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> JointWeights:
