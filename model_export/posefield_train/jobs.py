@@ -185,16 +185,10 @@ class FinishedJobs:
                 yield finished[0]
             else:
                 left.append((number, listed[number]))
-        for number, result in self.jobs.run(_numbered_result, left, (function, shared)):
+        for number, result in self.jobs.run(_run_numbered, left, (function, shared)):
             content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
             atomic_files.write(hashlib.sha256(content).digest() + content, paths[number])
             yield result
-
-
-def _numbered_result(
-    function: Callable[..., Any], shared: Arguments, number: int, job: Arguments
-) -> tuple[int, Any]:
-    return number, function(*shared, *job)
 
 
 def read_result(file: Path) -> tuple[Any] | None:

@@ -61,7 +61,6 @@ def _all_equal(examples: Sequence[Example]) -> bool:
 
 
 def _cause(recipe: Recipe, control: Control) -> str:
-    """Return the reason for which a control has the same value in all clips."""
     if isinstance(control, ControlMeasured):
         return _measured_cause(recipe, control.auto)
     column = f"column {control.column!r} holds it in every row"

@@ -193,8 +193,6 @@ def _vectorize(
 
 
 def _predictor(recipe: Recipe, samples: SamplePoints, jobs: Jobs) -> time_alignment.Predictor:
-    """Return a function that predicts each clip from the others by a tuned kriging model."""
-
     settings = recipe.kriging
 
     def predict(values: Floats) -> Floats:
@@ -339,7 +337,6 @@ def _assemble(
     fits: _FittedModels,
     reduced: TuckerTensor,
 ) -> FloatModel:
-    """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
     solved = universal_kriging.solve_samples(fits.pose.hyper, clips.samples, reduced.bases[2])
     event, blend = None, _event_blend(recipe, reference, fits, reduced)
     if fits.event and blend:
@@ -376,7 +373,6 @@ def _fit_and_truncate(
     full: TuckerTensor,
     jobs: Jobs,
 ) -> TrainedModel:
-    """Fit the coefficient models, choose the ranks within the budgets, and assemble the model."""
     tensor = clips.tensor
     reference = truncation_error.truncation_reference(recipe, examples, tensor)
     fits = _fit_models(recipe, examples, clips, reference, full, jobs)

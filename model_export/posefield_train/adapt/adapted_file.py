@@ -225,7 +225,6 @@ def _recordings(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
 
 
 def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
-    """Return the controls with ranges, defaults and values from samples (N, d)."""
     typical = trained_card.typical_controls(values)
     return tuple(
         replace(

@@ -211,7 +211,6 @@ def _coefficient_model(
 def _solve_kriging(
     file: _ModelFile, name: str, samples: tuple[Hyper, Floats, Indices]
 ) -> UniversalKriging:
-    """Return one kriging model, solved for the sample values recovered from its dual weights."""
     columns = _columns(file, name)
     stored = file[f"{name}_weights"][:, : columns.stop - columns.start]
     return _solve_recovered(samples, file["linear_weights"][:, columns], stored)

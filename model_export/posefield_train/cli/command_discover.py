@@ -165,7 +165,6 @@ def _write_recipes(
 
 
 def _tell_families(families: "FoundFamilies", output: Path, recordings: int) -> None:
-    """Print each family that is offered, and how to accept it."""
     from posefield_train.families import recipe_folder
 
     for one in families.offered:

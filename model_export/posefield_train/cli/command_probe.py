@@ -132,7 +132,6 @@ def _refuse_existing(path: Path) -> None:
 
 
 def _tell(report: "ProbeReport", files: list[Path], todo: str, json: bool) -> None:
-    """Print the files that were written, and what has to be completed."""
     from posefield_train.probe import probe_report
 
     if json:

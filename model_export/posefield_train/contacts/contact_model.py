@@ -202,7 +202,6 @@ def _notes(
 
 
 def _accuracy_notes(accuracy: ContactAccuracy) -> list[str]:
-    """Return a note if the controls hardly say when joints are in contact."""
     if accuracy.brier < PREDICTED * accuracy.climatology:
         return []
     return [

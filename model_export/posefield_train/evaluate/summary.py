@@ -232,7 +232,6 @@ def columns(result: EvaluationResult) -> tuple[tuple[str, str], ...]:
 
 
 def _cells(result: EvaluationResult, summary: MethodSummary) -> tuple[str, ...]:
-    """Return the row of the table under `columns`."""
     mean, left_out = summary.mean, summary.left_out
     name = f"{summary.name} ({summary.clips} clips)" if left_out else summary.name
     curves = (f"{100 * summary.curve_distance:.3f}",) if result.curves else ()

@@ -182,7 +182,6 @@ def build_card(
 
 
 def _roles(recipe: Recipe, trained: TrainedModel) -> dict[str, str]:
-    """Return the joints by role."""
     if recipe.skeleton.is_unified:
         return common_topology.model_roles(trained.skeleton.names)
     return {str(role): joint for role, joint in recipe.roles.items()}

@@ -284,12 +284,10 @@ NUGGET, TREND = ("nugget", 0), ("trend", 0)
 
 
 def _value(name: Parameter, unit: float) -> float:
-    """Return the value of a parameter at a search unit."""
     return float(expit(unit) if name[0] == "correlation" else np.exp(unit))
 
 
 def _product(shares: Sequence[Floats]) -> Floats | float:
-    """Return the product of matrices, 1.0 for none."""
     product: Floats | float = 1.0
     for share in shares:
         product = product * share

@@ -111,7 +111,6 @@ def label_controls(
 
 
 def _widest_gap(values: Floats) -> tuple[float, float]:
-    """Return the ends of the widest range without a value."""
     distinct = np.unique(values)
     at = int(np.argmax(np.diff(distinct)))
     return float(distinct[at]), float(distinct[at + 1])

@@ -90,7 +90,6 @@ class LevelCosts:
         return Section("levels", "Levels of detail", paragraphs, tables, (), facts)
 
     def _uses(self) -> tuple[str, ...]:
-        """Return one sentence per level on its use."""
         pairs = zip_longest(self.distances, self.distances[1:])
         return tuple(self._use(number, *pair) for number, pair in enumerate(pairs))
 
