@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -115,8 +115,12 @@ def perform(
 
     _check_stage(question, many)
     if are_many(script):
-        perform_them = _perform_crowd if many.crowd else _perform_many
-        perform_them(script, one, many, _Stage(tuple(model or ()), question, json))
+        models = tuple(model or ())
+        if many.crowd:
+            facts, text = _perform_crowd(script, one, many, models, question)
+        else:
+            facts, text = _perform_many(script, one, many, models)
+        typer.echo(as_json(facts) if json else text)
         return
     for option in ("crowd", "format", "workers"):
         if getattr(many, option) not in (None, False):
@@ -165,15 +169,6 @@ def _performed(
     return performance, order.encode(performance)
 
 
-@dataclass(frozen=True)
-class _Stage:
-    """Models of many scripts, the stage of a crowd, and whether to print JSON."""
-
-    models: tuple[Path, ...]
-    question: CrowdStageQuestion
-    json: bool
-
-
 def _check_stage(question: CrowdStageQuestion, many: ManyArguments) -> None:
     """Raise InvalidField for options of a crowd without one, and of files with one."""
     defaults = CrowdStageQuestion()
@@ -202,7 +197,10 @@ def _workers(many: ManyArguments) -> int:
     return workers
 
 
-def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
+def _perform_many(
+    scripts: Path, one: OneArguments, many: ManyArguments, models: tuple[Path, ...]
+) -> tuple[dict[str, Any], str]:
+    """Write a file for each script; return the outcome as plain values and as text."""
     from posefield.batch.scripts import PerformanceBatch, read_scripts, run
     from posefield.console.progress import ProgressBar
 
@@ -210,10 +208,10 @@ def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: 
     form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
     workers, rows = _workers(many), read_scripts(scripts)
     character = _batch_character(output, one)
-    batch = PerformanceBatch(stage.models, output, form, one.layout, character)
+    batch = PerformanceBatch(models, output, form, one.layout, character)
     with ProgressBar("performances", len(rows), 0) as bar:
         outcome = run(batch, rows, workers, bar.advance)
-    typer.echo(as_json(outcome.facts(output)) if stage.json else f"{output}: {outcome.sentence}")
+    return outcome.facts(output), f"{output}: {outcome.sentence}"
 
 
 def _batch_character(output: str, options: CharacterOptions) -> "UserCharacter | None":
@@ -228,7 +226,14 @@ def _batch_character(output: str, options: CharacterOptions) -> "UserCharacter |
     return options.open(Path(output) / FOLDER)
 
 
-def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
+def _perform_crowd(
+    scripts: Path,
+    one: OneArguments,
+    many: ManyArguments,
+    models: tuple[Path, ...],
+    question: CrowdStageQuestion,
+) -> tuple[dict[str, Any], str]:
+    """Write one stage with a character for each script; return its report in both forms."""
     from posefield.batch import performance_crowd
     from posefield.batch.scripts import read_scripts
     from posefield.console.progress import ProgressBar
@@ -237,11 +242,11 @@ def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage:
     one.refuse("with --crowd, expected without: a crowd has the characters of its models")
     if one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --crowd, expected 'whole'")
-    crowd = performance_crowd.from_question(stage.models, output, stage.question)
+    crowd = performance_crowd.from_question(models, output, question)
     workers, rows = _workers(many), read_scripts(scripts)
     with ProgressBar("performances", len(rows), 0) as bar:
         facts = performance_crowd.write(crowd, rows, workers, bar.advance)
-    typer.echo(as_json(facts) if stage.json else performance_crowd.report_text(facts))
+    return facts, performance_crowd.report_text(facts)
 
 
 def _read(script: Path) -> bytes:

@@ -10,7 +10,7 @@ from asyncio import Future, Task
 from collections.abc import Callable, Hashable, Sequence
 from contextvars import Context, copy_context
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from anyio import to_thread
 
@@ -36,11 +36,8 @@ Work = Callable[[Sequence[Any]], Sequence[Any]]
 Pending = list[tuple[Any, "Future[Any]"]]
 
 
-class EncodedClip(NamedTuple):
-    """A clip and its file."""
-
-    answer: ClipAnswer
-    content: bytes
+EncodedClip = tuple[ClipAnswer, bytes]
+"""A clip and its file."""
 
 
 class ClipBatcher:
@@ -64,12 +61,12 @@ class ClipBatcher:
         """
         if encoder.inline_limit:
             answer = clips.synthesize_clip(model, question, longest)
-            return EncodedClip(answer, await self.file(encoder, convention, answer))
+            return answer, await self.file(encoder, convention, answer)
         if clip_draft.largest_frame_count(model, question) > MAX_BATCHED_FRAMES:
             answer = await worker_threads.run_in_thread(
                 clips.synthesize_clip, model, question, longest
             )
-            return EncodedClip(answer, await self.file(encoder, convention, answer))
+            return answer, await self.file(encoder, convention, answer)
         key = encoder.extension, convention, model.identity, question.level, longest
         work = partial(_encoded_clips, model, longest, encoder, convention)
         clip: EncodedClip = await self._result(key, question, work)
@@ -117,8 +114,7 @@ def _encoded_clips(
     clip_answers = [answer for answer in answers if isinstance(answer, ClipAnswer)]
     files = iter(encoder.write(clip_answers, convention))
     return [
-        answer if isinstance(answer, Exception) else EncodedClip(answer, next(files))
-        for answer in answers
+        answer if isinstance(answer, Exception) else (answer, next(files)) for answer in answers
     ]
 
 

@@ -122,7 +122,8 @@ def other_method(request: ServiceRequest, path: PathRoutes) -> Response:
         detail = f"{method}, expected one of {path.allow}"
         raise RequestError(METHOD_NOT_ALLOWED, detail, headers=allow)
     response = Response(status_code=204, headers=allow)
-    if request.service.origins and responses.is_preflight(request.head):
+    preflight = b"origin" in request.head and b"access-control-request-method" in request.head
+    if request.service.origins and preflight:
         response.raw_headers += responses.preflight_headers(path.allow.encode())
     return response
 
@@ -210,7 +211,10 @@ async def send_response(request: ServiceRequest, response: Response) -> None:
 
 def _common_headers(request: ServiceRequest, response: Response) -> list[tuple[bytes, bytes]]:
     """Return the headers of every response: request id, security, connection, CORS and caching."""
-    security = responses.security_headers(response.media_type, response.status_code)
+    # A Content-Security-Policy with a 304 would replace that of the browser's cached page, which
+    # could then load nothing.
+    is_page = response.media_type == "text/html" or response.status_code == 304
+    security = responses.PAGE_HEADERS if is_page else responses.DATA_HEADERS
     headers = [(b"x-request-id", request.identity.encode()), *security]
     if request.service.readiness.draining and "connection" not in response.headers:
         # The client's next request must reach a process that continues to run.

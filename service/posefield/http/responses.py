@@ -14,7 +14,7 @@ since data has no links. The proxy that terminates TLS sets `Strict-Transport-Se
 import json
 import platform
 import re
-from collections.abc import AsyncIterator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterable, Iterator, Sequence
 from hashlib import blake2b
 from importlib.metadata import version
 from pathlib import Path
@@ -166,11 +166,6 @@ def preflight_headers(allow: bytes) -> Headers:
     ]
 
 
-def is_preflight(headers: Mapping[bytes, bytes]) -> bool:
-    """Return True if an OPTIONS request with these headers is a CORS preflight."""
-    return b"origin" in headers and b"access-control-request-method" in headers
-
-
 DATA_HEADERS = (
     (b"x-content-type-options", b"nosniff"),
     (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
@@ -181,15 +176,6 @@ DATA_HEADERS = (
 
 PAGE_HEADERS = tuple(pair for pair in DATA_HEADERS if pair[0] != b"content-security-policy")
 """Headers of HTML pages; `page_headers` returns their own Content-Security-Policy."""
-
-
-def security_headers(media_type: str | None, status: int = 200) -> tuple[tuple[bytes, bytes], ...]:
-    """Return the security headers of a response.
-
-    A 304 has no Content-Security-Policy: it would replace that of the browser's cached page, which
-    could then load nothing.
-    """
-    return PAGE_HEADERS if media_type == "text/html" or status == 304 else DATA_HEADERS
 
 
 def page_headers(script: str, style: str) -> dict[str, str]:

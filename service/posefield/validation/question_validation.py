@@ -230,7 +230,7 @@ class QuestionValidator:
             if supported and not outside
             else self._extrapolation_warnings(extrapolate, outside, point)
         )
-        inferred = tuple(name for name in values if name not in controls)
+        inferred = () if plain else tuple(name for name in values if name not in controls)
         array = np.array([point])
         limited = () if plain else limited_controls(self._card.controls, point)
         return ValidatedQuestion(

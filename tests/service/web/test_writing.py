@@ -107,15 +107,15 @@ def test_clips_that_are_asked_for_at_once_are_made_together(calls, model, questi
     encoder, sizes = calls
     found = made(model, questions, encoder)
     assert sum(sizes) == len(questions) and max(sizes) == batching.MAX_CLIPS
-    assert [own.content for own in found] == [USDC.encode(answer) for answer in answers]
-    assert [own.answer.trust for own in found] == [answer.trust for answer in answers]
+    assert [content for _, content in found] == [USDC.encode(answer) for answer in answers]
+    assert [answer.trust for answer, _ in found] == [answer.trust for answer in answers]
 
 
 def test_a_clip_that_may_be_long_is_made_alone(calls, model, questions):
     encoder, sizes = calls
     long = structs.replace(questions[0], fps=990.0)
     (found,) = made(model, [long], encoder)
-    assert len(found.answer.clip) > batching.MAX_BATCHED_FRAMES
-    assert found.content == USDC.encode(clips.synthesize_clip(model, long))
+    assert len(found[0].clip) > batching.MAX_BATCHED_FRAMES
+    assert found[1] == USDC.encode(clips.synthesize_clip(model, long))
     made(model, [*questions[:2], long, long], encoder)
     assert sorted(sizes) == [1, 1, 1, 2]
