@@ -50,10 +50,10 @@ def main() -> None:
     parser.add_argument("first", type=Path)
     parser.add_argument("second", type=Path)
     parser.add_argument("--posefield", type=Path, default=Path(sys.executable).parent / "posefield")
-    given = parser.parse_args()
-    if given.what == "compare":
-        sys.exit(compare(given.first, given.second))
-    record(given.first.resolve(), given.second.resolve(), given.posefield.absolute())
+    options = parser.parse_args()
+    if options.what == "compare":
+        sys.exit(compare(options.first, options.second))
+    record(options.first.resolve(), options.second.resolve(), options.posefield.absolute())
 
 
 def record(models: Path, out: Path, posefield: Path) -> None:
@@ -86,9 +86,9 @@ def asked(models: Path, posefield: Path) -> Iterator[tuple[str, dict[str, Any]]]
         with httpx.Client(base_url=address, timeout=300.0) as client:
             for name, method, path, headers, body in questions(client):
                 answer = client.request(method, path, **_sent(headers, body))
-                kept = {k: v for k, v in answer.headers.items() if k not in DROPPED}
+                kept_headers = {k: v for k, v in answer.headers.items() if k not in DROPPED}
                 content = TIMES.sub(b"", answer.content.replace(address.encode(), b"ADDRESS"))
-                yield name, {"status": answer.status_code, "headers": kept, "body": content}
+                yield name, {"status": answer.status_code, "headers": kept_headers, "body": content}
     finally:
         process.terminate()
         process.wait()
@@ -129,11 +129,11 @@ def of_model(name: str, card: dict[str, Any]) -> Iterator[Question]:
 
 
 def _point(card: dict[str, Any], draw: random.Random) -> dict[str, float]:
-    made = {}
+    controls = {}
     for control in card["controls"]:
         low, high = control["minimum"], control["maximum"]
-        made[control["name"]] = round(low + (high - low) * (0.1 + 0.8 * draw.random()), 4)
-    return made
+        controls[control["name"]] = round(low + (high - low) * (0.1 + 0.8 * draw.random()), 4)
+    return controls
 
 
 def _extras(card: dict[str, Any], joint: str) -> list[dict[str, Any]]:
@@ -154,8 +154,8 @@ def _query(values: dict[str, Any]) -> str:
     for key, value in values.items():
         if key == "targets":
             for one in value:
-                place = ",".join(map(str, one["position"]))
-                pairs.append(("target", f"{one['joint']}@{one['at']}:{place}"))
+                position = ",".join(map(str, one["position"]))
+                pairs.append(("target", f"{one['joint']}@{one['at']}:{position}"))
         elif key == "time" and isinstance(value, list):
             pairs += [("time", one) for one in value]
         else:
@@ -229,10 +229,10 @@ def _many(name: str, base: str, points: list[dict[str, float]]) -> Iterator[Ques
     camera = {"position": [0.0, 1.6, 8.0], "fov": 1.0, "height": 1080.0}
     for form in CROWDS:
         yield f"{name} crowd.{form}", "POST", f"{base}/crowd.{form}", {}, crowd
-        seen = {**crowd, "level": "auto", "camera": camera, "heading": 0.5}
-        yield f"{name} crowd.{form} seen", "POST", f"{base}/crowd.{form}", {}, seen
-        kept = {**crowd, "level": 1.0, "position": [[1.0, 0.0, 2.0]] * 4, "root": "in_place"}
-        yield f"{name} crowd.{form} placed", "POST", f"{base}/crowd.{form}", {}, kept
+        automatic = {**crowd, "level": "auto", "camera": camera, "heading": 0.5}
+        yield f"{name} crowd.{form} seen", "POST", f"{base}/crowd.{form}", {}, automatic
+        fixed = {**crowd, "level": 1.0, "position": [[1.0, 0.0, 2.0]] * 4, "root": "in_place"}
+        yield f"{name} crowd.{form} placed", "POST", f"{base}/crowd.{form}", {}, fixed
     for form, sharing in itertools.product(USD, ("references", "scenegraph", "flatten")):
         query = urlencode({"count": 4, "seconds": 1, "seed": 3, "instancing": sharing})
         yield f"{name} GET crowd.{form} {sharing}", "GET", f"{base}/crowd.{form}?{query}", {}, None
@@ -401,8 +401,8 @@ def _lines(folder: Path) -> dict[str, Any]:
 
 def _what(one: dict[str, Any], other: dict[str, Any]) -> str:
     keys = [key for key in ("status", "headers") if one[key] != other[key]]
-    parts = [f"{key} {one[key]} -> {other[key]}" for key in keys]
-    return "; ".join(parts + ["body"] * (one["sha256"] != other["sha256"]))
+    changes = [f"{key} {one[key]} -> {other[key]}" for key in keys]
+    return "; ".join(changes + ["body"] * (one["sha256"] != other["sha256"]))
 
 
 if __name__ == "__main__":

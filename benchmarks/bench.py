@@ -39,26 +39,26 @@ ROOT = Path(__file__).parents[1]
 def main() -> None:
     """Measure, print, write."""
     shutil.rmtree(ROOT / "build/bench", ignore_errors=True)
-    made = family.make(ROOT / "build/bench/reaching")
-    table1 = measurement.of(made, measurement.POINTS, rounds=7)
+    trained_family = family.make(ROOT / "build/bench/reaching")
+    table1 = measurement.of(trained_family, measurement.POINTS, rounds=7)
     print(markdown.text(table1), end="\n\n")
     model = ROOT / "build/bench/reaching.onnx"
-    model.write_bytes(made.exported.content)
+    model.write_bytes(trained_family.exported.content)
     tables = {
         "training": [
-            *bench_rows.library_rows(made),
-            *runtime.rows(made),
-            *exact.rows(made),
+            *bench_rows.library_rows(trained_family),
+            *runtime.rows(trained_family),
+            *exact.rows(trained_family),
             *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
         ],
-        "crowds": [*crowd.rows(made), *crowd_usd.rows()],
+        "crowds": [*crowd.rows(trained_family), *crowd_usd.rows()],
         "files": [
-            *export_formats.rows(made),
+            *export_formats.rows(trained_family),
             *export.rows(model),
         ],
         "layers": export_usd.rows(),
         "requests": [
-            *clips_http.rows(made),
+            *clips_http.rows(trained_family),
             *serve.rows(model),
             *serve_rivals.rows(model),
             *serve_models.rows(model),
@@ -66,7 +66,7 @@ def main() -> None:
             *client.rows(model),
         ],
     }
-    rows = [row for each in tables.values() for row in each]
+    rows = [row for table_rows in tables.values() for row in table_rows]
     print(table(rows))
     tables["training"] = [*bench_rows.rows(table1), *tables["training"]]
     write([*bench_rows.rows(table1), *rows], ROOT / "build/bench.json")

@@ -38,14 +38,14 @@ def rows(model: Path) -> list[Row]:
         Client(service.url, cache_bytes=0) as uncached,
         Client(service.url) as client,
     ):
-        asked = client.model(model.stem)
-        controls = {name: control.default for name, control in asked.controls.items()}
+        model_client = client.model(model.stem)
+        controls = {name: control.default for name, control in model_client.controls.items()}
         where = url(service.url, model.stem, controls)
         alone = uncached.model(model.stem)
         ways = {
             "bare": lambda at: _bare(bare, where(at)),
             "none kept": lambda at: alone.pose(at, **controls),
-            "client": lambda at: asked.pose(at, **controls),
+            "client": lambda at: model_client.pose(at, **controls),
         }
         took = _in_turn(ways)
     times = ", ".join(f"{name} {seconds * 1e6:.0f} us" for name, seconds in took.items())
@@ -70,12 +70,12 @@ def _in_turn(ways: dict[str, Callable[[float], object]]) -> dict[str, float]:
     """Median seconds of each, one after the other, each time at a moment of its own."""
     took: dict[str, list[float]] = {name: [] for name in ways}
     for turn in range(WARM + ROUNDS):
-        for place, (name, way) in enumerate(ways.items()):
-            at = round(1e-4 * (3 * turn + place), 4)
+        for index, (name, call) in enumerate(ways.items()):
+            at = round(1e-4 * (3 * turn + index), 4)
             began = time.perf_counter()
-            way(at)
+            call(at)
             took[name].append(time.perf_counter() - began)
-    return {name: statistics.median(each[WARM:]) for name, each in took.items()}
+    return {name: statistics.median(durations[WARM:]) for name, durations in took.items()}
 
 
 if __name__ == "__main__":

@@ -33,10 +33,10 @@ def model_rows(name: str, model: Synthesizer) -> list[Row]:
         "stand": lambda: clips.synthesize_clip(model, structs.replace(plain, feet="stand")),
         "take": lambda: clips.synthesize_clip(model, structs.replace(plain, take=next(seeds))),
     }
-    taken = processor_seconds(runs)
-    feet, take = (1e3 * (taken[name] - taken["plain"]) for name in ("stand", "take"))
+    timings = processor_seconds(runs)
+    feet, take = (1e3 * (timings[name] - timings["plain"]) for name in ("stand", "take"))
     title = f"a clip of {FRAMES} frames, {name}, one thread"
-    words = f"processor time above that of the prediction, {1e3 * taken['plain']:.2g} ms"
+    words = f"processor time above that of the prediction, {1e3 * timings['plain']:.2g} ms"
     return [
         Row(f"standing feet of {title}", feet, "ms", words, None, FEET_GOAL),
         Row(f"a take with a new seed, {title}", take, "ms", words, None, TAKE_GOAL),
@@ -46,11 +46,13 @@ def model_rows(name: str, model: Synthesizer) -> list[Row]:
 def _question(model: Synthesizer) -> ClipQuestion:
     """Return the question for the default motion in that many frames."""
     card = model.session.card
-    asked = ClipQuestion(
-        controls={own.name: own.default for own in card.controls}, feet="as_predicted", exact="none"
+    question = ClipQuestion(
+        controls={control.name: control.default for control in card.controls},
+        feet="as_predicted",
+        exact="none",
     )
-    duration = clips.synthesize_clip(model, asked).trust.duration
-    return structs.replace(asked, fps=(FRAMES - 1) / duration)
+    duration = clips.synthesize_clip(model, question).trust.duration
+    return structs.replace(question, fps=(FRAMES - 1) / duration)
 
 
 def processor_seconds(runs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
@@ -58,12 +60,12 @@ def processor_seconds(runs: Mapping[str, Callable[[], object]]) -> dict[str, flo
 
     The least of many rounds: whatever else runs on the machine can only add to it.
     """
-    taken: dict[str, list[float]] = {name: [] for name in runs}
+    timings: dict[str, list[float]] = {name: [] for name in runs}
     with threadpool_limits(limits=1):
         for _ in range(ROUNDS):
             for name, run in runs.items():
-                begun = time.process_time()
+                start = time.process_time()
                 for _ in range(QUESTIONS):
                     run()
-                taken[name].append((time.process_time() - begun) / QUESTIONS)
-    return {name: min(times) for name, times in taken.items()}
+                timings[name].append((time.process_time() - start) / QUESTIONS)
+    return {name: min(times) for name, times in timings.items()}

@@ -35,12 +35,12 @@ LIMITS = {"POSEFIELD_CLIPS_POSES": "10000000", "POSEFIELD_PORT": "0"}
 POSEFIELD = Path(sys.executable).with_name("posefield")
 
 
-def rows(made: Family) -> list[Row]:
+def rows(trained_family: Family) -> list[Row]:
     """Clips a second, seconds to the first byte, and most memory of the server's process."""
-    model = crowd_models.reaching(made)
+    model = crowd_models.reaching(trained_family)
     with TemporaryDirectory() as name:
         path = Path(name, "reaching.onnx")
-        path.write_bytes(made.exported.content)
+        path.write_bytes(trained_family.exported.content)
         return [row for extension in FORMATS for row in _rows(model, path, extension)]
 
 
@@ -57,12 +57,12 @@ def _rows(model: Synthesizer, path: Path, extension: str) -> list[Row]:
             "first": lambda: _first(client, many),
         }
         took = in_turn(runs, rounds=5, repeats=1)
-    said = f"{CLIPS} clips as {extension}, {size / MANY / 1e3:.0f} kB each, zip"
+    note = f"{CLIPS} clips as {extension}, {size / MANY / 1e3:.0f} kB each, zip"
     here = f"in this process, to nowhere: {CLIPS / took['here']:.0f}"
     more = f"after {FEW} clips: {low / 1e6:.0f} MB; the archive has {size / 1e6:.0f} MB"
     return [
         Row(
-            said, CLIPS / took["http"], "clips/s over HTTP", here, took["here"] / took["http"], None
+            note, CLIPS / took["http"], "clips/s over HTTP", here, took["here"] / took["http"], None
         ),
         Row(f"first byte of {MANY} clips", took["first"], "s", "all are checked", None, None),
         Row(f"most memory of the server, {MANY} clips", high / 1e6, "MB", more, None, None),
@@ -73,7 +73,7 @@ def _body(model: Synthesizer, extension: str, count: int) -> bytes:
     rng = np.random.default_rng(1)
     ranges = {c.name: (c.minimum, c.maximum) for c in model.session.card.controls}
     clips = [
-        {"controls": {name: rng.uniform(*ends) for name, ends in ranges.items()}, "fps": 60}
+        {"controls": {name: rng.uniform(*limits) for name, limits in ranges.items()}, "fps": 60}
         for _ in range(count)
     ]
     return orjson.dumps({"format": extension, "clips": clips})

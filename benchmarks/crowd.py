@@ -18,13 +18,13 @@ from family import Family
 from rows import Row, table
 
 
-def rows(made: Family) -> list[Row]:
+def rows(trained_family: Family) -> list[Row]:
     """Poses of the procedural family, rivals of the same crowd, and walking crowds and clips."""
-    model, walks = crowd_models.reaching(made), crowd_models.walks()
+    model, walks = crowd_models.reaching(trained_family), crowd_models.walks()
     return [
         *crowd_poses.rows(model),
-        *crowd_bounds.rows(made, model),
-        *crowd_rivals.rows(made, model),
+        *crowd_bounds.rows(trained_family, model),
+        *crowd_rivals.rows(trained_family, model),
         *crowd_walk.rows(walks),
         *crowd_feet.rows(walks),
         *clip_feet.rows(walks),

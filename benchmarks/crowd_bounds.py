@@ -20,24 +20,24 @@ BATCH = crowd_synthesis.MOST_ROWS
 Profile = dict[str, Part]
 
 
-def rows(made: Family, model: Synthesizer) -> list[Row]:
+def rows(trained_family: Family, model: Synthesizer) -> list[Row]:
     """The machine's own bounds, how near the finest and the coarsest level come, and a profile."""
     levels = {"finest": 0, "coarsest": len(model.session.card.levels) - 1}
     scene = crowd_scene.around(model, BATCH)
     feed = {"controls": scene.controls.astype("f4"), "time": scene.times[:, None].astype("f4")}
     runs = {name: _run(model, feed, level) for name, level in levels.items()}
     one = _run(model, {key: rows[:1] for key, rows in feed.items()}, levels["coarsest"])
-    taken = in_turn({**runs, "one": one}, rounds=15, repeats=10)
+    timings = in_turn({**runs, "one": one}, rounds=15, repeats=10)
     machine = crowd_machine.measure()
-    content = made.exported.content
+    content = trained_family.exported.content
     profiles = {name: crowd_profile.of(content, level, feed) for name, level in levels.items()}
-    found = [
-        _bound_rows(model, name, taken[name] / BATCH, machine, profiles[name]) for name in levels
+    table_rows = [
+        _bound_rows(model, name, timings[name] / BATCH, machine, profiles[name]) for name in levels
     ]
     return [
         *machine.rows(),
-        *(row for three in found for row in three),
-        _fixed_row(taken["one"], taken["coarsest"]),
+        *(row for three in table_rows for row in three),
+        _fixed_row(timings["one"], timings["coarsest"]),
         *_profile_rows(profiles),
     ]
 
@@ -55,7 +55,7 @@ def _bound_rows(
     operations = card.levels[0 if name == "finest" else -1].operations
     # Rotations and bone offsets of every joint; root, travel, duration and sigma.
     out = 4 * (7 * len(card.skeleton) + 8)
-    passed = 8 * sum(part.numbers for part in profile.values()) // BATCH
+    passed = 8 * sum(group_profile.numbers for group_profile in profile.values()) // BATCH
     pace = f"in {1e6 * seconds:.3g} µs"
     shares = {
         f"float32: {operations:,} multiply-adds a pose {pace}": operations / machine.work,
@@ -83,9 +83,9 @@ def _part_row(group: str, profiles: dict[str, Profile]) -> Row:
     """Microseconds a pose at the coarsest level, and the shares of both levels' runs."""
     words = "; ".join(
         f"{name} {1e6 * profile[group].seconds / BATCH:.3g} µs, "
-        f"{100 * profile[group].seconds / sum(part.seconds for part in profile.values()):.0f} %"
+        f"{100 * profile[group].seconds / sum(one.seconds for one in profile.values()):.0f} %"
         for name, profile in profiles.items()
     )
     finest, coarsest = (profiles[name][group].seconds for name in ("finest", "coarsest"))
-    each = 1e6 * coarsest / BATCH
-    return Row(f"coarsest, profiled: {group}", each, "µs", words, finest / coarsest, None)
+    microseconds = 1e6 * coarsest / BATCH
+    return Row(f"coarsest, profiled: {group}", microseconds, "µs", words, finest / coarsest, None)

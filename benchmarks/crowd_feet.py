@@ -27,19 +27,19 @@ def rows(walks: dict[str, Gait]) -> list[Row]:
 
 
 def _walk_rows(name: str, gait: Gait) -> list[Row]:
-    taken = {"as_predicted": np.inf, "stand": np.inf}
+    timings = {"as_predicted": np.inf, "stand": np.inf}
     skates = {}
     for mode in ("as_predicted", "stand") * ROUNDS:
-        begun = time.process_time()
-        made = _motions(gait, mode)
-        taken[mode] = min(taken[mode], time.process_time() - begun)
-        skates[mode] = _skate(gait, made)
+        start = time.process_time()
+        motions = _motions(gait, mode)
+        timings[mode] = min(timings[mode], time.process_time() - start)
+        skates[mode] = _skate(gait, motions)
     title = f"{name}, {COUNT} characters of 100 frames, feet that stand"
-    ratio = taken["stand"] / taken["as_predicted"]
-    cost = f"processor time; as predicted: {taken['as_predicted']:.3g} s, {ratio:.2g} times less"
+    ratio = timings["stand"] / timings["as_predicted"]
+    cost = f"processor time; as predicted: {timings['as_predicted']:.3g} s, {ratio:.2g} times less"
     slid = f"as predicted: {skates['as_predicted']:.3g} cm/s"
     return [
-        Row(title, taken["stand"], "s", cost, None, GOAL),
+        Row(title, timings["stand"], "s", cost, None, GOAL),
         Row(f"{title}: skate", skates["stand"], "cm/s", slid, None, SLIDING),
     ]
 
@@ -50,7 +50,7 @@ def _motions(gait: Gait, feet: str) -> list[Motions]:
     return list(walking_feet.build_crowd(model, gait, order).batches)
 
 
-def _skate(gait: Gait, made: list[Motions]) -> float:
+def _skate(gait: Gait, motions: list[Motions]) -> float:
     card = gait.session.card
-    speeds = [walking_crowd.measure_foot_skate(card, one, RATE).ravel() for one in made]
+    speeds = [walking_crowd.measure_foot_skate(card, one, RATE).ravel() for one in motions]
     return 100.0 * float(np.concatenate(speeds).mean())

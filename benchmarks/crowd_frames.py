@@ -27,7 +27,9 @@ class Questions:
     share: Singles
 
 
-def solved(made: Family, field: naive_kriging.NaiveKriging, questions: Questions) -> Answer:
+def solved(
+    trained_family: Family, field: naive_kriging.NaiveKriging, questions: Questions
+) -> Answer:
     """Poses by LU factors of each frame's system, made beforehand, and averages of the samples."""
     factors = [linalg.lu_factor(poses.system(one).astype(np.float32)) for one in field.fields]
     values = field.values.astype(np.float32)
@@ -37,37 +39,37 @@ def solved(made: Family, field: naive_kriging.NaiveKriging, questions: Questions
         weights = linalg.lu_solve(factors[index], basis.T, check_finite=False)[:n]
         return weights.T @ values[:, index]
 
-    return _by_frame(made, field, questions, frame)
+    return _by_frame(trained_family, field, questions, frame)
 
 
-def dual(made: Family, field: naive_kriging.NaiveKriging, questions: Questions) -> Answer:
+def dual(trained_family: Family, field: naive_kriging.NaiveKriging, questions: Questions) -> Answer:
     """Poses by inverse and samples multiplied beforehand."""
     duals = [one.dual.astype(np.float32) for one in field.fields]
-    return _by_frame(made, field, questions, lambda index, basis: basis @ duals[index])
+    return _by_frame(trained_family, field, questions, lambda index, basis: basis @ duals[index])
 
 
 def _by_frame(
-    made: Family,
+    trained_family: Family,
     field: naive_kriging.NaiveKriging,
     questions: Questions,
     frame: Callable[[int, Singles], Singles],
 ) -> Answer:
     """Poses of everybody, frame after frame, where `frame` makes pose vectors of a basis."""
-    means = made.trained.model.decoder.means.astype(np.float32)
+    means = trained_family.trained.model.decoder.means.astype(np.float32)
     fields = [_singles(one) for one in field.fields]
 
     def run() -> list[Singles]:
         order = np.argsort(questions.below, kind="stable")
         firsts = np.searchsorted(questions.below[order], np.arange(len(fields)))
-        found = np.empty((len(order), field.values.shape[2]), np.float32)
+        values = np.empty((len(order), field.values.shape[2]), np.float32)
         for index, rows in enumerate(np.split(order, firsts[1:])):
             if not len(rows):
                 continue
             before, after = (
                 frame(at, _basis(fields[at], questions.points[rows])) for at in (index, index + 1)
             )
-            found[rows] = before + questions.share[rows] * (after - before)
-        return [decoded(found[:, 3:], means)]
+            values[rows] = before + questions.share[rows] * (after - before)
+        return [decoded(values[:, 3:], means)]
 
     return run
 
@@ -90,9 +92,9 @@ def _singles(field: UniversalKriging) -> Single:
 
 def _basis(field: Single, points: Singles) -> Singles:
     """Covariances and drift (K, n + 1 + d)."""
-    own = points * field.scale
-    squared = np.square(own).sum(axis=1)[:, None] + np.square(field.samples).sum(axis=1)
-    squared -= 2.0 * own @ field.samples.T
+    scaled = points * field.scale
+    squared = np.square(scaled).sum(axis=1)[:, None] + np.square(field.samples).sum(axis=1)
+    squared -= 2.0 * scaled @ field.samples.T
     near = field.covariance(np.maximum(squared, np.float32(0.0)))
     return np.hstack([near, np.ones((len(points), 1), np.float32), points])
 
@@ -101,5 +103,5 @@ def decoded(turned: Singles, means: Singles) -> Singles:
     """Quaternions (N, J, 4) as the model's decoder makes them, poses innermost while it does."""
     joints = np.ascontiguousarray(turned.T).reshape(*means.shape, -1)
     half = np.sqrt(np.sum(np.square(joints), axis=1, keepdims=True) + np.float32(1e-12))
-    found = joints * (np.sin(half) / half) + means[..., None] * np.cos(half)
-    return np.ascontiguousarray(found.transpose(2, 0, 1))
+    quaternions = joints * (np.sin(half) / half) + means[..., None] * np.cos(half)
+    return np.ascontiguousarray(quaternions.transpose(2, 0, 1))

@@ -50,9 +50,9 @@ def measure() -> Machine:
         "near": _copy(NEAR),
         "far": _copy(FAR),
     }
-    taken = in_turn(runs, rounds=31, repeats=5)
-    work, blas = (SIZE**3 / taken[name] for name in ("work", "blas"))
-    return Machine(work, blas, 2.0 * NEAR / taken["near"], 2.0 * FAR / taken["far"])
+    timings = in_turn(runs, rounds=31, repeats=5)
+    work, blas = (SIZE**3 / timings[name] for name in ("work", "blas"))
+    return Machine(work, blas, 2.0 * NEAR / timings["near"], 2.0 * FAR / timings["far"])
 
 
 def _product(right: Any) -> Any:

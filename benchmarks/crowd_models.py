@@ -12,9 +12,11 @@ from posefield.synthesis.synthesizer import Synthesizer
 WALK = Path(__file__).parents[1] / "service/posefield/shipped/cmu_walk.onnx"
 
 
-def reaching(made: Family) -> Synthesizer:
+def reaching(trained_family: Family) -> Synthesizer:
     """Return the procedural family's model."""
-    return Synthesizer("reaching", session.open_bytes(made.exported.content, "reaching.onnx"))
+    return Synthesizer(
+        "reaching", session.open_bytes(trained_family.exported.content, "reaching.onnx")
+    )
 
 
 def walks() -> dict[str, Gait]:

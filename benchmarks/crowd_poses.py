@@ -26,12 +26,12 @@ PAPER = (510.0, 190.0)
 
 def rows(model: Synthesizer) -> list[Row]:
     """10,000 characters, the scaling, and the coarsest level against the finest."""
-    taken = {count: _taken(crowd_scene.around(model, count)) for count in SIZES}
+    timings = {count: _taken(crowd_scene.around(model, count)) for count in SIZES}
     scene = crowd_scene.around(model, MANY)
     return [
-        *_many_rows(scene, taken[MANY]),
-        *(_size_row(count, taken[count]) for count in SIZES),
-        *_ratio_rows(scene, taken[MANY]),
+        *_many_rows(scene, timings[MANY]),
+        *(_size_row(count, timings[count]) for count in SIZES),
+        *_ratio_rows(scene, timings[MANY]),
     ]
 
 
@@ -45,26 +45,28 @@ def _taken(scene: Scene) -> dict[str, float]:
     return in_turn(runs, rounds=15, repeats=max(1, 2_000 // len(scene)))
 
 
-def _many_rows(scene: Scene, taken: dict[str, float]) -> list[Row]:
+def _many_rows(scene: Scene, timings: dict[str, float]) -> list[Row]:
     levels = scene.poses(AUTO)().levels
     words = f"{SEEN}; {crowd_scene.mix(levels, scene.coarsest + 1)}"
     name = f"crowd of {MANY:,}, a pose each, {os.cpu_count()} threads"
     return [
-        Row(f"{name}, levels by view", 1e3 * taken["auto"], "ms", words, None, FRAME),
-        Row(f"{name}, the same", 1e3 * taken["auto"], "ms", "the wish", None, HALF_FRAME),
-        Row(f"{name}, all at the finest", 1e3 * taken["finest"], "ms", "", None, FRAME),
-        Row(f"{name}, all at the coarsest", 1e3 * taken["coarsest"], "ms", "", None, FRAME),
+        Row(f"{name}, levels by view", 1e3 * timings["auto"], "ms", words, None, FRAME),
+        Row(f"{name}, the same", 1e3 * timings["auto"], "ms", "the wish", None, HALF_FRAME),
+        Row(f"{name}, all at the finest", 1e3 * timings["finest"], "ms", "", None, FRAME),
+        Row(f"{name}, all at the coarsest", 1e3 * timings["coarsest"], "ms", "", None, FRAME),
     ]
 
 
-def _size_row(count: int, taken: dict[str, float]) -> Row:
-    times = {name: f"{1e3 * seconds:.3g} ms" for name, seconds in taken.items()}
-    each = {name: f"{1e6 * seconds / count:.3g} µs" for name, seconds in taken.items()}
-    words = "; ".join(f"{name} {times[name]}, {each[name]} a pose" for name in taken)
-    return Row(f"crowd of {count:,}, levels by view", 1e3 * taken["auto"], "ms", words, None, None)
+def _size_row(count: int, timings: dict[str, float]) -> Row:
+    times = {name: f"{1e3 * seconds:.3g} ms" for name, seconds in timings.items()}
+    microseconds = {name: f"{1e6 * seconds / count:.3g} µs" for name, seconds in timings.items()}
+    words = "; ".join(f"{name} {times[name]}, {microseconds[name]} a pose" for name in timings)
+    return Row(
+        f"crowd of {count:,}, levels by view", 1e3 * timings["auto"], "ms", words, None, None
+    )
 
 
-def _ratio_rows(scene: Scene, taken: dict[str, float]) -> list[Row]:
+def _ratio_rows(scene: Scene, timings: dict[str, float]) -> list[Row]:
     alone = in_turn(
         {"finest": _graph(scene, 0), "coarsest": _graph(scene, scene.coarsest)},
         rounds=31,
@@ -73,7 +75,7 @@ def _ratio_rows(scene: Scene, taken: dict[str, float]) -> list[Row]:
     fine, mixed = PAPER
     return [
         _ratio_row(f"graph alone, {BATCH} poses a call, one thread", alone, BATCH),
-        _ratio_row(f"whole call, {MANY:,} characters", taken, MANY),
+        _ratio_row(f"whole call, {MANY:,} characters", timings, MANY),
         Row(
             "the paper's crowd with levels of detail",
             mixed,
@@ -85,11 +87,13 @@ def _ratio_rows(scene: Scene, taken: dict[str, float]) -> list[Row]:
     ]
 
 
-def _ratio_row(name: str, taken: dict[str, float], poses: int) -> Row:
-    each = {level: 1e6 * seconds / poses for level, seconds in taken.items()}
-    words = f"the finest: {each['finest']:.3g} µs"
-    ratio = each["finest"] / each["coarsest"]
-    return Row(f"coarsest level, a pose: {name}", each["coarsest"], "µs", words, ratio, RATIO)
+def _ratio_row(name: str, timings: dict[str, float], poses: int) -> Row:
+    microseconds = {level: 1e6 * seconds / poses for level, seconds in timings.items()}
+    words = f"the finest: {microseconds['finest']:.3g} µs"
+    ratio = microseconds["finest"] / microseconds["coarsest"]
+    return Row(
+        f"coarsest level, a pose: {name}", microseconds["coarsest"], "µs", words, ratio, RATIO
+    )
 
 
 def _graph(scene: Scene, level: int) -> Callable[[], object]:

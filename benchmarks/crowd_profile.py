@@ -59,11 +59,11 @@ def _events(content: bytes, feed: Feed) -> dict[str, list[Any]]:
         for _ in range(RUNS):
             session.run(None, feed)
         entries = json.loads(Path(session.end_profiling()).read_text())
-    found = defaultdict(list)
+    durations = defaultdict(list)
     for entry in entries:
         if entry["name"].endswith(KERNEL):
-            found[entry["name"].removesuffix(KERNEL)].append(entry)
-    return found
+            durations[entry["name"].removesuffix(KERNEL)].append(entry)
+    return durations
 
 
 COVARIANCES, KRIGING, TIME = "covariances", "kriging products", "canonical time and travel"
@@ -95,11 +95,11 @@ def _is_product(node: Any) -> bool:
 
 def _behind(output: str, made_by: dict[str, Any]) -> list[Any]:
     """Return the nodes that an output needs."""
-    found: dict[str, Any] = {}
+    sources: dict[str, Any] = {}
     waiting = [output]
     while waiting:
         node = made_by.get(waiting.pop())
-        if node is not None and node.name not in found:
-            found[node.name] = node
+        if node is not None and node.name not in sources:
+            sources[node.name] = node
             waiting += node.input
-    return list(found.values())
+    return list(sources.values())

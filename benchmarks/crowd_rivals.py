@@ -54,41 +54,43 @@ class Asked:
     questions: Questions
 
 
-def rows(made: Family, model: Synthesizer) -> list[Row]:
+def rows(trained_family: Family, model: Synthesizer) -> list[Row]:
     """Ours, at levels by view and at the finest, against every rival."""
-    content = naive_graphs.fitted(made, VECTORS)
-    _check(content, _asked(made, crowd_scene.around(model, CHECKED)))
-    asked = _asked(made, crowd_scene.around(model, MANY))
-    few = _asked(made, crowd_scene.around(model, FEW))
-    levels = asked.scene.poses(AUTO)().levels
+    content = naive_graphs.fitted(trained_family, VECTORS)
+    _check(content, _asked(trained_family, crowd_scene.around(model, CHECKED)))
+    question = _asked(trained_family, crowd_scene.around(model, MANY))
+    few = _asked(trained_family, crowd_scene.around(model, FEW))
+    levels = question.scene.poses(AUTO)().levels
     runs = {
-        "auto": _ours(asked.scene, levels),
-        "finest": _ours(asked.scene, np.zeros_like(levels)),
-        **_naive(content, asked),
+        "auto": _ours(question.scene, levels),
+        "finest": _ours(question.scene, np.zeros_like(levels)),
+        **_naive(content, question),
     }
-    taken = in_turn(runs, rounds=9, repeats=1)
+    timings = in_turn(runs, rounds=9, repeats=1)
     scipys = (
-        in_turn({"scipy": _scipy(made, few.questions)}, rounds=5, repeats=1)["scipy"] * MANY / FEW
+        in_turn({"scipy": _scipy(trained_family, few.questions)}, rounds=5, repeats=1)["scipy"]
+        * MANY
+        / FEW
     )
-    return [_row(name, {**taken, SCIPY: scipys}) for name in [*list(runs)[2:], SCIPY]]
+    return [_row(name, {**timings, SCIPY: scipys}) for name in [*list(runs)[2:], SCIPY]]
 
 
-def _row(name: str, taken: dict[str, float]) -> Row:
-    ratio = taken[name] / taken["auto"]
-    finest = f"ours all at the finest: {1e3 * taken['finest']:.3g} ms"
-    words = f"{name}: {1e3 * taken[name]:.3g} ms; {finest}"
+def _row(name: str, timings: dict[str, float]) -> Row:
+    ratio = timings[name] / timings["auto"]
+    finest = f"ours all at the finest: {1e3 * timings['finest']:.3g} ms"
+    words = f"{name}: {1e3 * timings[name]:.3g} ms; {finest}"
     title = f"crowd of {MANY:,}, levels by view, graph alone on one thread"
-    return Row(title, 1e3 * taken["auto"], "ms", words, ratio, None)
+    return Row(title, 1e3 * timings["auto"], "ms", words, ratio, None)
 
 
-def _asked(made: Family, scene: Scene) -> Asked:
-    model = made.trained.model
+def _asked(trained_family: Family, scene: Scene) -> Asked:
+    model = trained_family.trained.model
     # The procedural family's performers are not told apart.
     points = model.bank.points(scene.controls, np.zeros((len(scene), 0)))
     fields = model.bank.numpy(points)
-    _, place = model.timing.numpy(fields["duration"], fields["warp"], scene.times[:, None])
-    below = np.minimum(place[:, 0].astype(int), model.timing.frames - 2)
-    share = (place - below[:, None]).astype(np.float32)
+    _, frame_position = model.timing.numpy(fields["duration"], fields["warp"], scene.times[:, None])
+    below = np.minimum(frame_position[:, 0].astype(int), model.timing.frames - 2)
+    share = (frame_position - below[:, None]).astype(np.float32)
     return Asked(scene, Questions(points.astype(np.float32), below, share))
 
 
@@ -99,19 +101,19 @@ def _ours(scene: Scene, levels: Indices) -> Callable[[], None]:
         for level in np.unique(levels).tolist():
             rows = np.flatnonzero(levels == level)
             for first in range(0, len(rows), BATCH):
-                part = rows[first : first + BATCH]
-                scene.model.session.run(controls[part], times[part], *OUTPUTS, level=level)
+                chunk = rows[first : first + BATCH]
+                scene.model.session.run(controls[chunk], times[chunk], *OUTPUTS, level=level)
 
     return run
 
 
-def _naive(content: Contents, asked: Asked) -> dict[str, Answer]:
-    made, field, questions = content.made, content.field, asked.questions
+def _naive(content: Contents, question: Asked) -> dict[str, Answer]:
+    trained_family, field, questions = content.trained_family, content.field, question.questions
     return {
-        SOLVED: crowd_frames.solved(made, field, questions),
-        DUAL: crowd_frames.dual(made, field, questions),
-        GATHERED: _graph(content.batch(), asked.scene),
-        GATHERED_DUAL: _graph(content.batch_dual(), asked.scene),
+        SOLVED: crowd_frames.solved(trained_family, field, questions),
+        DUAL: crowd_frames.dual(trained_family, field, questions),
+        GATHERED: _graph(content.batch(), question.scene),
+        GATHERED_DUAL: _graph(content.batch_dual(), question.scene),
     }
 
 
@@ -123,21 +125,21 @@ def _graph(content: bytes, scene: Scene) -> Answer:
     controls, times = scene.controls.astype("f4"), scene.times[:, None].astype("f4")
 
     def run() -> list[Singles]:
-        parts = (slice(first, first + TOGETHER) for first in range(0, len(scene), TOGETHER))
+        slices = (slice(first, first + TOGETHER) for first in range(0, len(scene), TOGETHER))
         return [
             np.concatenate(
-                [session.run(None, {"controls": controls[p], "time": times[p]})[0] for p in parts]
+                [session.run(None, {"controls": controls[p], "time": times[p]})[0] for p in slices]
             )
         ]
 
     return run
 
 
-def _scipy(made: Family, questions: Questions) -> Answer:
-    values = naive_graphs.numbers(made, VECTORS)[..., 3:]
-    samples = made.trained.model.bank.pose.samples
+def _scipy(trained_family: Family, questions: Questions) -> Answer:
+    values = naive_graphs.numbers(trained_family, VECTORS)[..., 3:]
+    samples = trained_family.trained.model.bank.pose.samples
     field = RBFInterpolator(samples, values.reshape(len(values), -1), degree=1)
-    means = made.trained.model.decoder.means.astype(np.float32)
+    means = trained_family.trained.model.decoder.means.astype(np.float32)
 
     def run() -> list[Singles]:
         motions = field(questions.points).reshape(len(questions.points), *values.shape[1:])
@@ -149,7 +151,7 @@ def _scipy(made: Family, questions: Questions) -> Answer:
     return run
 
 
-def _check(content: Contents, asked: Asked) -> None:
-    scene = asked.scene
-    rivals = _naive(content, asked)
+def _check(content: Contents, question: Asked) -> None:
+    scene = question.scene
+    rivals = _naive(content, question)
     naive_graphs.check(content, rivals, scene.controls, scene.times[:, None])

@@ -65,15 +65,15 @@ class Scene:
 def around(model: Synthesizer, count: int) -> Scene:
     """Scene of so many characters; the same at every call."""
     rng = np.random.Generator(np.random.PCG64(count))
-    known = model.session.card.controls
-    low, high = np.array([(control.minimum, control.maximum) for control in known]).T
-    controls = rng.uniform(low, high, (count, len(known)))
+    card_controls = model.session.card.controls
+    low, high = np.array([(control.minimum, control.maximum) for control in card_controls]).T
+    controls = rng.uniform(low, high, (count, len(card_controls)))
     # Nobody stands where the camera is: the ring begins a step from it.
     inner = (model.radius + 0.5) ** 2
     away = np.sqrt(rng.uniform(inner, inner + ROOM * count / np.pi, count))
     angles = rng.uniform(0.0, 2.0 * np.pi, count)
-    places = np.stack([away * np.sin(angles), np.zeros(count), away * np.cos(angles)], axis=1)
-    placement = Placement(places, rng.uniform(-np.pi, np.pi, count))
+    positions = np.stack([away * np.sin(angles), np.zeros(count), away * np.cos(angles)], axis=1)
+    placement = Placement(positions, rng.uniform(-np.pi, np.pi, count))
     return Scene(model, controls, rng.uniform(0.0, 1.0, count) * _ends(model, controls), placement)
 
 
@@ -81,8 +81,10 @@ def _ends(model: Synthesizer, controls: Floats) -> Floats:
     """Durations (N,), s, that every level agrees to."""
     start = np.zeros((len(controls), 1))
     levels = range(len(model.session.card.levels))
-    ends = [model.session.run(controls, start, "duration", level=level)[0] for level in levels]
-    return np.min(ends, axis=0).astype(float)
+    end_points = [
+        model.session.run(controls, start, "duration", level=level)[0] for level in levels
+    ]
+    return np.min(end_points, axis=0).astype(float)
 
 
 def mix(levels: Indices, count: int) -> str:

@@ -41,15 +41,15 @@ def rows() -> list[Row]:
             "lists": _schemas(person, unique, LISTED, _lists, folder / "lists.usdc"),
             "arrays": _schemas(person, unique, COPIED, _arrays, folder / "arrays.usdc"),
         }
-        taken = in_turn(runs, rounds=5, repeats=1)
-    lists, arrays = CHARACTERS / LISTED * taken["lists"], CHARACTERS / COPIED * taken["arrays"]
+        timings = in_turn(runs, rounds=5, repeats=1)
+    lists, arrays = CHARACTERS / LISTED * timings["lists"], CHARACTERS / COPIED * timings["arrays"]
     return [
-        _row(".usd and a layer for each motion", taken["usd"], 0.5),
-        _row(".usdz of the same layers", taken["usdz"], 0.5),
-        _row("one .usdc", taken["usdc"], None),
-        _row(f".usd, {SHARED} motions shared", taken["shared"], 0.1),
-        _against(f"a Gf value a joint; {LISTED} characters timed", lists, taken["usd"]),
-        _against(f"arrays from NumPy; {COPIED} characters timed", arrays, taken["usd"]),
+        _row(".usd and a layer for each motion", timings["usd"], 0.5),
+        _row(".usdz of the same layers", timings["usdz"], 0.5),
+        _row("one .usdc", timings["usdc"], None),
+        _row(f".usd, {SHARED} motions shared", timings["shared"], 0.1),
+        _against(f"a Gf value a joint; {LISTED} characters timed", lists, timings["usd"]),
+        _against(f"arrays from NumPy; {COPIED} characters timed", arrays, timings["usd"]),
     ]
 
 
@@ -62,22 +62,22 @@ def _against(words: str, theirs: float, ours: float) -> Row:
     return Row("crowd to disk: .usd, against", ours, "s", baseline, theirs / ours, None)
 
 
-def _ours(person: Skeleton, made: Motions, path: Path) -> Callable[[], None]:
-    played = np.arange(CHARACTERS) % len(made)
-    return lambda: crowd_writer.write(_crowd(person, made, played), path)
+def _ours(person: Skeleton, motions: Motions, path: Path) -> Callable[[], None]:
+    played = np.arange(CHARACTERS) % len(motions)
+    return lambda: crowd_writer.write(_crowd(person, motions, played), path)
 
 
-def _crowd(person: Skeleton, made: Motions, played: Indices) -> CrowdClip:
+def _crowd(person: Skeleton, motions: Motions, played: Indices) -> CrowdClip:
     rng = np.random.default_rng(1)
     positions = rng.uniform(-50, 50, (len(played), 3)) * (1, 0, 1)
     placement = Placement(positions, rng.uniform(-np.pi, np.pi, len(played)))
-    return CrowdClip(person, 30.0, FRAMES, placement, played, _batches(made), {"seed": 1})
+    return CrowdClip(person, 30.0, FRAMES, placement, played, _batches(motions), {"seed": 1})
 
 
-def _batches(made: Motions) -> Iterator[Motions]:
-    for start in range(0, len(made), BATCH):
-        part = slice(start, start + BATCH)
-        arrays = (None if value is None else value[part] for value in vars(made).values())
+def _batches(motions: Motions) -> Iterator[Motions]:
+    for start in range(0, len(motions), BATCH):
+        chunk = slice(start, start + BATCH)
+        arrays = (None if value is None else value[chunk] for value in vars(motions).values())
         yield Motions(*arrays)
 
 
@@ -106,24 +106,24 @@ def _motions(person: Skeleton, count: int) -> Motions:
 Convert = Callable[[Motions, int, int], tuple[Any, Any]]
 
 
-def _lists(made: Motions, index: int, frame: int) -> tuple[Any, Any]:
-    offsets = [made.root_position[index, frame], *made.bone_offsets[index, 1:]]
-    turns = made.rotations[index, frame].tolist()
+def _lists(motions: Motions, index: int, frame: int) -> tuple[Any, Any]:
+    offsets = [motions.root_position[index, frame], *motions.bone_offsets[index, 1:]]
+    turns = motions.rotations[index, frame].tolist()
     return (
         Vt.Vec3fArray([Gf.Vec3f(*offset.tolist()) for offset in offsets]),
         Vt.QuatfArray([Gf.Quatf(w, x, y, z) for w, x, y, z in turns]),
     )
 
 
-def _arrays(made: Motions, index: int, frame: int) -> tuple[Any, Any]:
-    offsets = made.bone_offsets[index].copy()
-    offsets[0] = made.root_position[index, frame]
-    turns = np.roll(made.rotations[index, frame], -1, axis=-1)
+def _arrays(motions: Motions, index: int, frame: int) -> tuple[Any, Any]:
+    offsets = motions.bone_offsets[index].copy()
+    offsets[0] = motions.root_position[index, frame]
+    turns = np.roll(motions.rotations[index, frame], -1, axis=-1)
     return Vt.Vec3fArray.FromNumpy(offsets), Vt.QuatfArray.FromNumpy(turns)
 
 
 def _schemas(
-    person: Skeleton, made: Motions, count: int, convert: Convert, path: Path
+    person: Skeleton, motions: Motions, count: int, convert: Convert, path: Path
 ) -> Callable[[], None]:
     """Return a function that writes `count` characters as the schema API's examples do."""
 
@@ -131,14 +131,14 @@ def _schemas(
         path.unlink(missing_ok=True)
         stage = Usd.Stage.CreateNew(str(path))
         for index in range(count):
-            _character(stage, f"/Crowd/c{index:05}", person, made, index, convert)
+            _character(stage, f"/Crowd/c{index:05}", person, motions, index, convert)
         stage.Save()
 
     return run
 
 
 def _character(
-    stage: Any, at: str, person: Skeleton, made: Motions, index: int, convert: Convert
+    stage: Any, at: str, person: Skeleton, motions: Motions, index: int, convert: Convert
 ) -> None:
     joints = character.joint_paths(character.legal_names(person.names), person.parents)
     root = UsdSkel.Root.Define(stage, at)
@@ -155,7 +155,7 @@ def _character(
     moves, turns = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()
     animation.CreateScalesAttr(Vt.Vec3hArray(len(joints), Gf.Vec3h(1, 1, 1)))
     for frame in range(FRAMES):
-        for attribute, value in zip((moves, turns), convert(made, index, frame), strict=True):
+        for attribute, value in zip((moves, turns), convert(motions, index, frame), strict=True):
             attribute.Set(value, frame)
 
 

@@ -49,9 +49,9 @@ class Walk:
 
     def levels(self) -> Indices:
         """Levels (K,) by view."""
-        seen, levels = ~np.isnan(self.scale), np.zeros(len(self.scale), dtype=np.int64)
-        levels[seen] = level_selection.select_by_error(
-            self.model.level_table.errors, self.scale[seen], LIMIT
+        visible, levels = ~np.isnan(self.scale), np.zeros(len(self.scale), dtype=np.int64)
+        levels[visible] = level_selection.select_by_error(
+            self.model.level_table.errors, self.scale[visible], LIMIT
         )
         return levels
 
@@ -75,18 +75,18 @@ class Walk:
         return run
 
     def _answer(self, level: int, rows: Indices) -> list[Singles]:
-        asked = self.controls[rows], self.times[rows]
-        return self.model.session.run(*asked, *OUTPUTS, labels=self.labels[rows], level=level)
+        question = self.controls[rows], self.times[rows]
+        return self.model.session.run(*question, *OUTPUTS, labels=self.labels[rows], level=level)
 
     def joints(self, levels: Indices, which: Indices) -> Floats:
         """Joints (W, J, 3), m, of some of the poses, in each character's own frame."""
         card = self.model.session.card
-        found = np.empty((len(which), len(card.skeleton), 3))
+        values = np.empty((len(which), len(card.skeleton), 3))
         for level, rows in _parts(levels[which]):
             turns, root, bones = self._answer(level, which[rows])[:3]
             local = skeleton.translations(bones, root)
-            found[rows] = skeleton.forward_kinematics(card.skeleton.parents, turns, local)[0][:, 0]
-        return found
+            values[rows] = skeleton.forward_kinematics(card.skeleton.parents, turns, local)[0][:, 0]
+        return values
 
 
 def _parts(levels: Indices) -> Iterator[tuple[int, Indices]]:
@@ -102,12 +102,12 @@ def rows(walks: dict[str, Gait]) -> list[Row]:
 
 def _walk_rows(name: str, gait: Gait) -> list[Row]:
     plan = walking_crowd.plan_random(gait, COUNT, SECONDS, RATE, seed=0)
-    own = float(np.ptp(plan.places[:, 0].real))
-    found = []
-    for extent in (own, *EXTENTS):
-        walk = _walk(gait, _spread(plan, extent / own))
-        found += _rows(f"{name}, {COUNT} characters on {extent:.0f} m", walk)
-    return found
+    path_width = float(np.ptp(plan.places[:, 0].real))
+    table_rows = []
+    for extent in (path_width, *EXTENTS):
+        walk = _walk(gait, _spread(plan, extent / path_width))
+        table_rows += _rows(f"{name}, {COUNT} characters on {extent:.0f} m", walk)
+    return table_rows
 
 
 def _spread(plan: LocomotionPlan, factor: float) -> LocomotionPlan:
@@ -145,13 +145,13 @@ def _rows(name: str, walk: Walk) -> list[Row]:
         "live, finest": walk.live(everybody),
         "choice": walk.levels,
     }
-    taken = in_turn(runs, rounds=5, repeats=1)
+    timings = in_turn(runs, rounds=5, repeats=1)
     mix = crowd_scene.mix(levels, len(walk.model.session.card.levels))
-    chosen = f"chosen in {1e3 * taken['choice']:.2g} ms"
+    chosen = f"chosen in {1e3 * timings['choice']:.2g} ms"
     words = f"one thread, {mix}, {chosen}; all at the finest: {{:.3g}} s"
     return [
-        _row(f"{name}, {SECONDS:g} s posed", taken["auto"], taken["finest"], words),
-        _row(f"{name}, posed frame by frame", taken["live"], taken["live, finest"], "{:.3g} s"),
+        _row(f"{name}, {SECONDS:g} s posed", timings["auto"], timings["finest"], words),
+        _row(f"{name}, posed frame by frame", timings["live"], timings["live, finest"], "{:.3g} s"),
         _error_row(name, walk, levels),
     ]
 
@@ -166,12 +166,14 @@ def _error_row(name: str, walk: Walk, levels: Indices) -> Row:
     gaps = walk.joints(levels, which) - walk.joints(np.zeros_like(levels), which)
     # Those the camera is in are at the finest level: there is no gap to project.
     pixels = np.linalg.norm(gaps, axis=-1) * np.nan_to_num(walk.scale[which])[:, None]
-    each = np.sqrt(np.mean(np.square(pixels), axis=1))
+    frame_errors = np.sqrt(np.mean(np.square(pixels), axis=1))
     near = ~(walk.scale[which] * walk.model.level_table.errors[0] <= LIMIT)
     words = (
-        f"{100 * np.mean(each > LIMIT):.2g} % of the characters beyond {LIMIT:g} pixel, "
+        f"{100 * np.mean(frame_errors > LIMIT):.2g} % of the characters beyond {LIMIT:g} pixel, "
         f"{100 * np.mean(pixels > LIMIT):.2g} % of the joints, the largest joint "
         f"{pixels.max():.2g}; {100 * np.mean(near):.2g} % of the characters so near that the "
         "finest level's own error covers more"
     )
-    return Row(f"{name}: the worst character", float(each.max()), "pixels", words, None, LIMIT)
+    return Row(
+        f"{name}: the worst character", float(frame_errors.max()), "pixels", words, None, LIMIT
+    )

@@ -52,19 +52,19 @@ class Discovery:
     seconds: float
 
 
-def discover(folder: Path, made: Path) -> Discovery:
+def discover(folder: Path, output: Path) -> Discovery:
     """Return the families of hdm05_long. made: folder for the recipes."""
     before = _seconds()
-    words = [COMMAND, "discover", folder / "bvh", "-o", made, "--licence", LICENCE]
+    words = [COMMAND, "discover", folder / "bvh", "-o", output, "--licence", LICENCE]
     subprocess.run(words, check=True, capture_output=True)
     seconds = _seconds() - before
     recordings = read_recordings(folder / "bvh").recordings
     cuts = hand_cuts.read(folder, recordings)
-    facts = json.loads((made / "discover.json").read_text(encoding="utf-8"))
+    facts = json.loads((output / "discover.json").read_text(encoding="utf-8"))
     names = [one["number"] for one in facts["families"] if one["kind"] == "motions"]
-    paths = [made / f"family_{number:02d}.toml" for number in names]
+    paths = [output / f"family_{number:02d}.toml" for number in names]
     families = [judge(path, recordings, cuts) for path in paths]
-    performers = {file: own["performer"] for file, own in facts["recordings"].items()}
+    performers = {file: fact["performer"] for file, fact in facts["recordings"].items()}
     return Discovery(tuple(recordings), tuple(cuts), tuple(families), performers, seconds)
 
 
@@ -81,44 +81,50 @@ def judge(recipe: Path, recordings: Sequence[Recording], cuts: Sequence[HandCut]
     for row in rows:
         at, rate = files[row.file]
         spans.append(Span(at, row.first_frame / rate, row.last_frame / rate))
-    own = [hand_cuts.same_cuts(span, cuts) for span in spans]
-    counted = Counter(cut.action for found in own for cut in found)
+    matches = [hand_cuts.same_cuts(span, cuts) for span in spans]
+    counted = Counter(cut.action for match in matches for cut in match)
     action = counted.most_common(1)[0][0] if counted else ""
     pairs = [
         (span, cut)
-        for span, found in zip(spans, own, strict=True)
-        for cut in found
+        for span, match in zip(spans, matches, strict=True)
+        for cut in match
         if cut.action == action
     ]
     return JudgedFamily(recipe, tuple(rows), action, tuple(pairs))
 
 
-def document(found: Discovery) -> Found:
+def document(discovery: Discovery) -> Found:
     """Return counts by action and in all, distances of the ends, and the processor time."""
-    actions = sorted({cut.action for cut in found.cuts})
+    actions = sorted({cut.action for cut in discovery.cuts})
     return {
-        "minutes": sum((len(recording) - 1) / recording.rate for recording in found.recordings)
+        "minutes": sum((len(recording) - 1) / recording.rate for recording in discovery.recordings)
         / 60.0,
-        "seconds": found.seconds,
-        "performers": len(set(found.performers.values())),
-        "actions": [{"action": action, **_counts_of(found, action)} for action in actions],
-        "all": counts(found.families, found.cuts),
-        "ends": ends(found.families),
+        "seconds": discovery.seconds,
+        "performers": len(set(discovery.performers.values())),
+        "actions": [{"action": action, **_counts_of(discovery, action)} for action in actions],
+        "all": counts(discovery.families, discovery.cuts),
+        "ends": ends(discovery.families),
     }
 
 
 def rows(document: Found) -> list[Row]:
     """Return shares of wrong clips and missed cuts, distances of ends and processor time."""
     counts, minutes = document["all"], document["minutes"]
-    ends = {name: round(seconds, 3) for name, seconds in document["ends"].items()}
+    end_points = {name: round(seconds, 3) for name, seconds in document["ends"].items()}
     wrong = 100.0 * (1.0 - counts["right"] / counts["clips"])
-    found = [
+    table_rows = [
         ("clips of families: wrong", wrong, "%", f"of {counts['clips']}", 10.0),
         _missed("all actions", counts, 20.0),
         *(_missed(action["action"], action, None) for action in document["actions"]),
-        ("ends from those of the cuts", ends["median"], "s", "median", None),
-        ("the same but for the median of a family", ends["convention_median"], "s", "median", 0.1),
-        ("its worst tenth", ends["convention_p90"], "s", "90th percentile", 0.3),
+        ("ends from those of the cuts", end_points["median"], "s", "median", None),
+        (
+            "the same but for the median of a family",
+            end_points["convention_median"],
+            "s",
+            "median",
+            0.1,
+        ),
+        ("its worst tenth", end_points["convention_p90"], "s", "90th percentile", 0.3),
         (
             "processor time",
             document["seconds"],
@@ -127,21 +133,23 @@ def rows(document: Found) -> list[Row]:
             5 * minutes,
         ),
     ]
-    return [Row(name, value, unit, remark, None, goal) for name, value, unit, remark, goal in found]
+    return [
+        Row(name, value, unit, remark, None, goal) for name, value, unit, remark, goal in table_rows
+    ]
 
 
 def _missed(
     action: str, counts: dict[str, int], goal: float | None
 ) -> tuple[str, float, str, str, float | None]:
-    missed = 100.0 * (1.0 - counts["found"] / counts["cuts"])
+    share = 100.0 * (1.0 - counts["found"] / counts["cuts"])
     remark = f"of {counts['cuts']}; {counts['families']} families of {counts['clips']} clips"
-    return f"{action}: cuts missed", missed, "%", remark, goal
+    return f"{action}: cuts missed", share, "%", remark, goal
 
 
-def _counts_of(found: Discovery, action: str) -> dict[str, int]:
+def _counts_of(discovery: Discovery, action: str) -> dict[str, int]:
     return counts(
-        [one for one in found.families if one.action == action],
-        [cut for cut in found.cuts if cut.action == action],
+        [one for one in discovery.families if one.action == action],
+        [cut for cut in discovery.cuts if cut.action == action],
     )
 
 
@@ -163,15 +171,19 @@ def ends(families: Sequence[JudgedFamily]) -> dict[str, float]:
     action where they choose to.
     """
     signed = [
-        np.array([(one.start - cut.span.start, one.end - cut.span.end) for one, cut in own.pairs])
-        for own in families
-        if own.pairs
+        np.array(
+            [(one.start - cut.span.start, one.end - cut.span.end) for one, cut in family.pairs]
+        )
+        for family in families
+        if family.pairs
     ]
-    every = np.abs(np.concatenate(signed))
-    rest = np.abs(np.concatenate([each - np.median(each, axis=0) for each in signed]))
+    all_values = np.abs(np.concatenate(signed))
+    rest = np.abs(
+        np.concatenate([differences - np.median(differences, axis=0) for differences in signed])
+    )
     return {
-        "median": float(np.median(every)),
-        "p90": float(np.percentile(every, 90)),
+        "median": float(np.median(all_values)),
+        "p90": float(np.percentile(all_values, 90)),
         "convention_median": float(np.median(rest)),
         "convention_p90": float(np.percentile(rest, 90)),
     }

@@ -28,30 +28,30 @@ SAME_STRIDE = 0.8
 
 def strides(folder: Path) -> list[Row]:
     """Return the figures of strides against those of strides.csv, at 120 frames a second."""
-    found = {
+    strides_found = {
         recording.file: [one for one in found_clips.find_strides(recording) if one.travels]
         for recording in read_recordings(folder).recordings
     }
     cuts = hand_cuts.records(folder / "strides.csv")
-    apart = []
+    differences = []
     for row in cuts:
         first, last = int(row["start_frame"]), int(row["end_frame"])
-        for one in found.get(row["file"], []):
+        for one in strides_found.get(row["file"], []):
             common = min(one.last, last) - max(one.first, first)
             if common > SAME_STRIDE * (max(one.last, last) - min(one.first, first)):
-                apart.append((abs(one.first - first), abs(one.last - last)))
-    several = sum(map(len, found.values()))
-    missed = 100.0 * (1.0 - len(apart) / len(cuts))
-    said = f"of {len(cuts)} cut by hand; {several} found in all"
-    middle, most = float(np.median(apart)), float(np.percentile(apart, 90))
+                differences.append((abs(one.first - first), abs(one.last - last)))
+    several = sum(map(len, strides_found.values()))
+    missed_share = 100.0 * (1.0 - len(differences) / len(cuts))
+    note = f"of {len(cuts)} cut by hand; {several} found in all"
+    middle, largest = float(np.median(differences)), float(np.percentile(differences, 90))
     return [
-        Row("strides: missed", missed, "%", said, None, 3.0),
+        Row("strides: missed", missed_share, "%", note, None, 3.0),
         Row("strides: cuts apart, median", middle, "frames", "120 frames a second", None, 1.0),
         Row(
             "strides: cuts apart, 90th percentile",
-            most,
+            largest,
             "frames",
-            f"worst {np.max(apart)}",
+            f"worst {np.max(differences)}",
             None,
             4.0,
         ),
@@ -69,33 +69,38 @@ def examples(folder: Path) -> list[Row]:
     precisions = defaultdict(list)
     rounds: dict[str, list[float]] = {"first": [], "least sure": []}
     for action, example in truth:
-        others = [span for own, span in truth if own == action and span != example]
-        found = _spans(family_search.find_like(corpus, [example], len(others)))
-        right = [one for one in found if hand_cuts.is_right(one, others)]
-        precisions[action].append(len(right) / len(others))
-        wrong = [one for one in found if one not in right][:REJECTED]
+        rest = [span for precision, span in truth if precision == action and span != example]
+        similar = _spans(family_search.find_like(corpus, [example], len(rest)))
+        right = [one for one in similar if hand_cuts.is_right(one, rest)]
+        precisions[action].append(len(right) / len(rest))
+        wrong = [one for one in similar if one not in right][:REJECTED]
         for name, accepted in (("first", right[:ACCEPTED]), ("least sure", right[-ACCEPTED:])):
-            most = len(others) - len(accepted)
-            again = family_search.find_like(corpus, [example, *accepted], most, wrong)
+            largest = len(rest) - len(accepted)
+            again = family_search.find_like(corpus, [example, *accepted], largest, wrong)
             several = [*accepted, *_spans(again)]
-            rounds[name].append(
-                sum(hand_cuts.is_right(one, others) for one in several) / len(others)
-            )
+            rounds[name].append(sum(hand_cuts.is_right(one, rest) for one in several) / len(rest))
     spent = time.process_time() - begin
-    every = [each for own in precisions.values() for each in own]
+    all_values = [value for precision in precisions.values() for value in precision]
     worst = min(precisions, key=lambda action: np.mean(precisions[action]))
     counts = Counter(action for action, _ in truth)
-    said = f"{len(truth)} examples of {len(counts)} actions; worst {worst}, "
-    said += f"{100.0 * (1.0 - np.mean(precisions[worst])):.0f} %"
+    note = f"{len(truth)} examples of {len(counts)} actions; worst {worst}, "
+    note += f"{100.0 * (1.0 - np.mean(precisions[worst])):.0f} %"
     minutes = sum(len(recording) / recording.rate for recording in recordings) / 60.0
     files_said = f"{minutes:.1f} minutes in {len(recordings)} recordings"
     queries = len(truth) * (1 + 2 * (1 + ACCEPTED))
     accepts = f"{ACCEPTED} accepted, those included, and {REJECTED} rejected"
     return [
-        Row("one example: missed by the best R", _missed(every), "%", said, None, 12.0),
+        Row("one example: missed by the best R", _missed(all_values), "%", note, None, 12.0),
         *(
-            Row(f"a second round, the {name} right ones", _missed(own), "%", accepts, None, 5.0)
-            for name, own in rounds.items()
+            Row(
+                f"a second round, the {name} right ones",
+                _missed(precision),
+                "%",
+                accepts,
+                None,
+                5.0,
+            )
+            for name, precision in rounds.items()
         ),
         Row("processor time of reading and features", reading, "s", files_said, None, 60.0),
         Row("processor time of an example", 1e3 * spent / queries, "ms", "mean", None, None),
@@ -115,12 +120,12 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder with cmu_walk and hdm05_long, unpacked")
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args(arguments)
-    found = [*strides(given.data / "cmu_walk"), *examples(given.data / "hdm05_long")]
-    print(table(found))
-    if given.record:
+    options = parser.parse_args(arguments)
+    table_rows = [*strides(options.data / "cmu_walk"), *examples(options.data / "hdm05_long")]
+    print(table(table_rows))
+    if options.record:
         command = "python benchmarks/discovery.py DATA --record"
-        record({"discovered": found}, command, ROOT / "docs/results")
+        record({"discovered": table_rows}, command, ROOT / "docs/results")
 
 
 if __name__ == "__main__":

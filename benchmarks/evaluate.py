@@ -34,9 +34,9 @@ def measure(file: Path, data: Path, jobs: Jobs) -> dict[str, Any]:
         with ProgressBar(f"{family.name}, {name}") as bar:
             results.append(protocol.run(family, examples, name, jobs, bar.update))
         print(f"{summary.table(results[-1].errors)}\n")
-    first, *others = [result.facts() for result in results]
+    first, *rest = [result.facts() for result in results]
     performers = new_performers.facts([result.errors for result in results])
-    return {**first, **({"performers": performers} if performers else {}), "others": others}
+    return {**first, **({"performers": performers} if performers else {}), "others": rest}
 
 
 def main() -> None:
@@ -45,12 +45,12 @@ def main() -> None:
     parser.add_argument("recipe", type=Path, help="recipe file or shipped recipe")
     parser.add_argument("--data", type=Path, help="folder of the motion data")
     parser.add_argument("--json", type=Path, help="file for the figures")
-    given = parser.parse_args()
-    file = data_folder.recipe_file(given.recipe, given.data)
+    options = parser.parse_args()
+    file = data_folder.recipe_file(options.recipe, options.data)
     with executors.jobs(None, None) as processes:
-        figures = measure(file, given.data or file.parent, FinishedJobs(processes, KEPT))
-    if given.json:
-        given.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+        figures = measure(file, options.data or file.parent, FinishedJobs(processes, KEPT))
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ class Asked:
     """An open model, a question to it, and targets of a hand at the end."""
 
     opened: Session
-    bench: LevelCorrector
+    corrector: LevelCorrector
     point: np.ndarray
     times: np.ndarray
     targets: tuple[PositionConstraint, ...]
@@ -46,41 +46,44 @@ class Asked:
 
         def run() -> object:
             state = self.state(frames)
-            held = self.bench.solve(self.bench.predict(state), [next(target)])
-            return held.poses(state.frames)
+            corrected = self.corrector.solve(self.corrector.predict(state), [next(target)])
+            return corrected.poses(state.frames)
 
         return run
 
 
-def rows(made: Family) -> list[Row]:
+def rows(trained_family: Family) -> list[Row]:
     """Compare a clip and a pose constrained to a target with each other and plain ones."""
-    asked = _asked(made)
+    questions = _asked(trained_family)
     runs = {
-        "plain clip": asked.plain(FRAMES),
-        "exact clip": asked.exact(FRAMES),
-        "plain pose": asked.plain(1),
-        "exact pose": asked.exact(1),
+        "plain clip": questions.plain(FRAMES),
+        "exact clip": questions.exact(FRAMES),
+        "plain pose": questions.plain(1),
+        "exact pose": questions.exact(1),
     }
-    taken = in_turn(runs, rounds=15, repeats=TARGETS)
-    clip, pose = taken["exact clip"], taken["exact pose"]
+    timings = in_turn(runs, rounds=15, repeats=TARGETS)
+    clip, pose = timings["exact clip"], timings["exact pose"]
     words = "the same as the model predicts it, one call of the graph"
     return [
         Row(f"exact clip of {FRAMES} frames, in process", 1e3 * clip, "ms", "", None, 2.5),
-        Row("its cost", clip / taken["plain clip"], "times", words, None, None),
+        Row("its cost", clip / timings["plain clip"], "times", words, None, None),
         Row("its cost", clip / pose, "times", "an exact pose, in process", None, None),
-        Row("cost of an exact pose", pose / taken["plain pose"], "times", words, None, None),
+        Row("cost of an exact pose", pose / timings["plain pose"], "times", words, None, None),
     ]
 
 
-def _asked(made: Family) -> Asked:
-    opened = session.open_bytes(made.exported.content, "reaching.onnx")
-    bench, point = constrained_motion.build_corrector(opened, 0), made.examples[4].controls[None]
+def _asked(trained_family: Family) -> Asked:
+    opened = session.open_bytes(trained_family.exported.content, "reaching.onnx")
+    corrector, point = (
+        constrained_motion.build_corrector(opened, 0),
+        trained_family.examples[4].controls[None],
+    )
     times = np.linspace(0.0, float(opened.run(point, None, "duration")[0][0]), FRAMES)
-    begun = bench.predict(opened.state(point, times))
+    predicted = corrector.predict(opened.state(point, times))
     joint, last = opened.card.skeleton.names.index("RightHand"), float(opened.card.frames - 1)
-    hand, _ = begun.scene.position_and_gradient(begun.numbers, joint, last)
+    hand, _ = predicted.scene.position_and_gradient(predicted.numbers, joint, last)
     ways = np.random.Generator(np.random.PCG64(TARGETS)).standard_normal((TARGETS, 3))
     ways *= OFF / np.linalg.norm(ways, axis=1, keepdims=True)
     moment = Measure("height", (joint,), "end")
-    targets = (PositionConstraint(("hand",), moment, (0, 1, 2), hand + way) for way in ways)
-    return Asked(opened, bench, point, times, tuple(targets))
+    targets = (PositionConstraint(("hand",), moment, (0, 1, 2), hand + offset) for offset in ways)
+    return Asked(opened, corrector, point, times, tuple(targets))

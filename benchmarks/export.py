@@ -82,7 +82,7 @@ class PeakMemory:
     def begin(self, total: int, done: int) -> None:
         """Show nothing."""
 
-    def advance(self, part: ChunkResult) -> None:
+    def advance(self, result: ChunkResult) -> None:
         """Record the peak memory."""
         self.peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
@@ -97,13 +97,13 @@ class PeakMemory:
 
 def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
     """Rates, ratios and shares, with what one process takes of memory."""
-    bench = Bench.of(model, clips, form)
-    taken = in_turn(
-        {name: partial(bench.seconds, name, process_pool.run_here) for name in layouts.LAYOUTS}
+    benchmark = Bench.of(model, clips, form)
+    timings = in_turn(
+        {name: partial(benchmark.seconds, name, process_pool.run_here) for name in layouts.LAYOUTS}
     )
     return [
-        *_rates(clips, form, taken),
-        *_shares(bench, form, taken["folder"] / clips),
+        *_rates(clips, form, timings),
+        *_shares(benchmark, form, timings["folder"] / clips),
         _processes(Bench.of(model, LONGER * clips, form), LONGER * clips, form),
         _memory(model, clips, form),
     ]
@@ -111,95 +111,95 @@ def rows(model: Path, clips: int = CLIPS, form: str = FORM) -> list[Row]:
 
 def in_turn(runs: dict[str, Callable[[], float]]) -> dict[str, float]:
     """Median seconds of each."""
-    taken: dict[str, list[float]] = {name: [] for name in runs}
+    timings: dict[str, list[float]] = {name: [] for name in runs}
     for _ in range(ROUNDS):
         for name, one in runs.items():
-            taken[name].append(one())
-    return {name: statistics.median(seconds) for name, seconds in taken.items()}
+            timings[name].append(one())
+    return {name: statistics.median(seconds) for name, seconds in timings.items()}
 
 
-def _rates(clips: int, form: str, taken: dict[str, float]) -> list[Row]:
-    loose = taken["folder"]
+def _rates(clips: int, form: str, timings: dict[str, float]) -> list[Row]:
+    loose = timings["folder"]
     what = f"export of {clips} clips as {form} by one process"
     goal = FAST * loose / clips
     first = Row(f"{what} to folders", clips / loose, "clips/s", "2,000 a second", 1 / goal, 1.0)
-    others = [
+    rest = [
         Row(f"{what}: {name}", clips / seconds, "clips/s", "folders", loose / seconds, None)
-        for name, seconds in taken.items()
+        for name, seconds in timings.items()
         if name != "folder"
     ]
-    return [first, *others]
+    return [first, *rest]
 
 
-def _processes(bench: Bench, clips: int, form: str) -> Row:
-    taken = in_turn(
+def _processes(benchmark: Bench, clips: int, form: str) -> Row:
+    timings = in_turn(
         {
-            "one": partial(bench.seconds, "folder", process_pool.run_here),
-            "two": partial(bench.seconds, "folder", process_pool.runner(2)),
+            "one": partial(benchmark.seconds, "folder", process_pool.run_here),
+            "two": partial(benchmark.seconds, "folder", process_pool.runner(2)),
         }
     )
     name = f"export of {clips} clips as {form} by two processes, their beginning included"
-    ratio = taken["one"] / taken["two"]
-    return Row(name, clips / taken["two"], "clips/s", "one process", ratio, TWICE)
+    ratio = timings["one"] / timings["two"]
+    return Row(name, clips / timings["two"], "clips/s", "one process", ratio, TWICE)
 
 
-def _shares(bench: Bench, form: str, whole: float) -> list[Row]:
+def _shares(benchmark: Bench, form: str, total: float) -> list[Row]:
     """Return the time of a clip in each stage, and the rest of the whole."""
-    seconds = _stages(bench, form)
-    seconds["all else: chunks, parts, folders"] = whole - sum(seconds.values())
+    seconds = _stages(benchmark, form)
+    seconds["all else: chunks, parts, folders"] = total - sum(seconds.values())
     return [
         Row(
             f"export of a clip as {form}: {name}",
-            1e6 * taken,
+            1e6 * timings,
             "µs",
             "the whole",
-            taken / whole,
+            timings / total,
             None,
         )
-        for name, taken in seconds.items()
+        for name, timings in seconds.items()
     ]
 
 
-def _stages(bench: Bench, form: str) -> dict[str, float]:
+def _stages(benchmark: Bench, form: str) -> dict[str, float]:
     """Seconds a clip of each stage, each done over many clips by itself."""
-    rows = bench.source.rows()
-    asked = [next(rows) for _ in range(STAGED)]
-    name = bench.work.job.model.partition("@")[0]
-    opened = model_registry.open_model(name, name, bench.work.model)
+    rows = benchmark.source.rows()
+    queries = [next(rows) for _ in range(STAGED)]
+    name = benchmark.work.job.model.partition("@")[0]
+    opened = model_registry.open_model(name, name, benchmark.work.model)
     encoder = CLIP_ENCODERS[form]
-    answers = [synthesize_clip(opened, query.question) for query in asked]
+    answers = [synthesize_clip(opened, query.question) for query in queries]
     files = encoder.write(answers, encoder.usual)
-    entries = partial(_entries, asked, answers, files)
+    entries = partial(_entries, queries, answers, files)
     with tempfile.TemporaryDirectory() as folder:
         target = open_target(folder)
         target.prepare()
-        named = [(f"{index}.{form}", content) for index, content in enumerate(files)]
+        named_files = [(f"{index}.{form}", content) for index, content in enumerate(files)]
         stages: dict[str, Callable[[], object]] = {
-            "synthesis": lambda: [synthesize_clip(opened, query.question) for query in asked],
+            "synthesis": lambda: [synthesize_clip(opened, query.question) for query in queries],
             "encoding": lambda: encoder.write(answers, encoder.usual),
             "checksum and line of the manifest": entries,
-            "file system": lambda: target.write(named),
+            "file system": lambda: target.write(named_files),
         }
-        taken = {name: _median(stage) / STAGED for name, stage in stages.items()}
-    source = bench.source
+        timings = {name: _median(stage) / STAGED for name, stage in stages.items()}
+    source = benchmark.source
     reading = _median(lambda: (run.check_rows(source, False), sum(1 for _ in source.rows())))
-    return {"queries, looked at and read": reading / sum(1 for _ in source.rows()), **taken}
+    return {"queries, looked at and read": reading / sum(1 for _ in source.rows()), **timings}
 
 
-def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:
+def _entries(queries: list, answers: list, files: list[bytes]) -> list[bytes]:
     return [
         manifest_line(exported_file(query.name, "clips/000/name", answer, content).entry)
-        for query, content, answer in zip(asked, files, answers, strict=True)
+        for query, content, answer in zip(queries, files, answers, strict=True)
     ]
 
 
 def _median(stage: Callable[[], object]) -> float:
-    taken = []
+    timings = []
     for _ in range(9):
         start = time.perf_counter()
         stage()
-        taken.append(time.perf_counter() - start)
-    return statistics.median(taken)
+        timings.append(time.perf_counter() - start)
+    return statistics.median(timings)
 
 
 def _memory(model: Path, clips: int, form: str) -> Row:
@@ -225,11 +225,11 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=CLIPS)
     parser.add_argument("--format", default=FORM)
     parser.add_argument("--long", type=int, default=0)
-    given = parser.parse_args()
-    found = rows(given.model, given.clips, given.format)
-    if given.long:
-        found.append(_memory(given.model, given.long, given.format))
-    print(table(found))
+    options = parser.parse_args()
+    table_rows = rows(options.model, options.clips, options.format)
+    if options.long:
+        table_rows.append(_memory(options.model, options.long, options.format))
+    print(table(table_rows))
 
 
 if __name__ == "__main__":

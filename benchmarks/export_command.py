@@ -44,38 +44,42 @@ CASES = (
 
 def rows(clips: int, rounds: int, before: Path | None) -> list[Row]:
     """Return the rates of all cases, and their ratios to the goals and to another checkout."""
-    found = []
+    table_rows = []
     for case in CASES:
         roots = {"now": ROOT} | ({} if before is None else {"before": before})
-        taken: dict[str, list[float]] = {name: [] for name in (*roots, "two")}
+        timings: dict[str, list[float]] = {name: [] for name in (*roots, "two")}
         for _ in range(rounds):
             for name, root in roots.items():
-                taken[name].append(seconds(case, root, clips, 1))
-            taken["two"].append(seconds(case, ROOT, clips, 2))
-        rates = {name: clips / median(own) for name, own in taken.items()}
-        found += _case_rows(case, clips, rates)
-    return found
+                timings[name].append(seconds(case, root, clips, 1))
+            timings["two"].append(seconds(case, ROOT, clips, 2))
+        rates = {name: clips / median(durations) for name, durations in timings.items()}
+        table_rows += _case_rows(case, clips, rates)
+    return table_rows
 
 
 def _case_rows(case: Case, clips: int, rates: dict[str, float]) -> list[Row]:
     name = f"export of {clips:,} clips to a folder, start included: {case.name}"
-    unit, own = "clips for each CPU second", rates["now"]
+    unit, rate = "clips for each CPU second", rates["now"]
     goal = f"{case.goal:,.0f} for each CPU second"
-    found = [Row(name, own, unit, goal, own / case.goal, 1.0)]
+    table_rows = [Row(name, rate, unit, goal, rate / case.goal, 1.0)]
     if "before" in rates:
         earlier = f"the commit before: {rates['before']:,.0f}"
-        found.append(Row(name, own, unit, earlier, own / rates["before"], None))
+        table_rows.append(Row(name, rate, unit, earlier, rate / rates["before"], None))
     two = f"{name}, by two processes"
     # Two processes take as much time as one where each takes no more for a clip.
-    found.append(Row(two, rates["two"], unit, "one process", rates["two"] / own, 0.85))
-    return found
+    table_rows.append(Row(two, rates["two"], unit, "one process", rates["two"] / rate, 0.85))
+    return table_rows
 
 
 def seconds(case: Case, root: Path, clips: int, workers: int) -> float:
     """Return the processor time of an export by a checkout, s, of all of its processes."""
     service = root / "service"
     model = service / "posefield/shipped" / f"{case.model}.onnx"
-    given = {"OPENBLAS_NUM_THREADS": "1", "ORT_DISABLE_TELEMETRY": "1", "PYTHONPATH": str(service)}
+    environment = {
+        "OPENBLAS_NUM_THREADS": "1",
+        "ORT_DISABLE_TELEMETRY": "1",
+        "PYTHONPATH": str(service),
+    }
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "posefield", "export", str(model)]
         options = ["-o", f"{folder}/clips", "--sample", str(clips), "--workers", str(workers)]
@@ -84,7 +88,7 @@ def seconds(case: Case, root: Path, clips: int, workers: int) -> float:
             [*command, *options, *case.options],
             check=True,
             capture_output=True,
-            env=os.environ | given,
+            env=os.environ | environment,
             cwd=folder,
         )
         return _children() - start
@@ -102,12 +106,12 @@ def main() -> None:
     parser.add_argument("--clips", type=int, default=4000)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args()
-    found = rows(given.clips, given.rounds, given.before)
-    print(table(found))
-    if given.record:
+    options = parser.parse_args()
+    table_rows = rows(options.clips, options.rounds, options.before)
+    print(table(table_rows))
+    if options.record:
         command = "python benchmarks/export_command.py --before FOLDER --record"
-        record({"exports": found}, command, ROOT / "docs/results/speed")
+        record({"exports": table_rows}, command, ROOT / "docs/results/speed")
 
 
 if __name__ == "__main__":

@@ -23,18 +23,18 @@ GOALS = {"glb": 5.0, "bvh": 5.0}
 """ms a clip: 200 clips a second and core."""
 
 
-def rows(made: Family) -> list[Row]:
+def rows(trained_family: Family) -> list[Row]:
     """Time the synthesis of a clip of 100 frames, and its writing in each format."""
-    model = Synthesizer("reaching", session.open_bytes(made.exported.content, "reaching"))
+    model = Synthesizer("reaching", session.open_bytes(trained_family.exported.content, "reaching"))
     question = _question(model)
     answers = [clips.synthesize_clip(model, question)] * BATCH
-    taken = in_turn(
+    timings = in_turn(
         {"synthesis": partial(_synthesised, model, question), **_writers(answers)},
         rounds=9,
         repeats=1,
     )
     joints = len(answers[0].clip.skeleton)
-    return [_row(name, seconds / BATCH, joints, answers[0]) for name, seconds in taken.items()]
+    return [_row(name, seconds / BATCH, joints, answers[0]) for name, seconds in timings.items()]
 
 
 def _question(model: Synthesizer) -> ClipQuestion:

@@ -43,16 +43,16 @@ def rows() -> list[Row]:
 
 
 def _layers(answers: list[ClipAnswer]) -> list[Row]:
-    one, made = answers[0], list(usd_clip.builders_and_contents(answers, METRES))
-    expected = [author.layer(content).ExportToString() for author, content in made]
+    one, builders = answers[0], list(usd_clip.builders_and_contents(answers, METRES))
+    expected = [author.layer(content).ExportToString() for author, content in builders]
     for _ in range(2):
         if list(map(layers.crate_text, usd_clip.usdc(answers, METRES))) != expected:
             raise AssertionError("usdc differs from what usd-core writes")
     with TemporaryDirectory(dir=FOLDER) as folder:
-        path, (author, content) = Path(folder, "clip.usdc"), made[0]
-        taken = in_turn(
+        path, (author, content) = Path(folder, "clip.usdc"), builders[0]
+        timings = in_turn(
             {
-                "filled": lambda: [crate_template.usdc(*each) for each in made],
+                "filled": lambda: [crate_template.usdc(*builder) for builder in builders],
                 "ours": lambda: usd_clip.usdc(answers, METRES),
                 "alone": lambda: usd_clip.usdc([one], METRES),
                 "sdf": lambda: _crate(*_first([one])),
@@ -63,17 +63,21 @@ def _layers(answers: list[ClipAnswer]) -> list[Row]:
             rounds=15,
             repeats=2,
         )
-    filled, ours = taken["filled"] / CLIPS, taken["ours"] / CLIPS
-    given, whole = "usdc, body and extent given", "usdc, body and extent made"
+    filled, ours = timings["filled"] / CLIPS, timings["ours"] / CLIPS
+    with_parts, without_parts = "usdc, body and extent given", "usdc, body and extent made"
     return [
-        _row(given, filled, f"UsdSkel schema API, {LISTS}", taken["lists"], 200.0),
-        _row(given, filled, f"UsdSkel schema API, {ARRAYS}", taken["arrays"], None),
-        _row(given, filled, "Sdf layer, the same", taken["layer"], 20.0),
+        _row(with_parts, filled, f"UsdSkel schema API, {LISTS}", timings["lists"], 200.0),
+        _row(with_parts, filled, f"UsdSkel schema API, {ARRAYS}", timings["arrays"], None),
+        _row(with_parts, filled, "Sdf layer, the same", timings["layer"], 20.0),
         _row(
-            whole, ours, f"UsdSkel schema API, {LISTS}, body and extent given", taken["lists"], None
+            without_parts,
+            ours,
+            f"UsdSkel schema API, {LISTS}, body and extent given",
+            timings["lists"],
+            None,
         ),
-        _row(whole, ours, "Sdf layer, the same one clip at a time", taken["sdf"], None),
-        _row(whole, ours, "ours, one clip at a time", taken["alone"], None),
+        _row(without_parts, ours, "Sdf layer, the same one clip at a time", timings["sdf"], None),
+        _row(without_parts, ours, "ours, one clip at a time", timings["alone"], None),
     ]
 
 
@@ -87,7 +91,7 @@ def _row(name: str, ours: float, words: str, theirs: float, goal: float | None) 
 
 def _package(answers: list[ClipAnswer]) -> list[Row]:
     one = answers[0]
-    taken = in_turn(
+    timings = in_turn(
         {
             "usdz": lambda: usd_clip.usdz(answers, METRES),
             "sdf": lambda: usd_clip.usdz_package(_crate(*_first([one]))),
@@ -96,13 +100,13 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
         repeats=2,
     )
     words = "Sdf layer and the same zip, one clip at a time"
-    ours = taken["usdz"] / CLIPS
-    return [_row("usdz, body and extent made", ours, words, taken["sdf"], None)]
+    ours = timings["usdz"] / CLIPS
+    return [_row("usdz, body and extent made", ours, words, timings["sdf"], None)]
 
 
 def _others(answers: list[ClipAnswer]) -> list[Row]:
     """Time an animation alone, a clip that warns, the first clips of a kind, a library."""
-    taken = in_turn(
+    timings = in_turn(
         {
             "whole": lambda: usd_clip.usdc(answers, METRES),
             "bare": lambda: usd_clip.animation_usdc(answers, METRES),
@@ -112,19 +116,24 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
         rounds=9,
         repeats=1,
     )
-    each = {name: 1e3 * seconds / CLIPS for name, seconds in taken.items()}
-    warned = each["warned"] / each["whole"]
+    milliseconds = {name: 1e3 * seconds / CLIPS for name, seconds in timings.items()}
+    warned = milliseconds["warned"] / milliseconds["whole"]
     entries = [
         usd_library.library_entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)
     ]
     some = list(itertools.islice(itertools.cycle(entries), ENTRIES))
     stage = in_turn({"stage": lambda: _stage(answers[0], some)}, rounds=1, repeats=1)["stage"]
     return [
-        Row("animation alone as usdc", each["bare"], "ms", SIZE, None, None),
+        Row("animation alone as usdc", milliseconds["bare"], "ms", SIZE, None, None),
         Row(
-            "clip as usdc, against", each["warned"], "ms", "with warnings of its own", warned, None
+            "clip as usdc, against",
+            milliseconds["warned"],
+            "ms",
+            "with warnings of its own",
+            warned,
+            None,
         ),
-        Row("template of a new kind", 1e3 * taken["new"], "ms", "and three clips", None, None),
+        Row("template of a new kind", 1e3 * timings["new"], "ms", "and three clips", None, None),
         Row(f"library stage of {ENTRIES} clips", stage, "s", "", None, None),
     ]
 
@@ -163,7 +172,7 @@ def _answers(count: int) -> list[ClipAnswer]:
     """Clips that differ in all that clips of one model can."""
     person, rng = _person(), np.random.default_rng(3)
     t = np.arange(FRAMES)[:, None, None] / 30
-    made = []
+    answers = []
     for _ in range(count):
         pace, phase = rng.uniform(0.5, 1.5, (2, JOINTS, 3))
         path = rng.uniform(-1, 1, 3) * (1, 0.05, 1) * t[:, 0] + (0, 0.9, 0)
@@ -171,10 +180,10 @@ def _answers(count: int) -> list[ClipAnswer]:
         clip = clips.assemble(person, quat.exp(np.sin(pace * t + phase)), path, offsets, 30.0)
         controls = {f"control {index}": float(rng.uniform()) for index in range(6)}
         duration, sigma = (float(np.float32(number)) for number in rng.uniform(0, 2, 2))
-        made.append(
+        answers.append(
             ClipAnswer(clip, Trust("walk@0123abcd", controls, None, 0, duration, sigma, True, ()))
         )
-    return made
+    return answers
 
 
 def _person() -> Skeleton:
@@ -231,32 +240,32 @@ def _schemas(clip: Clip, content: LayerContent, convert: Convert, path: Path) ->
 
 
 def _skeleton(stage: Any, rig: CharacterRig, content: LayerContent) -> Any:
-    made = UsdSkel.Skeleton.Define(stage, "/Character/Skel")
-    made.CreateJointsAttr(rig.paths)
-    made.CreateJointNamesAttr(character.legal_names(rig.names))
-    made.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["bind"]))
-    made.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["rest"]))
-    return made
+    skeleton = UsdSkel.Skeleton.Define(stage, "/Character/Skel")
+    skeleton.CreateJointsAttr(rig.paths)
+    skeleton.CreateJointNamesAttr(character.legal_names(rig.names))
+    skeleton.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["bind"]))
+    skeleton.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["rest"]))
+    return skeleton
 
 
 def _mesh(stage: Any, rig: CharacterRig, content: LayerContent, extent: Any) -> Any:
-    made = UsdGeom.Mesh.Define(stage, "/Character/Body")
-    made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(content.values["points"]))
-    made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(rig.body.normals))
-    made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    mesh = UsdGeom.Mesh.Define(stage, "/Character/Body")
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(content.values["points"]))
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(rig.body.normals))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     counts, corners = (Vt.IntArray.FromNumpy(a) for a in (rig.body.counts, rig.body.corners))
-    made.CreateFaceVertexCountsAttr(counts)
-    made.CreateFaceVertexIndicesAttr(corners)
-    made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    made.CreateExtentAttr(extent)
-    made.CreateDisplayColorAttr([Gf.Vec3f(0.75)])
-    binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
+    mesh.CreateFaceVertexCountsAttr(counts)
+    mesh.CreateFaceVertexIndicesAttr(corners)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateExtentAttr(extent)
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(0.75)])
+    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
     joints, weights = rig.body.joints.reshape(-1), rig.body.weights.reshape(-1) / np.float32(255)
-    each = rig.body.joints.shape[1]
-    binding.CreateJointIndicesPrimvar(False, each).Set(Vt.IntArray.FromNumpy(joints))
-    binding.CreateJointWeightsPrimvar(False, each).Set(Vt.FloatArray.FromNumpy(weights))
+    influences = rig.body.joints.shape[1]
+    binding.CreateJointIndicesPrimvar(False, influences).Set(Vt.IntArray.FromNumpy(joints))
+    binding.CreateJointWeightsPrimvar(False, influences).Set(Vt.FloatArray.FromNumpy(weights))
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
-    return made.GetPrim()
+    return mesh.GetPrim()
 
 
 if __name__ == "__main__":

@@ -58,8 +58,8 @@ def make(folder: Path) -> Family:
     path = sample_files.write_family(folder)
     start = time.perf_counter()
     with threadpool_limits(limits=1):
-        own = recipe.read(path)
-        trained = posefield_train.train(own, path.parent)
+        family_recipe = recipe.read(path)
+        trained = posefield_train.train(family_recipe, path.parent)
         exported = onnx_export.export_model(trained)
     return of(trained, exported, time.perf_counter() - start)
 

@@ -38,18 +38,18 @@ class Book:
     listening: bool = True
     ended: bool = False
 
-    def answered(self, known: Known, answer: Answer) -> None:
+    def answered(self, reference: Known, answer: Answer) -> None:
         """Note an answer to a question whose right answers are known."""
-        places = [i for i, right in enumerate(known.right) if answer.is_like(right)]
-        if places:
+        indices = [i for i, right in enumerate(reference.right) if answer.is_like(right)]
+        if indices:
             self.right[answer.status] += 1
-            if len(known.right) > 1 and len(places) == 1:
-                self.versions[places[0]] += 1
+            if len(reference.right) > 1 and len(indices) == 1:
+                self.versions[indices[0]] += 1
         elif not self.is_refusal(answer):
-            name = f"{known.question.method} {known.model}{known.question.rest[:60]}"
-            expected = " or ".join(f"{a.status} {a.headers.get('etag')}" for a in known.right)
-            found = f"{answer.status} {answer.headers.get('etag')} {answer.body[:200]!r}"
-            self.fault(f"{name}: {found}, expected {expected}")
+            name = f"{reference.question.method} {reference.model}{reference.question.rest[:60]}"
+            expected = " or ".join(f"{a.status} {a.headers.get('etag')}" for a in reference.right)
+            answer_text = f"{answer.status} {answer.headers.get('etag')} {answer.body[:200]!r}"
+            self.fault(f"{name}: {answer_text}, expected {expected}")
 
     def is_refusal(self, answer: Answer) -> bool:
         """Note a documented 503, or say that it is none."""
@@ -71,7 +71,7 @@ class Book:
     def unanswered(self, wire: Wire, what: str, reason: BaseException) -> None:
         """Note a request of a well-behaved client that was sent and not answered."""
         now = monotonic()
-        if any(wire.begun < when and now < when + NOTICED for when in self.killed):
+        if any(wire.opened_at < when and now < when + NOTICED for when in self.killed):
             self.broken += 1
         else:
             self.fault(f"{what}: not answered, {reason!r}")

@@ -19,14 +19,14 @@ class Site:
     """A service at a port, what is known of it, and what became of what was asked."""
 
     port: int
-    known: Sequence[Known]
+    references: Sequence[Known]
     book: Book
     seed: int
 
     def some(self, rng: random.Random, method: str | None = None) -> Known:
         """A question, of a method if one is given."""
         while True:
-            one = rng.choice(self.known)
+            one = rng.choice(self.references)
             if method in (None, one.question.method):
                 return one
 
@@ -52,7 +52,7 @@ async def asking(site: Site, rng: random.Random) -> None:
     wire = await _connected(site)
     for _ in range(rng.randint(1, 60)):
         await _ask(site, wire, [site.some(rng)])
-        if wire.told or site.book.ended:
+        if wire.is_closing or site.book.ended:
             break
         await asyncio.sleep(rng.choice((0, 0, 0.001, 0.01, 0.1)))
     wire.hang_up()
@@ -63,7 +63,7 @@ async def pipelining(site: Site, rng: random.Random) -> None:
     wire = await _connected(site)
     for _ in range(rng.randint(1, 10)):
         await _ask(site, wire, [site.some(rng) for _ in range(rng.randint(2, 12))])
-        if wire.told or site.book.ended:
+        if wire.is_closing or site.book.ended:
             break
     wire.hang_up()
 
@@ -77,8 +77,8 @@ async def bursting(site: Site, rng: random.Random) -> None:
 async def slowly_reading(site: Site, rng: random.Random) -> None:
     """Answers taken bit by bit are whole all the same."""
     wire = await _connected(site, receive=4096)
-    known = next(k for k in iter(lambda: site.some(rng, "POST"), None) if _is_long(k))
-    await _ask(site, wire, [known])
+    reference = next(k for k in iter(lambda: site.some(rng, "POST"), None) if _is_long(k))
+    await _ask(site, wire, [reference])
     wire.hang_up()
 
 
@@ -103,14 +103,14 @@ async def hanging_up_reading(site: Site, rng: random.Random) -> None:
 async def slowly_sending(site: Site, rng: random.Random) -> None:
     """A request bit by bit is answered as any other."""
     wire = await _connected(site)
-    known, pieces = site.some(rng, "POST"), 10
-    content, seconds = known.content, rng.choice((0.3, 1.0, 4.0))
+    reference, pieces = site.some(rng, "POST"), 10
+    content, seconds = reference.content, rng.choice((0.3, 1.0, 4.0))
     try:
         for number in range(pieces):
-            part = slice(*(len(content) * i // pieces for i in (number, number + 1)))
-            await wire.send(content[part])
+            chunk = slice(*(len(content) * i // pieces for i in (number, number + 1)))
+            await wire.send(content[chunk])
             await asyncio.sleep(seconds / pieces)
-        site.book.answered(known, await wire.answer())
+        site.book.answered(reference, await wire.answer())
     except GONE as reason:
         site.book.unanswered(wire, "slow request", reason)
         raise
@@ -142,7 +142,7 @@ async def watching(site: Site, rng: random.Random) -> None:
             site.book.unanswered(wire, path, reason)
             raise
         site.book.allowed(path, answer, {200})
-        if wire.told:
+        if wire.is_closing:
             break
     wire.hang_up()
     await asyncio.sleep(0.2)
@@ -163,17 +163,17 @@ async def _once(site: Site, rng: random.Random) -> None:
     wire.hang_up()
 
 
-async def _ask(site: Site, wire: Wire, asked: Sequence[Known]) -> None:
+async def _ask(site: Site, wire: Wire, requests: Sequence[Known]) -> None:
     """Send them together, and look at each answer until one says that it is the last."""
-    known = asked[0]
+    reference = requests[0]
     try:
-        await wire.send(b"".join(known.content for known in asked))
-        for known in asked:
-            site.book.answered(known, await wire.answer(known.question.method))
-            if wire.told:
+        await wire.send(b"".join(reference.content for reference in requests))
+        for reference in requests:
+            site.book.answered(reference, await wire.answer(reference.question.method))
+            if wire.is_closing:
                 return
     except GONE as reason:
-        question = known.question
+        question = reference.question
         site.book.unanswered(wire, f"{question.method} {question.rest[:60]}", reason)
         raise
 
@@ -192,8 +192,8 @@ async def _break(site: Site, name: str, content: bytes, statuses: set[int]) -> N
     wire.hang_up()
 
 
-def _is_long(known: Known) -> bool:
-    return len(known.right[0].body) > 50_000
+def _is_long(reference: Known) -> bool:
+    return len(reference.right[0].body) > 50_000
 
 
 def _head(*lines: str) -> bytes:

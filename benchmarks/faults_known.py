@@ -104,20 +104,22 @@ def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:
     of them all there are, and also to each of its versions by its hash."""
     sessions = [session.open_bytes(content, "version") for content in contents]
     questions = [*_questions(sessions[0].card.controls)]
-    found = []
+    references = []
     for name in names:
         versions = [Synthesizer(name, one) for one in sessions]
         apps = [create_app(ModelRegistry({name: model}), Settings()) for model in versions]
-        asked = questions if name == names[0] else questions[::FEWER]
-        own = [*asked, *_held(asked, name, apps)]
-        answers = [[asyncio.run(answered(app, q, name)) for app in apps] for q in own]
-        for question, right in zip(own, answers, strict=True):
+        requests = questions if name == names[0] else questions[::FEWER]
+        questions_of_model = [*requests, *_held(requests, name, apps)]
+        answers = [
+            [asyncio.run(answered(app, q, name)) for app in apps] for q in questions_of_model
+        ]
+        for question, right in zip(questions_of_model, answers, strict=True):
             assert right[0].status < 500
-            found.append(Known(question, name, tuple(right)))
+            references.append(Known(question, name, tuple(right)))
             if name == names[0]:
                 pairs = zip(versions, right, strict=True)
-                found += [Known(question, model.identity, (one,)) for model, one in pairs]
-    return found
+                references += [Known(question, model.identity, (one,)) for model, one in pairs]
+    return references
 
 
 async def answered(app: App, question: Question, model: str) -> Answer:
@@ -136,10 +138,10 @@ async def answered(app: App, question: Question, model: str) -> Answer:
         "headers": [(name.lower().encode(), value.encode()) for name, value in pairs],
     }
     sent: list[dict[str, Any]] = []
-    given = iter([{"type": "http.request", "body": question.body, "more_body": False}])
+    query = iter([{"type": "http.request", "body": question.body, "more_body": False}])
 
     async def receive() -> dict[str, Any]:
-        if (message := next(given, None)) is not None:
+        if (message := next(query, None)) is not None:
             return message
         # Nobody hangs up here.
         await asyncio.Event().wait()
@@ -167,8 +169,8 @@ def _questions(controls: Sequence[Control]) -> Iterator[Question]:
     yield from _poses(controls, rng)
     for extension in CLIP_ENCODERS:
         for _ in range(2):
-            asked = urlencode({**_point(controls, rng), "fps": rng.choice((25, 60))})
-            yield Question("GET", f"/clip.{extension}?{asked}")
+            query = urlencode({**_point(controls, rng), "fps": rng.choice((25, 60))})
+            yield Question("GET", f"/clip.{extension}?{query}")
         body = orjson.dumps({"controls": _point(controls, rng), "fps": 30})
         yield Question("POST", f"/clip.{extension}", JSON, body)
     for extension in CROWD_ENCODERS:
@@ -182,20 +184,20 @@ def _questions(controls: Sequence[Control]) -> Iterator[Question]:
 
 def _poses(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
     for _ in range(60):
-        asked = urlencode({**_point(controls, rng), "time": round(rng.random(), 3)})
-        yield Question("GET", f"/pose?{asked}")
+        query = urlencode({**_point(controls, rng), "time": round(rng.random(), 3)})
+        yield Question("GET", f"/pose?{query}")
     for extension in POSE_ENCODERS:
-        asked = urlencode({**_point(controls, rng), "time": round(rng.random(), 3), "level": 1})
-        yield Question("GET", f"/pose.{extension}?{asked}")
+        query = urlencode({**_point(controls, rng), "time": round(rng.random(), 3), "level": 1})
+        yield Question("GET", f"/pose.{extension}?{query}")
         times = [round(rng.random(), 3) for _ in range(5)]
         body = orjson.dumps({"controls": _point(controls, rng), "times": times})
         yield Question("POST", f"/pose.{extension}", JSON, body)
     for coding in ("gzip", "zstd"):
-        asked = urlencode({**_point(controls, rng), "time": 0.5})
-        yield Question("GET", f"/pose?{asked}", (f"Accept-Encoding: {coding}",))
-    asked = urlencode({**_point(controls, rng), "time": 0.5})
-    yield Question("HEAD", f"/pose?{asked}")
-    yield Question("GET", f"/pose?{asked}", ("Accept: application/vnd.msgpack",))
+        query = urlencode({**_point(controls, rng), "time": 0.5})
+        yield Question("GET", f"/pose?{query}", (f"Accept-Encoding: {coding}",))
+    query = urlencode({**_point(controls, rng), "time": 0.5})
+    yield Question("HEAD", f"/pose?{query}")
+    yield Question("GET", f"/pose?{query}", ("Accept: application/vnd.msgpack",))
 
 
 def _grids(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
@@ -209,11 +211,11 @@ def _grids(controls: Sequence[Control], rng: random.Random) -> Iterator[Question
 def _refused(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
     """Yield questions that violate the contract, or have no answer."""
     point = _point(controls, rng)
-    asked = urlencode({**point, "time": 0.1})
-    yield Question("GET", f"/pose?{asked}&time=nan")
-    yield Question("GET", f"/pose?{asked}&more=1")
-    yield Question("GET", f"/clip.fbx?{asked}")
-    yield Question("GET", f"/pose?{asked}", ("Accept: image/png",))
+    query = urlencode({**point, "time": 0.1})
+    yield Question("GET", f"/pose?{query}&time=nan")
+    yield Question("GET", f"/pose?{query}&more=1")
+    yield Question("GET", f"/clip.fbx?{query}")
+    yield Question("GET", f"/pose?{query}", ("Accept: image/png",))
     yield Question("DELETE", "/pose")
     yield Question("POST", "/pose", JSON, b'{"controls": {"stature": 1e400}, "times": [0]}')
     yield Question("POST", "/pose", JSON, b'{"controls": {')

@@ -52,12 +52,12 @@ class Stage:
 
     async def start(self) -> None:
         """Start the service; return once it listens."""
-        with self.log.open("ab") as said:
+        with self.log.open("ab") as log:
             self.child = await asyncio.create_subprocess_exec(
                 *(POSEFIELD, "serve", self.folder),
                 env={**os.environ, **SETTINGS, "POSEFIELD_PORT": str(self.port)},
                 stdout=asyncio.subprocess.PIPE,
-                stderr=said,
+                stderr=log,
             )
         assert self.child.stdout
         if not await self.child.stdout.readline():
@@ -88,8 +88,8 @@ class Stage:
 
     def complete(self) -> bool:
         """Return whether all workers answer; one that starts cannot open a file that is broken."""
-        own = self.workers()
-        return len(own) == WORKERS and all(accepts(pid, self.port) for pid in own)
+        workers = self.workers()
+        return len(workers) == WORKERS and all(accepts(pid, self.port) for pid in workers)
 
     async def watch(self) -> None:
         """Look at the workers' memory every second."""
@@ -106,13 +106,13 @@ class Stage:
 
     async def play(self, seconds: float, rng: random.Random) -> None:
         """Scenes for so many seconds, at least one of each kind."""
-        begun = monotonic()
+        start = monotonic()
         pause = 0.3 if seconds < 120 else 3.0
         rare = [(0.2, killing), (0.5, restarting), (0.75, killing)]
         turn = 0
-        while monotonic() - begun < seconds or rare or turn < len(MODEL_SCENES):
+        while monotonic() - start < seconds or rare or turn < len(MODEL_SCENES):
             await asyncio.sleep(pause)
-            if rare and monotonic() - begun > rare[0][0] * seconds:
+            if rare and monotonic() - start > rare[0][0] * seconds:
                 scene = rare.pop(0)[1]
             else:
                 scene, turn = MODEL_SCENES[turn % len(MODEL_SCENES)], turn + 1
@@ -153,10 +153,10 @@ async def breaking_newest(stage: Stage, rng: random.Random) -> None:
 async def breaking_in_place(stage: Stage, rng: random.Random) -> None:
     """A file is cut off where it lies; its place is taken by a whole one later."""
     path = stage.folder / "plain.onnx"
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
     await _settled(stage, lambda page: page["reload"]["faults"])
-    _put(path, whole)
+    _put(path, content)
     await _settled(stage, lambda page: not page["reload"]["faults"])
 
 
@@ -191,9 +191,9 @@ def _put(path: Path, content: bytes) -> None:
 async def _settled(stage: Stage, is_so: Callable[[dict], object]) -> None:
     """Until the service says so, several times, for a worker each time."""
     async with httpx.AsyncClient(timeout=30) as client:
-        seen, end = 0, monotonic() + 30
+        settled, end = 0, monotonic() + 30
 
-        while seen < 2 * WORKERS:
+        while settled < 2 * WORKERS:
             if monotonic() > end:
                 stage.book.fault("what lies in the folder was not noticed within 30 s")
                 return
@@ -203,7 +203,7 @@ async def _settled(stage: Stage, is_so: Callable[[dict], object]) -> None:
                 )
             except httpx.TransportError:
                 continue
-            seen = seen + 1 if page.status_code == 200 and is_so(page.json()) else 0
+            settled = settled + 1 if page.status_code == 200 and is_so(page.json()) else 0
             await asyncio.sleep(0.1)
 
 

@@ -14,13 +14,15 @@ PATIENCE = 60.0
 
 @dataclass
 class Wire:
-    """A connection; begun: when it was first asked for. told: whether an answer said that it is
-    the last."""
+    """A connection.
+
+    opened_at: when it was first asked for. is_closing: whether an answer said that it is the last.
+    """
 
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
-    begun: float
-    told: bool = False
+    opened_at: float
+    is_closing: bool = False
 
     async def send(self, content: bytes) -> None:
         """Send it all."""
@@ -39,7 +41,7 @@ class Wire:
         while text := (await self._line()).strip():
             name, _, value = text.decode("latin-1").partition(": ")
             headers[name.lower()] = value
-        self.told = headers.get("connection") == "close"
+        self.is_closing = headers.get("connection") == "close"
         return Answer(status, headers, await self._body(method, status, headers))
 
     async def _line(self) -> bytes:
@@ -67,15 +69,15 @@ class Wire:
 
 async def opened(port: int, receive: int | None = None) -> Wire:
     """A connection; receive: bytes that wait here at most, for those who take little at a time."""
-    begun, own = monotonic(), socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    own.setblocking(False)
+    start, connection = monotonic(), socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    connection.setblocking(False)
     if receive is not None:
-        own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive)
     try:
         async with asyncio.timeout(PATIENCE):
-            await asyncio.get_running_loop().sock_connect(own, ("127.0.0.1", port))
+            await asyncio.get_running_loop().sock_connect(connection, ("127.0.0.1", port))
     except BaseException:
-        own.close()
+        connection.close()
         raise
     limit = 1 << 16 if receive is None else receive
-    return Wire(*await asyncio.open_connection(sock=own, limit=limit), begun)
+    return Wire(*await asyncio.open_connection(sock=connection, limit=limit), start)

@@ -29,26 +29,26 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("data", choices=[*DATA])
     parser.add_argument("source", type=Path)
     parser.add_argument("output", type=Path)
-    given = parser.parse_args(words)
-    data, converter = DATA[given.data]
+    options = parser.parse_args(words)
+    data, converter = DATA[options.data]
     try:
-        found = converter.convert(given.source)
-        for file, reason in found.missing.items():
+        fetched = converter.convert(options.source)
+        for file, reason in fetched.missing.items():
             print(f"missing: {file}: {reason}", file=sys.stderr)
-        for one in found.files:
+        for one in fetched.files:
             if one.remark:
                 print(f"warning: {one.file}: {one.remark}", file=sys.stderr)
-        if not found.files:
-            missing = len(found.missing)
-            raise FileError(given.source, f"found none of {missing} clips; see {data.page}")
-        facts = data_sets.write(data, found, given.output)
+        if not fetched.files:
+            missing = len(fetched.missing)
+            raise FileError(options.source, f"found none of {missing} clips; see {data.page}")
+        facts = data_sets.write(data, fetched, options.output)
     except FileError as fault:
         print(f"fetch: {fault}", file=sys.stderr)
         return 3
-    total = len(found.files) + len(found.missing)
+    total = len(fetched.files) + len(fetched.missing)
     print(
-        f"{given.output / data.folder}: {len(found.files)} of {total} motions, {facts['rows']} "
-        f"rows of {data.table}; train with --data {given.output}\n{data.terms}"
+        f"{options.output / data.folder}: {len(fetched.files)} of {total} motions, {facts['rows']} "
+        f"rows of {data.table}; train with --data {options.output}\n{data.terms}"
     )
     return 0
 

@@ -31,32 +31,32 @@ MOST_WORSE = 5.0
 """Percent that a model of found clips may be worse."""
 
 
-def compare(found: Discovery, data: Path) -> list[dict[str, Any]]:
+def compare(discovery: Discovery, data: Path) -> list[dict[str, Any]]:
     """Return the errors of models of each action, cm. data: folder of the recordings."""
-    return [_compare(found, action, data) for action in ACTIONS]
+    return [_compare(discovery, action, data) for action in ACTIONS]
 
 
-def _compare(found: Discovery, action: str, data: Path) -> dict[str, Any]:
-    own = [one for one in found.families if one.action == action]
-    family = max(own, key=lambda one: len(one.pairs))
+def _compare(discovery: Discovery, action: str, data: Path) -> dict[str, Any]:
+    families = [one for one in discovery.families if one.action == action]
+    family = max(families, key=lambda one: len(one.pairs))
     by_hand = [
-        FamilyRow(cut.file, *cut.frames, found.performers[cut.file], Path(cut.file).stem)
-        for cut in found.cuts
+        FamilyRow(cut.file, *cut.frames, discovery.performers[cut.file], Path(cut.file).stem)
+        for cut in discovery.cuts
         if cut.action == action
     ]
-    told, automatic = _read(family, family.rows, data)
+    family_recipe, automatic = _read(family, family.rows, data)
     _, manual = _read(family, by_hand, data)
     errors: dict[str, list[tuple[float, float]]] = {"found": [], "by_hand": []}
     for performer in sorted({one.row.performer for one in manual}):
-        held = [one for one in manual if one.row.performer == performer]
+        held_out = [one for one in manual if one.row.performer == performer]
         for name, examples in (("found", automatic), ("by_hand", manual)):
             rest = [one for one in examples if one.row.performer != performer]
-            errors[name] += _errors(told, rest, held)
+            errors[name] += _errors(family_recipe, rest, held_out)
     return {
         "action": action,
         "clips": {"found": len(automatic), "by_hand": len(manual)},
-        "relative_cm": {name: 100.0 * _mean(own, 0) for name, own in errors.items()},
-        "absolute_rms_cm": {name: 100.0 * _rms(own, 1) for name, own in errors.items()},
+        "relative_cm": {name: 100.0 * _mean(families, 0) for name, families in errors.items()},
+        "absolute_rms_cm": {name: 100.0 * _rms(families, 1) for name, families in errors.items()},
     }
 
 
@@ -77,36 +77,38 @@ def _read(
         path = Path(folder) / family.recipe.name
         path.write_text(text, encoding="utf-8")
         path.with_suffix(".csv").write_bytes(found_families.table(rows))
-        own = recipe.read(path)
-        examples, _ = ingest.ingest(own, data)
-    return own, list(examples)
+        family_recipe = recipe.read(path)
+        examples, _ = ingest.ingest(family_recipe, data)
+    return family_recipe, list(examples)
 
 
 def _errors(
-    told: Recipe, rest: Sequence[Example], held: Sequence[Example]
+    family_recipe: Recipe, rest: Sequence[Example], held_out: Sequence[Example]
 ) -> list[tuple[float, float]]:
     """Return the relative mean and the absolute root mean square of each held-out clip, m."""
-    trained = train_examples(told, rest)
-    asked = Queries(np.stack([one.controls for one in held]), [{}] * len(held))
-    made = predictions.predict_posefield(trained, asked)
-    found = []
-    for one, answer in zip(held, made, strict=True):
+    trained = train_examples(family_recipe, rest)
+    queries = Queries(np.stack([one.controls for one in held_out]), [{}] * len(held_out))
+    predicted = predictions.predict_posefield(trained, queries)
+    motion_errors_found = []
+    for one, answer in zip(held_out, predicted, strict=True):
         captured = motion_errors.motion_of_clip(one.captured or one.clip, None)
         errors = motion_errors.compare_motions(answer, captured, ())
-        found.append((errors.relative.mean, errors.absolute.rms))
-    return found
+        motion_errors_found.append((errors.relative.mean, errors.absolute.rms))
+    return motion_errors_found
 
 
 def rows(models: Sequence[dict[str, Any]]) -> list[Row]:
     """Return how much farther models of found clips are than those of clips cut by hand."""
-    found = []
+    table_rows = []
     for model in models:
         clips, errors = model["clips"], model["relative_cm"]
         more = 100.0 * (errors["found"] / errors["by_hand"] - 1.0)
         remark = "{found} clips, {by_hand} by hand; ".format(**clips)
         remark += "{found:.2f} cm, {by_hand:.2f} cm by hand".format(**errors)
-        found.append(Row(f"{model['action']}: error", more, "% more", remark, None, MOST_WORSE))
-    return found
+        table_rows.append(
+            Row(f"{model['action']}: error", more, "% more", remark, None, MOST_WORSE)
+        )
+    return table_rows
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -114,13 +116,13 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="folder hdm05_long, unpacked")
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as made:
-        found = discovered_families.discover(given.folder, Path(made))
-        families = discovered_families.rows(discovered_families.document(found))
-        models = rows(compare(found, given.folder / "bvh"))
+    options = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        discovery = discovered_families.discover(options.folder, Path(folder))
+        families = discovered_families.rows(discovered_families.document(discovery))
+        models = rows(compare(discovery, options.folder / "bvh"))
     print(table([*families, *models]))
-    if given.record:
+    if options.record:
         command = "python benchmarks/found_models.py HDM05_LONG --record"
         record({"found_families": families, "found_models": models}, command, RESULTS)
 

@@ -68,20 +68,20 @@ LEVELS = ("finest", "coarsest", "by view")
 
 def crowd_rows(checkout: Path | None) -> list[Row]:
     """10,000 characters, one pose each: processor time of both threads."""
-    taken = _times(checkout)
-    ours = {name: median(times[i] for times in taken["ours"]) for i, name in enumerate(LEVELS)}
+    timings = _times(checkout)
+    ours = {name: median(times[i] for times in timings["ours"]) for i, name in enumerate(LEVELS)}
     ratio = ours["finest"] / ours["coarsest"]
-    found = []
+    table_rows = []
     for index, level in enumerate(LEVELS):
         name = f"{MANY:,} characters, a pose each, processor time of the whole call, {level}"
-        own = name, 1e3 * ours[level], "ms"
+        columns = name, 1e3 * ours[level], "ms"
         if level == "finest":
-            found.append(Row(*own, "the coarsest level", ratio, RATIO))
+            table_rows.append(Row(*columns, "the coarsest level", ratio, RATIO))
         if checkout:
-            pairs = zip(taken["earlier"], taken["ours"], strict=True)
+            pairs = zip(timings["earlier"], timings["ours"], strict=True)
             times = median(before[index] / after[index] for before, after in pairs)
-            found.append(Row(*own, "commit fa93c04", times, FASTER))
-    return found
+            table_rows.append(Row(*columns, "commit fa93c04", times, FASTER))
+    return table_rows
 
 
 def _times(checkout: Path | None) -> dict[str, list[list[float]]]:
@@ -91,13 +91,13 @@ def _times(checkout: Path | None) -> dict[str, list[list[float]]]:
     runs = [scene.poses(d) for d in (scene.all_at(0), scene.all_at(scene.coarsest), AUTO)]
     for run in runs:
         run()
-    taken: dict[str, list[list[float]]] = {"ours": [], "earlier": []}
+    timings: dict[str, list[list[float]]] = {"ours": [], "earlier": []}
     with _earlier(checkout) if checkout else nullcontext() as other:
         for _ in range(ROUNDS):
             if other:
-                taken["earlier"].append(other())
-            taken["ours"].append([_seconds(run) for run in runs])
-    return taken
+                timings["earlier"].append(other())
+            timings["ours"].append([_seconds(run) for run in runs])
+    return timings
 
 
 def _seconds(run: Callable[[], object]) -> float:
@@ -123,8 +123,8 @@ def _earlier(checkout: Path) -> Iterator[Callable[[], list[float]]]:
             def ask() -> list[float]:
                 sent.write(f"{REPEATS}\n")
                 sent.flush()
-                found: list[float] = json.loads(answers.readline())
-                return found
+                answer: list[float] = json.loads(answers.readline())
+                return answer
 
             yield ask
 
@@ -134,13 +134,13 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("checkout", type=Path, nargs="?")
     parser.add_argument("--record", action="store_true")
-    own = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        made = family.make(Path(folder, "reaching"))
-    rows = [*runtime.rows(made), *crowd_rows(own.checkout)]
+        trained_family = family.make(Path(folder, "reaching"))
+    rows = [*runtime.rows(trained_family), *crowd_rows(options.checkout)]
     rows = [row for row in rows if row.name not in ("model file", runtime.TRAINING)]
     print(table(rows))
-    if own.record:
+    if options.record:
         command = "python benchmarks/graph.py CHECKOUT --record"
         record({"graph": rows}, command, ROOT / "docs/results/speed")
 

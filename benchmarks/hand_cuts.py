@@ -26,13 +26,13 @@ class HandCut:
 def read(folder: Path, recordings: Sequence[Recording]) -> list[HandCut]:
     """Return the cuts of truth.csv. folder: that of the table, and of the recordings below bvh."""
     files = [recording.file for recording in recordings]
-    found = []
+    cuts = []
     for row in records(folder / "truth.csv"):
         recording = files.index(row["file"])
         frames = int(row["first_frame"]), int(row["last_frame"])
         span = Span(recording, *(at / recordings[recording].rate for at in frames))
-        found.append(HandCut(row["action"], row["performer"], row["file"], frames, span))
-    return found
+        cuts.append(HandCut(row["action"], row["performer"], row["file"], frames, span))
+    return cuts
 
 
 def records(path: Path) -> list[dict[str, str]]:
@@ -49,11 +49,11 @@ def shared(one: Span, other: Span) -> float:
     return common / (max(one.end, other.end) - min(one.start, other.start))
 
 
-def is_right(found: Span, cuts: Sequence[Span]) -> bool:
+def is_right(span: Span, cuts: Sequence[Span]) -> bool:
     """Return whether a found clip is one of the cuts."""
-    return any(shared(found, cut) >= SAME_MOTION for cut in cuts)
+    return any(shared(span, cut) >= SAME_MOTION for cut in cuts)
 
 
-def same_cuts(found: Span, cuts: Sequence[HandCut]) -> list[HandCut]:
+def same_cuts(span: Span, cuts: Sequence[HandCut]) -> list[HandCut]:
     """Return the cuts that a found clip is."""
-    return [cut for cut in cuts if shared(found, cut.span) >= SAME_MOTION]
+    return [cut for cut in cuts if shared(span, cut.span) >= SAME_MOTION]

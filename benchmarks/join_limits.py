@@ -56,8 +56,8 @@ def passage_of(clip: Clip) -> Passage:
 def pairs(examples: Sequence[Example]) -> Iterator[tuple[Clip, Clip]]:
     """Yield each clip with the next one of its performer."""
     groups = defaultdict(list)
-    for own in examples:
-        groups[own.row.performer].append(own.captured or own.clip)
+    for example in examples:
+        groups[example.row.performer].append(example.captured or example.clip)
     for clips in groups.values():
         if len(clips) > 1:
             yield from zip(clips, [*clips[1:], clips[0]], strict=True)
@@ -65,8 +65,8 @@ def pairs(examples: Sequence[Example]) -> Iterator[tuple[Clip, Clip]]:
 
 def peak(body: Character, passage: Passage, frame: int) -> float:
     """Return the largest acceleration near a frame, m/s²."""
-    found = join_quality.accelerations(body, passage, frame - 6, frame + WINDOW - 6)
-    return float(found.max(initial=0.0))
+    accelerations = join_quality.accelerations(body, passage, frame - 6, frame + WINDOW - 6)
+    return float(accelerations.max(initial=0.0))
 
 
 def join_peaks(before: Clip, after: Clip, cyclic: bool) -> tuple[float, float]:
@@ -91,35 +91,37 @@ def join_peaks(before: Clip, after: Clip, cyclic: bool) -> tuple[float, float]:
 
 def family_peaks(path: Path, data: Path) -> tuple[float, Peaks]:
     """Return the 99th percentile of a recipe's clips, m/s², and the peaks over it."""
-    own = recipe.read(path)
-    examples, _ = ingest.ingest(own, data)
-    known = trained_card.captured_acceleration(examples)
-    if known is None:
+    family_recipe = recipe.read(path)
+    examples, _ = ingest.ingest(family_recipe, data)
+    captured = trained_card.captured_acceleration(examples)
+    if captured is None:
         raise ValueError(f"{path.stem} has no clip of three frames, expected longer ones")
-    found = Peaks()
+    peaks = Peaks()
     for example in examples:
-        each = trained_card.clip_accelerations(example.captured or example.clip)
-        starts = range(0, max(len(each) - WINDOW + 1, 1), WINDOW // 2)
-        found.captured += [float(each[at : at + WINDOW].max()) / known.p99 for at in starts]
+        accelerations = trained_card.clip_accelerations(example.captured or example.clip)
+        starts = range(0, max(len(accelerations) - WINDOW + 1, 1), WINDOW // 2)
+        peaks.captured += [
+            float(accelerations[at : at + WINDOW].max()) / captured.p99 for at in starts
+        ]
     for before, after in pairs(examples):
-        blended, plain = join_peaks(before, after, own.motion.cyclic)
-        found.blended.append(blended / known.p99)
-        found.cut.append(plain / known.p99)
-    return known.p99, found
+        blended, plain = join_peaks(before, after, family_recipe.motion.cyclic)
+        peaks.blended.append(blended / captured.p99)
+        peaks.cut.append(plain / captured.p99)
+    return captured.p99, peaks
 
 
 def rows(data: Path) -> Iterator[Row]:
     """Yield the shares that each limit flags, by family."""
     for path in sorted(Path(data_folder.__file__).parents[1].glob("recipes/*.toml")):
-        p99, found = family_peaks(path, data)
-        sizes = f"{len(found.captured)} parts, {len(found.blended)} joins, p99 {p99:.3g} m/s²"
+        p99, peaks = family_peaks(path, data)
+        sizes = f"{len(peaks.captured)} parts, {len(peaks.blended)} joins, p99 {p99:.3g} m/s²"
         for factor in FACTORS:
             captured, blended, plain = (
-                100.0 * float(np.mean(np.array(each) > factor))
-                for each in (found.captured, found.blended, found.cut)
+                100.0 * float(np.mean(np.array(values) > factor))
+                for values in (peaks.captured, peaks.blended, peaks.cut)
             )
-            said = f"captured; {blended:.1f} % of joins, {plain:.1f} % of cuts; {sizes}"
-            yield Row(f"{path.stem}: above {factor:g} times", captured, "%", said, None, None)
+            note = f"captured; {blended:.1f} % of joins, {plain:.1f} % of cuts; {sizes}"
+            yield Row(f"{path.stem}: above {factor:g} times", captured, "%", note, None, None)
 
 
 def main(arguments: Sequence[str]) -> None:

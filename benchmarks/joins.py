@@ -79,103 +79,108 @@ class Join:
 def takes(name: str, data: Path) -> list[Take]:
     """Return the takes of a recipe whose files go on beyond the clips."""
     path = next(Path(data_folder.__file__).parents[1].glob(f"recipes/{name}.toml"))
-    own = recipe.read(path)
-    rows = clip_table.read(own, data)
-    files = ingest.read_files(rows, own.source)
-    found = []
+    family_recipe = recipe.read(path)
+    rows = clip_table.read(family_recipe, data)
+    files = ingest.read_files(rows, family_recipe.source)
+    recordings = []
     for row in rows:
-        clip = ingest.clip_of_file(files[str(row.file)], own.source)
+        clip = ingest.clip_of_file(files[str(row.file)], family_recipe.source)
         if row.last_frame is not None and row.last_frame + round(LEAST * clip.rate) < len(clip):
-            found.append(_take(row, clip, own.motion.feet))
-    return found
+            recordings.append(_take(row, clip, family_recipe.motion.feet))
+    return recordings
 
 
 def captured(name: str, data: Path) -> float:
     """Return the accelerations of a recipe's clips, as the card of its model has them."""
     path = next(Path(data_folder.__file__).parents[1].glob(f"recipes/{name}.toml"))
     examples, _ = ingest.ingest(recipe.read(path), data)
-    found = trained_card.captured_acceleration(examples)
-    if found is None:
+    acceleration = trained_card.captured_acceleration(examples)
+    if acceleration is None:
         raise ValueError(f"{name} has no clip of three frames, expected longer ones")
-    return found.p99
+    return acceleration.p99
 
 
 def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
     """Return the take of a row, mended as training does: hips that turn half about their bone."""
     clip, _ = canonical.remove_jumps(clip, 0)
     joints = [clip.skeleton.names.index(name) for name in feet]
-    every = round(clip.rate / RATE)
+    step = round(clip.rate / RATE)
     paths = clip.positions()[:, joints]
     contacts = np.stack(
-        [contact_detection.detect_contacts(own, clip.rate, False) for own in paths.swapaxes(0, 1)],
+        [
+            contact_detection.detect_contacts(path, clip.rate, False)
+            for path in paths.swapaxes(0, 1)
+        ],
         axis=1,
-    )[::every]
+    )[::step]
     bones = clip.translations[0].copy()
     bones[0] = 0.0
     chosen = footsteps.choose_limbs(clip.skeleton.parents, bones, joints, ()).character
-    known = []
+    intervals = []
     for foot, joint in enumerate(joints):
         row = frame_groups.one_row(len(contacts), RATE)
         down = stance_rows.from_probabilities(contacts[:, foot].astype(float), row).mask(row)
-        known.append(stance_rows.statistics(joint, paths[::every, foot, 1], RATE, down))
+        intervals.append(stance_rows.statistics(joint, paths[::step, foot, 1], RATE, down))
     passage = Passage(
-        clip.rotations[::every],
-        clip.root_path[::every],
+        clip.rotations[::step],
+        clip.root_path[::step],
         contacts.astype(float),
         np.zeros(len(contacts)),
     )
-    first, last = row.first_frame // every, (row.last_frame or 0) // every
-    return Take(row.named, row.performer, chosen, tuple(known), passage, last, first)
+    first, last = row.first_frame // step, (row.last_frame or 0) // step
+    return Take(row.named, row.performer, chosen, tuple(intervals), passage, last, first)
 
 
-def pairs(found: Sequence[Take], every: bool = False) -> Iterator[tuple[Take, Take]]:
+def pairs(recordings: Sequence[Take], all_pairs: bool = False) -> Iterator[tuple[Take, Take]]:
     """Yield each take with the next one of its performer, or with every other."""
     groups = defaultdict(list)
-    for take in found:
+    for take in recordings:
         groups[take.performer].append(take)
     for group in groups.values():
         for index, take in enumerate(group):
-            others = [group[(index + ahead) % len(group)] for ahead in range(1, len(group))]
-            yield from ((take, other) for other in (others if every else others[:1]))
+            rest = [group[(index + offset) % len(group)] for offset in range(1, len(group))]
+            yield from ((take, other) for other in (rest if all_pairs else rest[:1]))
 
 
-def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: float) -> Join:
+def join(take: Take, other: Take, cyclic: bool, kind: Blend, typical: float) -> Join:
     """Return the measures of a join of two takes. usual: what it is compared with."""
-    body, rest = own.character, len(other.passage)
-    before = own.passage.part(0, own.event + 1)
+    body, rest = take.character, len(other.passage)
+    before = take.passage.part(0, take.event + 1)
     if cyclic:
         after = other.passage.part(other.begin, rest)
         exits, entries = 12, other.event - other.begin
     else:
         after = other.passage.part(other.event, min(other.event + round(AFTER * RATE), rest))
         exits, entries = 15, 21
-    before, _ = join_quality.on_floor(body, before, own.contacts)
-    after, _ = join_quality.on_floor(body, after, own.contacts)
+    before, _ = join_quality.on_floor(body, before, take.contacts)
+    after, _ = join_quality.on_floor(body, after, take.contacts)
     window = range(len(before) - exits, len(before))
     cut = joins.find_cut(body, before, after, window, range(entries))
     after = after.placed(cut.motion)
     joined = joins.join(before, after, cut, kind)
     stepped, _ = join_quality.add_steps(body, before, after, cut, joined)
-    placed, slides, lowered = _placed(own, stepped, cut)
+    placed, slides, lowered = _placed(take, stepped, cut)
     drop = abs(float(before.roots[cut.exit, 1] - after.roots[cut.entry, 1]))
-    real, blended, peak = (_peak(body, each, cut.exit) for each in (own.passage, joined, placed))
-    high, low = (float(side.passage.roots[side.event, 1]) for side in (own, other))
-    facts = JoinFacts(cut.distance, drop, kind, usual, "captured", peak=peak)
+    real, blended, peak = (
+        _peak(body, passage, cut.exit) for passage in (take.passage, joined, placed)
+    )
+    high, low = (float(side.passage.roots[side.event, 1]) for side in (take, other))
+    facts = JoinFacts(cut.distance, drop, kind, typical, "captured", peak=peak)
     return Join(facts, real, blended, slides, lowered, (high, low))
 
 
-def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float, ...], float]:
+def _placed(take: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float, ...], float]:
     """Return a passage with placed feet, how far feet that stand at the join slide, and the mean
     lowering of the pelvis near it, m."""
     motion = SampledMotion(passage.rotations, passage.roots, RATE)
-    plan = body_plans.plan_feet(own.character, motion, own.contacts, passage.contacts)
+    plan = body_plans.plan_feet(take.character, motion, take.contacts, passage.contacts)
     times = np.arange(len(passage)) / RATE
     rotations, roots = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
     placed = Passage(rotations, roots, passage.contacts, passage.sigmas)
     near = _near(cut.exit, len(passage))
-    points = joins.positions(own.character, placed, 0, len(placed))[..., [0, 2]]
+    points = joins.positions(take.character, placed, 0, len(placed))[..., [0, 2]]
     slides = []
-    for leg, steps in zip(own.character.legs, plan.steps, strict=True):
+    for leg, steps in zip(take.character.legs, plan.steps, strict=True):
         for stance in steps.stances:
             if stance.begin < near.stop and stance.end > near.start:
                 path = points[stance.begin : stance.end, leg.tip]
@@ -190,40 +195,44 @@ def _near(frame: int, count: int) -> slice:
 
 def _peak(body: Character, passage: Passage, frame: int) -> float:
     near = _near(frame, len(passage))
-    found = join_quality.accelerations(body, passage, near.start, near.stop)
-    return float(found.max())
+    accelerations = join_quality.accelerations(body, passage, near.start, near.stop)
+    return float(accelerations.max())
 
 
 def rows(data: Path) -> list[Row]:
     """Return the figures of joins of reaches and of strides."""
-    found = []
+    table_rows = []
     for name, cyclic, kind, goal in FAMILIES:
-        usual = captured(name, data)
-        joins = [join(*pair, cyclic, kind, usual) for pair in pairs(takes(name, data))]
-        found += _rows(f"{name}, {len(joins)} joins", joins, goal)
+        typical = captured(name, data)
+        joins = [join(*pair, cyclic, kind, typical) for pair in pairs(takes(name, data))]
+        table_rows += _rows(f"{name}, {len(joins)} joins", joins, goal)
     deposits = takes("hdm05_deposit_floor", data)
-    usual = captured("hdm05_deposit_floor", data)
-    joins = [join(*pair, False, "dead", usual) for pair in pairs(deposits, True)]
-    other = [own for own in joins if min(own.height) < SQUAT and max(own.height) > STOOP]
-    share = 100.0 * float(np.mean([bool(own.facts.reasons) for own in other]))
-    same = [own for own in joins if own not in other]
-    alike = 100.0 * float(np.mean([bool(own.facts.reasons) for own in same]))
-    said = f"of {len(other)} joins of a squat and a stoop; {alike:.0f} % of {len(same)} others"
-    missed = Row("hdm05_deposit_floor: joins not flagged", 100.0 - share, "%", said, None, 0.0)
-    return [*found, missed]
+    typical = captured("hdm05_deposit_floor", data)
+    joins = [join(*pair, False, "dead", typical) for pair in pairs(deposits, True)]
+    other = [
+        join_found
+        for join_found in joins
+        if min(join_found.height) < SQUAT and max(join_found.height) > STOOP
+    ]
+    share = 100.0 * float(np.mean([bool(join_found.facts.reasons) for join_found in other]))
+    same = [join_found for join_found in joins if join_found not in other]
+    alike = 100.0 * float(np.mean([bool(join_found.facts.reasons) for join_found in same]))
+    note = f"of {len(other)} joins of a squat and a stoop; {alike:.0f} % of {len(same)} others"
+    missed_row = Row("hdm05_deposit_floor: joins not flagged", 100.0 - share, "%", note, None, 0.0)
+    return [*table_rows, missed_row]
 
 
 def _rows(title: str, joins: Sequence[Join], goal: float | None) -> list[Row]:
-    real = float(np.median([own.real for own in joins]))
+    real = float(np.median([join.real for join in joins]))
     plain, placed = (
         float(np.median(peaks))
-        for peaks in ([own.blended for own in joins], [own.facts.peak for own in joins])
+        for peaks in ([join.blended for join in joins], [join.facts.peak for join in joins])
     )
-    distance = 100.0 * float(np.median([own.facts.distance for own in joins]))
-    slides = [round(100.0 * one, 3) for own in joins for one in own.slides]
+    distance = 100.0 * float(np.median([join.facts.distance for join in joins]))
+    slides = [round(100.0 * one, 3) for join in joins for one in join.slides]
     slide, worst = float(np.percentile(slides, 90)), max(slides)
-    lowered = 100.0 * float(np.mean([own.lowered for own in joins]))
-    hard = 100.0 * float(np.mean([bool(own.facts.reasons) for own in joins]))
+    lowered = 100.0 * float(np.mean([join.lowered for join in joins]))
+    hard = 100.0 * float(np.mean([bool(join.facts.reasons) for join in joins]))
     against = f"median peak {plain:.3g} m/s², real continuation {real:.3g}"
     return [
         Row(f"{title}: peak over the real one", plain / real, "times", against, None, goal),
@@ -247,12 +256,12 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder of the captured data")
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args(arguments)
-    found = rows(given.data)
-    print(table(found))
-    if given.record:
+    options = parser.parse_args(arguments)
+    table_rows = rows(options.data)
+    print(table(table_rows))
+    if options.record:
         command = "python benchmarks/joins.py DATA --record"
-        record({"joins": found}, command, ROOT / "docs/results")
+        record({"joins": table_rows}, command, ROOT / "docs/results")
 
 
 if __name__ == "__main__":

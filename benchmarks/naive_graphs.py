@@ -28,41 +28,47 @@ VECTORS: ChartName = "rotation_vector"
 ABOUT = {"producer_name": "posefield", "producer_version": "naive"}
 
 
-def numbers(made: Family, chart: ChartName) -> Floats:
+def numbers(trained_family: Family, chart: ChartName) -> Floats:
     """Return the values (N, T, 3 + 4 J) that naive kriging averages: root positions, and the rows
     of rotations that are decoded, as in the model, so that decoding costs both the same."""
-    own = replace(made.trained.tensor.chart, chart=chart)
-    aligned = made.trained.aligned
-    vectors = own.numbers(aligned.rotations, aligned.root_path)
-    rows = decoder_graph.mean_products(own, vectors[..., 3:])
+    chart_parameters = replace(trained_family.trained.tensor.chart, chart=chart)
+    aligned = trained_family.trained.aligned
+    vectors = chart_parameters.numbers(aligned.rotations, aligned.root_path)
+    rows = decoder_graph.mean_products(chart_parameters, vectors[..., 3:])
     if chart == "stereographic":
-        rows += own.means.ravel()
+        rows += chart_parameters.means.ravel()
     return np.concatenate([vectors[..., :3], rows], axis=-1)
 
 
-def positions(made: Family) -> Floats:
+def positions(trained_family: Family) -> Floats:
     """Joint positions (N, T, J, 3) of the aligned clips, m."""
-    return time_alignment.joint_positions(made.trained.aligned, made.parents, made.offsets)
+    return time_alignment.joint_positions(
+        trained_family.trained.aligned, trained_family.parents, trained_family.offsets
+    )
 
 
 @dataclass(frozen=True)
 class Contents:
     """Graphs of one naive field, of numbers in a chart of rotations."""
 
-    made: Family
+    trained_family: Family
     field: NaiveKriging
     chart: ChartName
 
     def every_frame_once(self) -> bytes:
         """All frames' poses, then two of them for each time."""
         return self._graph(
-            lambda net, points, place: self._rows(net, self.field.onnx(net, points), place)
+            lambda net, points, frame_position: self._rows(
+                net, self.field.onnx(net, points), frame_position
+            )
         )
 
     def every_frame_once_dual(self) -> bytes:
         """The same through weights and samples multiplied beforehand."""
         return self._graph(
-            lambda net, points, place: self._rows(net, self.field.onnx_dual(net, points), place)
+            lambda net, points, frame_position: self._rows(
+                net, self.field.onnx_dual(net, points), frame_position
+            )
         )
 
     def gathered(self) -> bytes:
@@ -79,22 +85,26 @@ class Contents:
 
     def _graph(self, poses: Callable[[GraphBuilder, str, str], str], alone: bool = False) -> bytes:
         """Graph of one question at many times, or of many questions at a time each."""
-        model = self.made.trained.model
+        model = self.trained_family.trained.model
         net = GraphBuilder()
-        ends = LevelTables(kriging_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]]))
-        fields = kriging_graph.onnx(model.bank, net, "controls", ends.onnx(net))
-        duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
+        end_points = LevelTables(
+            kriging_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]])
+        )
+        fields = kriging_graph.onnx(model.bank, net, "controls", end_points.onnx(net))
+        duration, frame_position = model.timing.onnx(
+            net, fields["duration"], fields["warp"], "time"
+        )
         points = self._points(net)
         axes = net.indices(1) if alone else net.indices(0)
-        numbers = poses(net, points, net("Squeeze", place, axes))
+        numbers = poses(net, points, net("Squeeze", frame_position, axes))
         root = net("Slice", numbers, net.indices(0), net.indices(3), net.indices(1))
         net.add_output("rotation_rows", self._rotations(net, numbers))
         net.add_output("root_rows", root)
         net.add_output("offset_rows", model.proportions.onnx(net, fields["offsets"]))
         net.add_output("durations", duration)
-        joints, controls = len(self.made.parents), len(model.bank.low)
+        joints, controls = len(self.trained_family.parents), len(model.bank.low)
         questions, times, answers = ("batch", 1, "batch") if alone else (1, "steps", "steps")
-        whole = net.model(
+        model_graph = net.model(
             {"controls": [questions, controls], "time": [questions, times]},
             {
                 "rotation_rows": [answers, 4 * joints],
@@ -107,26 +117,26 @@ class Contents:
         )
         # Nodes that no output needs would be computed, too: those of our own poses and sigma.
         return onnx_file.select_outputs(
-            whole, "rotation_rows", "root_rows", "offset_rows", "durations"
+            model_graph, "rotation_rows", "root_rows", "offset_rows", "durations"
         )
 
     def _points(self, net: GraphBuilder) -> str:
         """The controls (B, d), whose sampled range is -1 to 1."""
-        bank = self.made.trained.model.bank
+        bank = self.trained_family.trained.model.bank
         gain = np.diag(2.0 / (bank.high - bank.low))
         shift = -(bank.high + bank.low) / (bank.high - bank.low)
-        own = net.weights("naive_gain", gain), net.weights("naive_shift", shift)
-        return net("Gemm", "controls", *own)
+        affine = net.weights("naive_gain", gain), net.weights("naive_shift", shift)
+        return net("Gemm", "controls", *affine)
 
     def _own(
         self,
         poses: Callable[[GraphBuilder, str, str], str],
         net: GraphBuilder,
         points: str,
-        place: str,
+        frame_position: str,
     ) -> str:
         """Pose vectors (B, D) of each question's two frames, and a line between them."""
-        row, share = self._split(net, place)
+        row, share = self._split(net, frame_position)
         samples = self.field.fields[0].samples
         d = samples.shape[1]
         # |p - s|² as one product, as in ours: no array (B, n, d).
@@ -134,8 +144,8 @@ class Contents:
         factors = net.weights(
             "naive_factors", np.vstack([np.ones_like(samples.T), -2.0 * samples.T])
         )
-        own = net.weights("naive_own", np.sum(np.square(samples), axis=1))
-        squared = net("Max", net("Gemm", both, factors, own), net.number(0.0))
+        squares = net.weights("naive_own", np.sum(np.square(samples), axis=1))
+        squared = net("Max", net("Gemm", both, factors, squares), net.number(0.0))
         drift = net(
             "Gemm",
             points,
@@ -143,8 +153,10 @@ class Contents:
             net.weights("naive_one", np.eye(1, d + 1)[0]),
         )
         frames = (row, net("Add", row, net.indices(1)))
-        found = (poses(net, self._system(net, squared, drift, frame), frame) for frame in frames)
-        return self._between(net, *found, share)
+        frame_poses = (
+            poses(net, self._system(net, squared, drift, frame), frame) for frame in frames
+        )
+        return self._between(net, *frame_poses, share)
 
     def _system(self, net: GraphBuilder, squared: str, drift: str, row: str) -> str:
         """Covariances and drift (B, 1, n + k) in the field of each question's frame."""
@@ -160,24 +172,24 @@ class Contents:
         poses = net("MatMul", basis, net("Gather", duals, row))
         return net("Squeeze", poses, net.indices(1))
 
-    def _split(self, net: GraphBuilder, place: str) -> tuple[str, str]:
+    def _split(self, net: GraphBuilder, frame_position: str) -> tuple[str, str]:
         """Frame below (S,) and the share of the next one (S, 1)."""
-        last = self.made.trained.model.timing.frames - 2.0
-        before = net("Min", net("Floor", place), net.number(last))
-        share = net("Unsqueeze", net("Sub", place, before), net.indices(1))
+        last = self.trained_family.trained.model.timing.frames - 2.0
+        before = net("Min", net("Floor", frame_position), net.number(last))
+        share = net("Unsqueeze", net("Sub", frame_position, before), net.indices(1))
         return net("Cast", before, to=7), share
 
     def _between(self, net: GraphBuilder, below: str, above: str, share: str) -> str:
         return net("Add", below, net("Mul", net("Sub", above, below), share))
 
-    def _rows(self, net: GraphBuilder, frames: str, place: str) -> str:
+    def _rows(self, net: GraphBuilder, frames: str, frame_position: str) -> str:
         """Pose vectors (S, D) between rows of those of all frames (T, D)."""
-        row, share = self._split(net, place)
+        row, share = self._split(net, frame_position)
         after = net("Add", row, net.indices(1))
         return self._between(net, net("Gather", frames, row), net("Gather", frames, after), share)
 
-    def _gathered(self, net: GraphBuilder, points: str, place: str) -> str:
-        row, share = self._split(net, place)
+    def _gathered(self, net: GraphBuilder, points: str, frame_position: str) -> str:
+        row, share = self._split(net, frame_position)
         after = net("Add", row, net.indices(1))
         return self._between(net, self._at(net, points, row), self._at(net, points, after), share)
 
@@ -195,22 +207,22 @@ class Contents:
 
     def _rotations(self, net: GraphBuilder, numbers: str) -> str:
         """Quaternions (S, 4 J) of numbers (S, 3 + 4 J), as the model's decoder makes them."""
-        means = self.made.trained.model.decoder.means
+        means = self.trained_family.trained.model.decoder.means
         end = net.indices(3 + 4 * len(means))
         turned = net("Slice", numbers, net.indices(3), end, net.indices(1))
         rows = net("Transpose", turned, perm=[1, 0])
         innermost = net.weights("naive_means", means[:, :, None])
         shape = net.indices(len(means), 1, -1)
-        found = decoder_graph.quaternions(net, self.chart, rows, innermost, shape)
-        return decoder_graph.rows_of_poses(net, found, len(means))
+        quaternions = decoder_graph.quaternions(net, self.chart, rows, innermost, shape)
+        return decoder_graph.rows_of_poses(net, quaternions, len(means))
 
 
-def fitted(made: Family, chart: ChartName) -> Contents:
+def fitted(trained_family: Family, chart: ChartName) -> Contents:
     """Return the graphs of a naive field, fitted frame by frame to numbers in a chart."""
-    samples = made.trained.model.bank.pose.samples
-    values = positions(made), numbers(made, chart)
+    samples = trained_family.trained.model.bank.pose.samples
+    values = positions(trained_family), numbers(trained_family, chart)
     field = naive_kriging.fit_naive(samples, *values, "matern52", variogram.fit_by_grid)
-    return Contents(made, field, chart)
+    return Contents(trained_family, field, chart)
 
 
 def check(
@@ -223,14 +235,14 @@ def check(
 
     controls (B, d) and times (B, S): the rivals' answers have B and S as one axis.
     """
-    model, field, chart = content.made.trained.model, content.field, CHARTS[content.chart]
+    model, field, chart = content.trained_family.trained.model, content.field, CHARTS[content.chart]
     # The procedural family's performers are not told apart.
     points = model.bank.points(controls, np.zeros((len(controls), 0)))
     fields = model.bank.numpy(points)
-    _, place = model.timing.numpy(fields["duration"], fields["warp"], times)
+    _, frame_position = model.timing.numpy(fields["duration"], fields["warp"], times)
     frames = field.numpy(points)
-    below = np.minimum(place.astype(int), frames.shape[1] - 2)
-    share = (place - below)[..., None]
+    below = np.minimum(frame_position.astype(int), frames.shape[1] - 2)
+    share = (frame_position - below)[..., None]
     which = np.arange(len(frames))[:, None]
     numbers = (1.0 - share) * frames[which, below] + share * frames[which, below + 1]
     means = model.decoder.means

@@ -68,32 +68,34 @@ def rows(path: Path) -> list[Row]:
     cheap = json.dumps({"controls": {c.name: c.default for c in card.controls}, "times": [0.0]})
     question = "POST", f"/v1/models/{name}/pose", cheap.encode()
     with serve_process.posefield(path, POSEFIELD_WORKERS="1", POSEFIELD_LOG="off") as server:
-        return [_row(server.url, question, *each) for each in questions(name, card).items()]
+        return [
+            _row(server.url, question, *arguments) for arguments in questions(name, card).items()
+        ]
 
 
 def _row(url: str, cheap: Question, name: str, costly: Question) -> Row:
     alone: list[float] = []
-    beside: list[float] = []
+    latencies: list[float] = []
     for _ in range(ROUNDS):
         alone += _latencies(url, cheap)
         with _clients(url, costly):
-            beside += _latencies(url, cheap)
-    baseline = f"alone: {1e3 * median(alone):.2f} ms; worst beside: {1e3 * max(beside):.0f} ms"
-    said = f"cheap pose beside {CLIENTS} clients: {name}"
-    factor = median(beside) / median(alone)
-    print(said, f"{1e3 * median(beside):.2f} ms, {factor:.1f} times;", baseline, flush=True)
-    return Row(f"{said}, times its latency alone", factor, "", baseline, None, GOAL)
+            latencies += _latencies(url, cheap)
+    baseline = f"alone: {1e3 * median(alone):.2f} ms; worst beside: {1e3 * max(latencies):.0f} ms"
+    note = f"cheap pose beside {CLIENTS} clients: {name}"
+    factor = median(latencies) / median(alone)
+    print(note, f"{1e3 * median(latencies):.2f} ms, {factor:.1f} times;", baseline, flush=True)
+    return Row(f"{note}, times its latency alone", factor, "", baseline, None, GOAL)
 
 
 def _latencies(url: str, question: Question) -> list[float]:
     wire = http.client.HTTPConnection(url.removeprefix("http://"), timeout=60)
-    found = []
+    latencies = []
     for _ in range(POSES):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         _answer(wire, question)
-        found.append(time.perf_counter() - begun)
+        latencies.append(time.perf_counter() - start)
         time.sleep(PAUSE)
-    return found
+    return latencies
 
 
 def _answer(wire: http.client.HTTPConnection, question: Question) -> int:
@@ -108,11 +110,11 @@ def _answer(wire: http.client.HTTPConnection, question: Question) -> int:
 @contextmanager
 def _clients(url: str, question: Question) -> Iterator[None]:
     context = multiprocessing.get_context("spawn")
-    end, begun = context.Event(), context.Event()
-    child = context.Process(target=ask_on, args=(url, question, begun, end))
+    end, started = context.Event(), context.Event()
+    child = context.Process(target=ask_on, args=(url, question, started, end))
     child.start()
     try:
-        begun.wait(60)
+        started.wait(60)
         time.sleep(1.0)
         yield
     finally:
@@ -120,7 +122,7 @@ def _clients(url: str, question: Question) -> Iterator[None]:
         child.join()
 
 
-def ask_on(url: str, question: Question, begun: Event, end: Event) -> None:
+def ask_on(url: str, question: Question, started: Event, end: Event) -> None:
     """Send a request from each of CLIENTS threads, again and again, until told to end."""
     os.nice(5)
 
@@ -134,7 +136,7 @@ def ask_on(url: str, question: Question, begun: Event, end: Event) -> None:
     threads = [Thread(target=ask) for _ in range(CLIENTS)]
     for thread in threads:
         thread.start()
-    begun.set()
+    started.set()
     for thread in threads:
         thread.join()
 

@@ -93,23 +93,23 @@ def time_rows(find: Find) -> list[Row]:
 
     whole_time, plan_time = _least(usdc), _least(plan)
     seconds = make(document, find).answer.trust.duration
-    said = f"{seconds:.1f} s of motion, {len(usdc()) / 1000:.0f} kB; least of 15 runs"
+    note = f"{seconds:.1f} s of motion, {len(usdc()) / 1000:.0f} kB; least of 15 runs"
     return [
-        Figure("three models to usdc, processor time", whole_time, "ms", said, None, 60.0, 10.0),
+        Figure("three models to usdc, processor time", whole_time, "ms", note, None, 60.0, 10.0),
         Figure("its plan, processor time", plan_time, "ms", "least of 15 runs", None, 10.0),
     ]
 
 
 def _least(run: Callable[[], bytes]) -> float:
     """Return the least processor time of a run on one thread, ms."""
-    found = []
+    seconds = []
     # Threads that wait for work would count as processor time.
     with threadpool_limits(1):
         for _ in range(15):
             begin = time.process_time()
             run()
-            found.append(1000.0 * (time.process_time() - begin))
-    return min(found)
+            seconds.append(1000.0 * (time.process_time() - begin))
+    return min(seconds)
 
 
 def memory_rows() -> list[Row]:
@@ -117,10 +117,10 @@ def memory_rows() -> list[Row]:
     one, _ = _long(5)
     ten, first = _long(50)
     _, second = _long(50)
-    said = f"{ten:.0f} MiB at most, of {one:.0f} MiB for a tenth; glb, 30 frames a second"
+    note = f"{ten:.0f} MiB at most, of {one:.0f} MiB for a tenth; glb, 30 frames a second"
     same = 0.0 if first == second else 1.0
     return [
-        Figure("9.6 minutes: memory over 1 minute's", ten - one, "MiB", said, None, None),
+        Figure("9.6 minutes: memory over 1 minute's", ten - one, "MiB", note, None, None),
         Figure("9.6 minutes: other bytes in another process", same, "of 1", "", None, 0.0),
     ]
 
@@ -132,9 +132,9 @@ def _long(walks: int) -> tuple[float, bytes]:
         for number in range(walks)
     ]
     with tempfile.TemporaryDirectory() as folder:
-        script, made = Path(folder, "script.json"), Path(folder, "made.glb")
+        script, output = Path(folder, "script.json"), Path(folder, "made.glb")
         script.write_bytes(msgspec.json.encode({"segments": segments}))
-        words = ["posefield", "perform", str(script), "-o", str(made)]
+        words = ["posefield", "perform", str(script), "-o", str(output)]
         command = [sys.executable, "-c", MEMORY.format(words=words)]
-        said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-        return float(said.split()[-1]), made.read_bytes()
+        note = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        return float(note.split()[-1]), output.read_bytes()

@@ -41,26 +41,35 @@ NEAR = (0.1, 0.6)
 
 def whole_rows(find: Find) -> list[Row]:
     """Return the figures of whole performances with several targets."""
-    made = [make(whole(target), find) for target in TARGETS]
-    peaks = [max(join.peak for join in own.answer.trust.joins) for own in made]
-    feet = [own.answer.trust.feet for own in made]
-    skates = [100.0 * own.skate for own in feet if own is not None]
-    before = 100.0 * float(np.mean([own.skate_before for own in feet if own is not None]))
-    slides, lowered = zip(*map(stood, made), strict=True)
-    missed = [1000.0 * _missed(*pair) for pair in zip(made, TARGETS, strict=True)]
-    said = f"{len(made)} targets; mean of the worst joins {np.mean(peaks):.3g}"
+    performances = [make(whole(target), find) for target in TARGETS]
+    peaks = [
+        max(join.peak for join in performance.answer.trust.joins) for performance in performances
+    ]
+    feet = [performance.answer.trust.feet for performance in performances]
+    skates = [100.0 * performance.skate for performance in feet if performance is not None]
+    before = 100.0 * float(
+        np.mean([performance.skate_before for performance in feet if performance is not None])
+    )
+    slides, lowered = zip(*map(stood, performances), strict=True)
+    distances = [1000.0 * _missed(*pair) for pair in zip(performances, TARGETS, strict=True)]
+    note = f"{len(performances)} targets; mean of the worst joins {np.mean(peaks):.3g}"
     title = "walk, grab, hold, return, walk"
     worst = f"mean {np.mean(skates):.2g}; without placed feet {before:.2g}"
     return [
-        Figure(f"{title}: largest peak at a join", max(peaks), "m/s²", said, None, 16.0, 8.0),
+        Figure(f"{title}: largest peak at a join", max(peaks), "m/s²", note, None, 16.0, 8.0),
         Figure(f"{title}: feet skate, worst", max(skates), "cm/s", worst, None, 8.0, 2.0),
-        _lowering(f"{title}: pelvis lowered", [value for own in lowered for value in own]),
-        _sliding(f"{title}: slide of standing feet at joins", [x for own in slides for x in own]),
+        _lowering(
+            f"{title}: pelvis lowered", [value for performance in lowered for value in performance]
+        ),
+        _sliding(
+            f"{title}: slide of standing feet at joins",
+            [x for performance in slides for x in performance],
+        ),
         Figure(
             f"{title}: hand from its target",
-            max(missed),
+            max(distances),
             "mm",
-            f"worst; mean {np.mean(missed):.2g}",
+            f"worst; mean {np.mean(distances):.2g}",
             None,
             1.0,
         ),
@@ -73,15 +82,15 @@ def _lowering(name: str, lowered: Sequence[float]) -> Row:
 
 
 def _sliding(name: str, slides: Sequence[float]) -> Row:
-    said = f"90th percentile of {len(slides)}; worst {max(slides):.2g}"
-    found = round(float(np.percentile(slides, 90)), 3)
-    return Figure(name, found, "cm", said, None, 1.0, 0.2)
+    note = f"90th percentile of {len(slides)}; worst {max(slides):.2g}"
+    sliding = round(float(np.percentile(slides, 90)), 3)
+    return Figure(name, sliding, "cm", note, None, 1.0, 0.2)
 
 
-def stood(made: Made) -> tuple[list[float], Frames]:
+def stood(performance: Made) -> tuple[list[float], Frames]:
     """Return how far each foot that stands at a join slides, and how low the pelvis is, cm."""
-    timeline = made.timeline
-    plan, motion = composition.plan_feet(made.script, timeline), timeline.performed
+    timeline = performance.timeline
+    plan, motion = composition.plan_feet(performance.script, timeline), timeline.performed
     times = np.arange(len(motion)) / RATE
     ((_, paths),) = foot_placement.foot_paths([plan])
     slides = []
@@ -96,9 +105,9 @@ def stood(made: Made) -> tuple[list[float], Frames]:
     return slides, 100.0 * np.abs(plan.lowered - plan.grounded)
 
 
-def _missed(made: Made, target: Sequence[float]) -> float:
+def _missed(performance: Made, target: Sequence[float]) -> float:
     """Return how far the hand is from its target at the event in the clip, m."""
-    clip, report = made.answer.clip, made.answer.trust
+    clip, report = performance.answer.clip, performance.answer.trust
     hand = clip.skeleton.names.index("rhand")
     frame = round((report.segments[1].event or 0.0) * clip.rate)
     return float(np.linalg.norm(clip.positions()[frame, hand] - np.array(target)))
@@ -112,47 +121,48 @@ def walk_rows(find: Find) -> list[Row]:
         "along bends": {"along": BENDS, "speed": 1.0},
         "turning": {"seconds": 12.0, "turn": 0.15, "speed": 1.1},
     }
-    found: dict[str, tuple[float, float, float]] = {}
-    for name, way in ways.items():
-        made = make(_walk(way), find)
-        path = made.answer.trust.segments[0].path
+    figures: dict[str, tuple[float, float, float]] = {}
+    for name, direction in ways.items():
+        performance = make(_walk(direction), find)
+        path = performance.answer.trust.segments[0].path
         if path is not None:
-            found[name] = (100.0 * path.lateral, np.degrees(path.heading), 100.0 * path.speed)
-    worst = {part: max(found, key=lambda name: found[name][part]) for part in range(3)}
+            figures[name] = (100.0 * path.lateral, np.degrees(path.heading), 100.0 * path.speed)
+    worst = {column: max(figures, key=lambda name: figures[name][column]) for column in range(3)}
     rows: list[Row] = [
         Figure(
             f"path following, means over cycles: {name}",
-            found[worst[part]][part],
+            figures[worst[column]][column],
             unit,
-            f"worst of {len(found)} walks: {worst[part]}",
+            f"worst of {len(figures)} walks: {worst[column]}",
             None,
             must,
             0.5,
         )
-        for part, (name, unit, must) in enumerate(
+        for column, (name, unit, must) in enumerate(
             [("lateral", "cm", 2.5), ("heading", "°", 1.5), ("speed", "cm/s", 2.0)]
         )
     ]
     return [*rows, *_starts(find)]
 
 
-def _walk(way: Mapping[str, object]) -> Document:
-    return {"fps": RATE, "segments": [{"kind": "walk", "model": WALK, **way}]}
+def _walk(direction: Mapping[str, object]) -> Document:
+    return {"fps": RATE, "segments": [{"kind": "walk", "model": WALK, **direction}]}
 
 
 def _starts(find: Find) -> list[Row]:
     """Return how walks with standing ends skate, and how suddenly these move, over steady walks."""
-    way = {"to": [0.0, 12.0], "speed": 1.1}
+    direction = {"to": [0.0, 12.0], "speed": 1.1}
     steady, both = (
-        make(_walk(way | ends), find) for ends in ({}, {"start": "standing", "stop": "standing"})
+        make(_walk(direction | end_points), find)
+        for end_points in ({}, {"start": "standing", "stop": "standing"})
     )
-    own, usual = both.answer.trust.feet, steady.answer.trust.feet
-    if own is None or usual is None:
+    feet_result, typical = both.answer.trust.feet, steady.answer.trust.feet
+    if feet_result is None or typical is None:
         raise ValueError("no feet, expected feet that stand")
-    title, peaks = "starts and stops", [_end_peak(each) for each in (both, steady)]
+    title, peaks = "starts and stops", [_end_peak(performance) for performance in (both, steady)]
     feet = [
-        ("skate over steady walk", own.skate_before, usual.skate_before),
-        ("skate with placed feet over steady walk", own.skate, usual.skate),
+        ("skate over steady walk", feet_result.skate_before, typical.skate_before),
+        ("skate with placed feet over steady walk", feet_result.skate, typical.skate),
     ]
     return [
         *(
@@ -177,12 +187,12 @@ def _starts(find: Find) -> list[Row]:
     ]
 
 
-def _end_peak(made: Made) -> float:
+def _end_peak(performance: Made) -> float:
     """Return the largest acceleration in the first and last 1.5 s of a clip, m/s²."""
-    clip = made.answer.clip
-    found = random_scripts.accelerations(clip, clip.positions())
-    ends = round(1.5 * clip.rate)
-    return float(max(found[:ends].max(), found[-ends:].max()))
+    clip = performance.answer.clip
+    accelerations = random_scripts.accelerations(clip, clip.positions())
+    end_points = round(1.5 * clip.rate)
+    return float(max(accelerations[:end_points].max(), accelerations[-end_points:].max()))
 
 
 def flag_rows(find: Find) -> list[Row]:
@@ -190,9 +200,9 @@ def flag_rows(find: Find) -> list[Row]:
     heights = [(low, high) for low in (0.45, 0.5, 0.55) for high in (0.85, 0.9, 0.95)]
     pairs = [*heights, *(pair[::-1] for pair in heights)]
     joins = [make(_deposited(*pair), find).answer.trust.joins[0] for pair in pairs]
-    missed = 100.0 * float(np.mean([not own.hard for own in joins]))
-    said = f"of {len(joins)} joins of models"
-    return [Figure("squat into stoop: joins not flagged", missed, "%", said, None, 0.0)]
+    unflagged = 100.0 * float(np.mean([not join.hard for join in joins]))
+    note = f"of {len(joins)} joins of models"
+    return [Figure("squat into stoop: joins not flagged", unflagged, "%", note, None, 0.0)]
 
 
 def _deposited(first: float, second: float) -> Document:
@@ -211,13 +221,13 @@ def random_rows(models: Mapping[str, Synthesizer], count: int) -> list[Row]:
     cast = random_scripts.cast(models)
     faulty = refused = 0
     for number, document in enumerate(random_scripts.scripts(cast, count)):
-        found = random_scripts.check(document, cast.find)
-        refused += bool(found.refused)
-        faulty += bool(found.faults)
-        for fault in found.faults:
+        problems = random_scripts.check(document, cast.find)
+        refused += bool(problems.refused)
+        faulty += bool(problems.faults)
+        for fault in problems.faults:
             print(f"script {number}: {fault}", file=sys.stderr)
-    said = f"of {count}; {refused} refused with a pointer"
-    return [Figure("random scripts with a fault", faulty, "scripts", said, None, 0.0)]
+    note = f"of {count}; {refused} refused with a pointer"
+    return [Figure("random scripts with a fault", faulty, "scripts", note, None, 0.0)]
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -226,18 +236,18 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("models", type=Path, nargs="+", help="model files")
     parser.add_argument("--scripts", type=int, default=1000, help="number of random scripts")
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     models = {
         **model_registry.load([model_registry.SHIPPED_FOLDER / f"{WALK}.onnx"]).models,
-        **model_registry.load(given.models).models,
+        **model_registry.load(options.models).models,
     }
     find = models.__getitem__
-    found = [*whole_rows(find), *walk_rows(find), *flag_rows(find), *time_rows(find)]
-    found += [*memory_rows(), *random_rows(models, given.scripts)]
-    print(table(found))
-    if given.record:
-        command = f"python benchmarks/performances.py MODELS --scripts {given.scripts} --record"
-        record({"performed": found}, command, ROOT / "docs/results")
+    table_rows = [*whole_rows(find), *walk_rows(find), *flag_rows(find), *time_rows(find)]
+    table_rows += [*memory_rows(), *random_rows(models, options.scripts)]
+    print(table(table_rows))
+    if options.record:
+        command = f"python benchmarks/performances.py MODELS --scripts {options.scripts} --record"
+        record({"performed": table_rows}, command, ROOT / "docs/results")
 
 
 if __name__ == "__main__":

@@ -43,33 +43,41 @@ class Proposed:
 
 def propose(name: str, data: Path) -> Proposed:
     """Return the proposal for a shipped recipe. data: folder of the data sets."""
-    own = recipe.read(data_folder.RECIPES / f"{name}.toml")
-    examples, _ = ingest.ingest(own, data)
+    family_recipe = recipe.read(data_folder.RECIPES / f"{name}.toml")
+    examples, _ = ingest.ingest(family_recipe, data)
     joints = examples[0].clip.skeleton.names
     motions = [measured_controls.measured_quantities(one.clip) for one in examples]
     performers, recordings = (
         [one.row.performer for one in examples],
         [one.recording for one in examples],
     )
-    indices = {str(role): joints.index(joint) for role, joint in own.roles.items()}
+    indices = {str(role): joints.index(joint) for role, joint in family_recipe.roles.items()}
     clips = FamilyClips(
-        tuple(motions), indices, tuple(performers), tuple(recordings), own.motion.cyclic
+        tuple(motions), indices, tuple(performers), tuple(recordings), family_recipe.motion.cyclic
     )
-    found = control_proposals.propose_controls(clips)
-    known = {(one.quantity, one.role, one.at) for one in found.controls}
-    roles = {joint: str(role) for role, joint in own.roles.items()}
-    wanted = {
+    proposals = control_proposals.propose_controls(clips)
+    controls = {(one.quantity, one.role, one.at) for one in proposals.controls}
+    roles = {joint: str(role) for role, joint in family_recipe.roles.items()}
+    recipe_controls = {
         control.name: (auto.quantity, roles.get(auto.joint or ""), PEAK.get(auto.at or "", auto.at))
-        for control in own.measured
+        for control in family_recipe.measured
         if (auto := control.auto)
     }
     values = np.array([one.controls for one in examples])
-    given = list(((values - values.mean(axis=0)) / values.std(axis=0)).T)
+    standardised = list(((values - values.mean(axis=0)) / values.std(axis=0)).T)
     prediction = RecordingPrediction(
         control_proposals.motion_coefficients(motions), performers, recordings
     )
-    lacking = tuple(control for control, measure in wanted.items() if measure not in known)
-    return Proposed(name, tuple(wanted), lacking, found.remaining[-1], prediction.remaining(given))
+    lacking = tuple(
+        control for control, measure in recipe_controls.items() if measure not in controls
+    )
+    return Proposed(
+        name,
+        tuple(recipe_controls),
+        lacking,
+        proposals.remaining[-1],
+        prediction.remaining(standardised),
+    )
 
 
 def row(proposed: Proposed) -> Row:
@@ -85,12 +93,12 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder of the data sets")
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args(arguments)
-    found = [row(propose(name, given.data)) for name in RECIPES]
-    print(table(found))
-    if given.record:
+    options = parser.parse_args(arguments)
+    table_rows = [row(propose(name, options.data)) for name in RECIPES]
+    print(table(table_rows))
+    if options.record:
         command = "python benchmarks/proposed_controls.py DATA --record"
-        record({"proposed_controls": found}, command, RESULTS)
+        record({"proposed_controls": table_rows}, command, RESULTS)
 
 
 if __name__ == "__main__":

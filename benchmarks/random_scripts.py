@@ -78,56 +78,56 @@ def draw(cast: Cast, rng: np.random.Generator) -> Document:
             continue
         kinds = ["walk"] * 3 + ["act"] * (3 if cast.acts else 0) + (["hold"] if segments else [])
         kind = str(rng.choice(kinds))
-        made = {"walk": _walk, "act": _act, "hold": _hold}[kind]
-        segments.append(made(cast, rng, here))
-    found: Document = {"segments": segments, "fps": FPS}
+        make_segment = {"walk": _walk, "act": _act, "hold": _hold}[kind]
+        segments.append(make_segment(cast, rng, here))
+    script: Document = {"segments": segments, "fps": FPS}
     if rng.random() < 0.3:
         position = [_round(value) for value in rng.uniform(-3.0, 3.0, 2)]
-        found["start"] = {"position": position, "heading": _round(rng.uniform(-1.2, 1.2))}
+        script["start"] = {"position": position, "heading": _round(rng.uniform(-1.2, 1.2))}
     if rng.random() < 0.3:
-        found |= {"take": int(rng.integers(0, 1000)), "detail": bool(rng.random() < 0.5)}
+        script |= {"take": int(rng.integers(0, 1000)), "detail": bool(rng.random() < 0.5)}
     if rng.random() < 0.2:
-        found["feet"] = "as_predicted"
+        script["feet"] = "as_predicted"
     if rng.random() < 0.2:
-        found["extrapolate"] = "refuse"
-    return found
+        script["extrapolate"] = "refuse"
+    return script
 
 
 def _walk(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
     name = str(rng.choice(list(cast.walks)))
     low, high = cast.walks[name]
     speeds = rng.uniform(low, min(high, 1.8), 3)
-    own: Document = {"kind": "walk", "model": name}
+    segment: Document = {"kind": "walk", "model": name}
     if rng.random() < 0.7:
-        own["speed"] = _round(speeds[0])
+        segment["speed"] = _round(speeds[0])
     elif rng.random() < 0.5:
         pairs = zip((0.0, 2.0, 5.0), speeds, strict=True)
-        own["speed"] = [[place, _round(speed)] for place, speed in pairs]
-        own["speed_over"] = str(rng.choice(["distance", "time"]))
-    way = str(rng.choice(["seconds", "seconds", "seconds", "to", "along"]))
-    if way == "seconds":
-        own["seconds"] = _round(rng.uniform(0.3, 6.0))
+        segment["speed"] = [[distance, _round(speed)] for distance, speed in pairs]
+        segment["speed_over"] = str(rng.choice(["distance", "time"]))
+    path_kind = str(rng.choice(["seconds", "seconds", "seconds", "to", "along"]))
+    if path_kind == "seconds":
+        segment["seconds"] = _round(rng.uniform(0.3, 6.0))
         if rng.random() < 0.5:
-            own["turn"] = _round(rng.uniform(-0.4, 0.4))
-    elif way == "to":
-        own["to"] = _ahead(rng, here)
-    elif way == "along":
-        own["along"] = [_ahead(rng, here) for _ in range(int(rng.integers(1, 4)))]
+            segment["turn"] = _round(rng.uniform(-0.4, 0.4))
+    elif path_kind == "to":
+        segment["to"] = _ahead(rng, here)
+    elif path_kind == "along":
+        segment["along"] = [_ahead(rng, here) for _ in range(int(rng.integers(1, 4)))]
     for end in ("start", "stop"):
         if rng.random() < 0.25:
-            own[end] = "standing"
-    return own | _joined(rng)
+            segment[end] = "standing"
+    return segment | _joined(rng)
 
 
 def _lead(cast: Cast, rng: np.random.Generator, here: list[float]) -> list[Document]:
     """Return a walk without an end of its own, and the act that it leads to."""
-    own = {"kind": "walk", "model": str(rng.choice(list(cast.walks)))}
+    segment = {"kind": "walk", "model": str(rng.choice(list(cast.walks)))}
     act = _act(cast, rng, here)
     if "at" not in act:
         targets = act.get("targets", [])
         if not targets or targets[0]["frame"] != "world":
             act |= {"at": _ahead(rng, here), "targets": []}
-    return [own, act]
+    return [segment, act]
 
 
 def _ahead(rng: np.random.Generator, here: list[float]) -> list[float]:
@@ -139,27 +139,27 @@ def _ahead(rng: np.random.Generator, here: list[float]) -> list[float]:
 def _act(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
     name = str(rng.choice(list(cast.acts)))
     card = cast.acts[name].session.card
-    own: Document = {"kind": "act", "model": name}
+    segment: Document = {"kind": "act", "model": name}
     if rng.random() < 0.5:
-        own["controls"] = {
-            each.name: _round(rng.uniform(each.minimum, each.maximum))
-            for each in card.controls
+        segment["controls"] = {
+            control.name: _round(rng.uniform(control.minimum, control.maximum))
+            for control in card.controls
             if rng.random() < 0.7
         }
     if card.performers and rng.random() < 0.3:
-        own["performer"] = str(rng.choice(card.performers))
+        segment["performer"] = str(rng.choice(card.performers))
     if rng.random() < 0.5 and card.event is not None:
-        own["targets"] = [_target(cast.acts[name], rng, here)]
+        segment["targets"] = [_target(cast.acts[name], rng, here)]
     if rng.random() < 0.3:
-        own["at"] = _ahead(rng, here)
-        own["facing"] = _round(rng.uniform(-3.2, 3.2))
-    return own | _joined(rng)
+        segment["at"] = _ahead(rng, here)
+        segment["facing"] = _round(rng.uniform(-3.2, 3.2))
+    return segment | _joined(rng)
 
 
 def _target(model: Synthesizer, rng: np.random.Generator, here: list[float]) -> Document:
     card = model.session.card
     frame = str(rng.choice(["world", "segment"]))
-    height = [own for own in card.controls if "height" in own.name]
+    height = [control for control in card.controls if "height" in control.name]
     low, high = (height[0].minimum, height[0].maximum) if height else (0.2, 1.5)
     x, z = _ahead(rng, list(here)) if frame == "world" else rng.uniform(-0.3, 0.8, 2)
     joint = card.skeleton.names[card.event.joint] if card.event else card.skeleton.names[-1]
@@ -168,10 +168,10 @@ def _target(model: Synthesizer, rng: np.random.Generator, here: list[float]) -> 
 
 
 def _hold(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
-    own: Document = {"kind": "hold", "seconds": _round(rng.uniform(0.1, 3.0))}
+    segment: Document = {"kind": "hold", "seconds": _round(rng.uniform(0.1, 3.0))}
     if rng.random() < 0.3:
-        own["look_at"] = [_round(value) for value in rng.uniform([-3, 0, 0], [3, 2, 9])]
-    return own
+        segment["look_at"] = [_round(value) for value in rng.uniform([-3, 0, 0], [3, 2, 9])]
+    return segment
 
 
 def _joined(rng: np.random.Generator) -> Document:
@@ -205,9 +205,9 @@ def check(document: Document, find: Callable[[str], Synthesizer]) -> Outcome:
         script = resolve_script(question, find)
         answer = composition.perform(script, MOST_FRAMES)
     except QueryError as refusal:
-        said = f"/{refusal.field}: {refusal.message}"
-        known = exists(msgspec.to_builtins(question), f"/{refusal.field}")
-        return Outcome([] if known else [f"no such pointer: {said}"], said)
+        note = f"/{refusal.field}: {refusal.message}"
+        is_known = exists(msgspec.to_builtins(question), f"/{refusal.field}")
+        return Outcome([] if is_known else [f"no such pointer: {note}"], note)
     return Outcome(list(faults(script, answer)), "", answer)
 
 
@@ -218,13 +218,13 @@ def read(document: Document) -> PerformanceQuestion:
 
 def exists(document: Any, pointer: str) -> bool:
     """Return whether a JSON pointer leads to a value of a document."""
-    for part in pointer.split("/")[1:]:
+    for key in pointer.split("/")[1:]:
         if isinstance(document, list | tuple):
-            if not part.isdecimal() or int(part) >= len(document):
+            if not key.isdecimal() or int(key) >= len(document):
                 return False
-            document = document[int(part)]
-        elif isinstance(document, dict) and part in document:
-            document = document[part]
+            document = document[int(key)]
+        elif isinstance(document, dict) and key in document:
+            document = document[key]
         else:
             return False
     return True
@@ -234,7 +234,7 @@ def faults(script: Script, answer: PerformanceAnswer) -> Iterator[str]:
     """Yield the faults of a performance, one sentence each."""
     clip, report = answer.clip, answer.trust
     numbers = (clip.rotations, clip.translations, clip.root_path)
-    if not all(np.isfinite(own).all() for own in numbers):
+    if not all(np.isfinite(script_warning).all() for script_warning in numbers):
         yield "numbers that are not finite"
         return
     if len(clip) != report.frames:
@@ -242,9 +242,9 @@ def faults(script: Script, answer: PerformanceAnswer) -> Iterator[str]:
     lengths = np.linalg.norm(clip.rotations, axis=-1)
     if np.abs(lengths - 1.0).max() > 1e-5:
         yield f"quaternions of length {lengths.min():g} to {lengths.max():g}"
-    for own in report.script_warnings:
-        if not exists(msgspec.to_builtins(script.question), own.pointer):
-            yield f"no such pointer in a warning: {own.sentence}"
+    for script_warning in report.script_warnings:
+        if not exists(msgspec.to_builtins(script.question), script_warning.pointer):
+            yield f"no such pointer in a warning: {script_warning.sentence}"
     positions = clip.positions()
     yield from _timeline(answer)
     yield from _jumps(answer, accelerations(clip, positions))
@@ -253,60 +253,66 @@ def faults(script: Script, answer: PerformanceAnswer) -> Iterator[str]:
 
 def accelerations(clip: Clip, positions: Positions) -> Frames:
     """Return the mean accelerations (F,) of the joints relative to the root, m/s²; ends are 0."""
-    found = positions - positions[:, :1]
+    relative = positions - positions[:, :1]
     means = np.zeros(len(clip))
     if len(clip) > 2:
-        second = np.diff(found, n=2, axis=0) * clip.rate**2
+        second = np.diff(relative, n=2, axis=0) * clip.rate**2
         means[1:-1] = np.linalg.norm(second, axis=-1).mean(axis=-1)
     return means
 
 
 def _timeline(answer: PerformanceAnswer) -> Iterator[str]:
     report = answer.trust
-    ends = [own.ends for own in report.segments]
-    begins = [own.begins for own in report.segments]
-    if begins[0] != 0.0 or abs(ends[-1] - report.duration) > 1e-5 or begins[1:] != ends[:-1]:
-        yield f"segments from {begins} to {ends}, {report.duration} s in all"
-    if any(own.ends < own.begins for own in report.segments):
-        yield f"a segment ends before it begins: {begins}, {ends}"
-    if any(not math.isfinite(own.sigma) for own in report.segments):
+    end_points = [segment.ends for segment in report.segments]
+    begins = [segment.begins for segment in report.segments]
+    if (
+        begins[0] != 0.0
+        or abs(end_points[-1] - report.duration) > 1e-5
+        or begins[1:] != end_points[:-1]
+    ):
+        yield f"segments from {begins} to {end_points}, {report.duration} s in all"
+    if any(segment.ends < segment.begins for segment in report.segments):
+        yield f"a segment ends before it begins: {begins}, {end_points}"
+    if any(not math.isfinite(segment.sigma) for segment in report.segments):
         yield "a sigma that is not finite"
 
 
-def _jumps(answer: PerformanceAnswer, found: Frames) -> Iterator[str]:
+def _jumps(answer: PerformanceAnswer, accelerations_found: Frames) -> Iterator[str]:
     """Yield frames whose accelerations are larger than the report of the joins says."""
     joins = answer.trust.joins
-    usual = max((own.usual for own in joins), default=float(np.percentile(found, 99.0)))
-    times = np.arange(len(found)) / answer.clip.rate
-    free = np.ones(len(found), dtype=bool)
-    flagged = {own.pointer for own in answer.trust.script_warnings if FAST in own.message}
+    typical = max(
+        (join.usual for join in joins), default=float(np.percentile(accelerations_found, 99.0))
+    )
+    times = np.arange(len(accelerations_found)) / answer.clip.rate
+    free = np.ones(len(accelerations_found), dtype=bool)
+    flagged = {join.pointer for join in answer.trust.script_warnings if FAST in join.message}
     for index, segment in enumerate(answer.trust.segments):
         if f"/segments/{index}" in flagged:
             free &= (times < segment.begins) | (times > segment.ends)
-    for own in joins:
-        near = (times >= own.time - BEFORE) & (times <= own.time + AFTER)
+    for join in joins:
+        near = (times >= join.time - BEFORE) & (times <= join.time + AFTER)
         free &= ~near
-        peak = float(found[near].max(initial=0.0))
-        allowed = max(own.peak, MOST_PEAK * own.usual)
-        if not own.hard and peak > allowed:
+        peak = float(accelerations_found[near].max(initial=0.0))
+        allowed = max(join.peak, MOST_PEAK * join.usual)
+        if not join.hard and peak > allowed:
             yield (
-                f"join at {own.time:.2f} s: {peak:.1f} m/s², {own.peak:.1f} said, usual "
-                f"{own.usual:.1f}"
+                f"join at {join.time:.2f} s: {peak:.1f} m/s², {join.peak:.1f} said, usual "
+                f"{join.usual:.1f}"
             )
-    worst = float(found[free].max(initial=0.0))
-    if worst > max(MOST_PEAK * usual, CAPTURED_PEAK):
-        time = float(times[free][np.argmax(found[free])])
-        yield f"{worst:.1f} m/s² at {time:.2f} s, away from joins; usual {usual:.1f}"
+    worst = float(accelerations_found[free].max(initial=0.0))
+    if worst > max(MOST_PEAK * typical, CAPTURED_PEAK):
+        time = float(times[free][np.argmax(accelerations_found[free])])
+        yield f"{worst:.1f} m/s² at {time:.2f} s, away from joins; usual {typical:.1f}"
 
 
 def _depth(script: Script, answer: PerformanceAnswer, positions: Positions) -> Iterator[str]:
     feet = script.character.feet
     if script.question.feet != "stand" or not feet:
         return
-    for foot, known in zip(feet, script.character.contacts, strict=True):
+    for foot, contact in zip(feet, script.character.contacts, strict=True):
         # A foot goes where its target is.
         led = _led(script, answer, script.character.skeleton.names[foot])
-        depth = np.where(led, 0.0, known.height - positions[:, foot, 1])
+        depth = np.where(led, 0.0, contact.height - positions[:, foot, 1])
         if depth.max() > DEEPEST:
             frame = int(np.argmax(depth))
             yield f"foot {foot} is {100 * depth.max():.1f} cm below the floor in frame {frame}"
@@ -316,14 +322,18 @@ def _led(script: Script, answer: PerformanceAnswer, joint: str) -> Booleans:
     """Return the frames (F,) near the event of an act, or in a hold of it, that leads a joint."""
     report = answer.trust
     times = np.arange(report.frames) / answer.clip.rate
-    found = np.zeros(len(times), dtype=bool)
-    for index, (own, told) in enumerate(zip(script.segments, report.segments, strict=True)):
-        if not isinstance(own, Act) or joint not in {each.joint for each in own.targets}:
+    values = np.zeros(len(times), dtype=bool)
+    for index, (segment, segment_report) in enumerate(
+        zip(script.segments, report.segments, strict=True)
+    ):
+        if not isinstance(segment, Act) or joint not in {
+            target.joint for target in segment.targets
+        }:
             continue
-        begins = ends = told.event or told.ends
+        begins = end_points = segment_report.event or segment_report.ends
         for later in report.segments[index + 1 :]:
             if later.kind != "hold":
                 break
-            ends = later.ends
-        found |= (times >= begins - LED) & (times <= ends + LED)
-    return found
+            end_points = later.ends
+        values |= (times >= begins - LED) & (times <= end_points + LED)
+    return values

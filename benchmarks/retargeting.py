@@ -57,11 +57,13 @@ def recipe_of(name: str, data: Path) -> Recipe:
 
 def first_clip(name: str, beginning: str, data: Path) -> Clip:
     """Return the whole motion of the first file of a family with a beginning of its name."""
-    own = recipe_of(name, data)
-    rows = [row for row in clip_table.read(own, data) if row.file.name.startswith(beginning)]
-    found = ingest.read_files(rows[:1], own.source)
-    (file,) = found.values()
-    clip = ingest.clip_of_file(file, own.source)
+    family_recipe = recipe_of(name, data)
+    rows = [
+        row for row in clip_table.read(family_recipe, data) if row.file.name.startswith(beginning)
+    ]
+    examples = ingest.read_files(rows[:1], family_recipe.source)
+    (file,) = examples.values()
+    clip = ingest.clip_of_file(file, family_recipe.source)
     return standing(clip) if name.startswith("bandai") else clip
 
 
@@ -70,9 +72,9 @@ def standing(clip: Clip) -> Clip:
 
     Joints of Bandai-Namco's files are at rest along one axis, which no character's file is.
     """
-    places, joints = clip.positions()[0], clip.skeleton
-    offsets = places - places[list(joints.parents)]
-    offsets[0] = places[0]
+    positions, joints = clip.positions()[0], clip.skeleton
+    offsets = positions - positions[list(joints.parents)]
+    offsets[0] = positions[0]
     rest = replace(joints, offsets=offsets, tip_joints=(), tip_offsets=np.zeros((0, 3)))
     still = np.tile(quat.IDENTITY, (1, len(joints), 1))
     return Clip(rest, still, offsets[None], clip.rate)
@@ -90,15 +92,15 @@ def captured_walks(data: Path) -> list[Motion]:
 
     Their joints have roles by their names.
     """
-    own = recipe_of("cmu_walk", data)
-    files = ingest.read_files(clip_table.read(own, data), own.source)
-    found = []
+    family_recipe = recipe_of("cmu_walk", data)
+    files = ingest.read_files(clip_table.read(family_recipe, data), family_recipe.source)
+    walks = []
     for file in files.values():
-        clip = ingest.clip_of_file(file, own.source)
-        kept = slice(1, None, round(clip.rate / RATE))
-        turns, places = clip.rotations[kept], clip.translations[kept]
-        found.append(Motion(replace(clip, rotations=turns, translations=places, rate=RATE), {}))
-    return found
+        clip = ingest.clip_of_file(file, family_recipe.source)
+        frames = slice(1, None, round(clip.rate / RATE))
+        turns, positions = clip.rotations[frames], clip.translations[frames]
+        walks.append(Motion(replace(clip, rotations=turns, translations=positions, rate=RATE), {}))
+    return walks
 
 
 def shipped_walks() -> list[Motion]:
@@ -113,25 +115,27 @@ def shipped_walks() -> list[Motion]:
     ]
 
 
-def figures(name: str, found: Sequence[RetargetReport]) -> Iterator[Row]:
+def figures(name: str, reports: Sequence[RetargetReport]) -> Iterator[Row]:
     """Yield the rows of one kind of motions on one rig."""
 
     def mean(values: Sequence[float]) -> float:
         return float(np.mean(values))
 
-    before = mean([own.skate_source for own in found])
-    copied, after = (mean([getattr(r, f) for r in found]) for f in ("skate_copied", "skate"))
-    said = f"{len(found)} motions, legs {mean([r.scale for r in found]):.2f} times as long"
+    before = mean([report.skate_source for report in reports])
+    copied, after = (mean([getattr(r, f) for r in reports]) for f in ("skate_copied", "skate"))
+    note = f"{len(reports)} motions, legs {mean([r.scale for r in reports]):.2f} times as long"
     speeds = f"{1e3 * before:.2f} mm/s of the motion; {1e3 * copied:.2f} copied"
     if before > 1e-3:
         yield Row(f"{name}: skate over the motion's", after / before, "", speeds, None, SKATE)
     else:
         yield Row(f"{name}: skate", 1e3 * after, "mm/s", speeds, None, 1.0)
-    depth = 100.0 * max(r.penetration for r in found)
-    yield Row(f"{name}: depth below the floor, worst p99", depth, "cm", said, None, DEPTH)
-    turned = np.degrees([r.legs_turned for r in found])
-    most = f"worst {turned.max():.1f}; pelvis lowered {100 * max(r.lowered for r in found):.1f} cm"
-    yield Row(f"{name}: legs turned, mean", mean(turned.tolist()), "degrees", most, None, TURNED)
+    depth = 100.0 * max(r.penetration for r in reports)
+    yield Row(f"{name}: depth below the floor, worst p99", depth, "cm", note, None, DEPTH)
+    turned = np.degrees([r.legs_turned for r in reports])
+    largest = (
+        f"worst {turned.max():.1f}; pelvis lowered {100 * max(r.lowered for r in reports):.1f} cm"
+    )
+    yield Row(f"{name}: legs turned, mean", mean(turned.tolist()), "degrees", largest, None, TURNED)
 
 
 def spent(motion: Motion, rig: Rig) -> Row:
@@ -162,20 +166,20 @@ def main(arguments: Sequence[str]) -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder with the families, unpacked")
-    given = parser.parse_args(arguments)
-    shipped, captured = shipped_walks(), captured_walks(given.data)
+    options = parser.parse_args(arguments)
+    shipped, captured = shipped_walks(), captured_walks(options.data)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         bodies = {
-            name: first_clip(family, beginning, given.data)
+            name: first_clip(family, beginning, options.data)
             for name, (family, beginning) in BODIES.items()
         }
         bodies["shipped mannequin"] = shipped[0].clip
         for name, body in bodies.items():
             rig = rig_of(body, Path(folder), name)
             for kind, motions in (("shipped walk", shipped), ("CMU walks", captured)):
-                found = [retarget(own.clip, rig, own.roles)[1] for own in motions]
-                rows += figures(f"{kind} onto {name}", found)
+                reports = [retarget(motion.clip, rig, motion.roles)[1] for motion in motions]
+                rows += figures(f"{kind} onto {name}", reports)
         rows.append(spent(shipped[2], rig))
     print(table(rows))
 

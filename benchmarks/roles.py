@@ -27,9 +27,9 @@ def measure(table: str, first: dict[str, int] | None) -> dict[str, Any]:
     """Return the conventions of a table and their counts. first: counts of its first run."""
     skeletons = skeleton_tables.read(table)
     counts = {"right": 0, "asked": 0, "wrong": 0}
-    for own in skeletons.values():
-        found = joint_recognition.roles_of(own.names, own.parents)
-        right, wrong, missing = own.count(found)
+    for skeleton in skeletons.values():
+        recognised = joint_recognition.roles_of(skeleton.names, skeleton.parents)
+        right, wrong, missing = skeleton.count(recognised)
         counts["right"] += right
         counts["wrong"] += len(wrong)
         counts["asked"] += len(missing)
@@ -41,11 +41,11 @@ def rows(measured: dict[str, Any]) -> list[Row]:
     now, first = measured["now"], measured["first"]
     name = f"{measured['table'].replace('_', ' ')}, {len(measured['conventions'])} conventions"
     count = sum(now.values())
-    asked = f"of {count} roles" + (f"; {first['asked']} in the first run" if first else "")
+    comment = f"of {count} roles" + (f"; {first['asked']} in the first run" if first else "")
     wrong = f"{first['wrong']} in the first run" if first else ""
     share = 100.0 * now["asked"] / count
     return [
-        Row(f"{name}: asked", share, "%", asked, None, None),
+        Row(f"{name}: asked", share, "%", comment, None, None),
         Row(f"{name}: wrong", now["wrong"], "roles", wrong, None, 0.0 if first else None),
     ]
 
@@ -62,14 +62,14 @@ def main(arguments: Sequence[str]) -> None:
     """Print the figures; write them where the documentation reads them if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     first = json.loads(FIRST_RUNS.read_text(encoding="utf-8"))
     measured = [measure(name, first.get(name)) for name in TABLES]
-    found = [row for counts in measured for row in rows(counts)]
-    found.append(held_out([counts["now"] for counts in measured if counts["first"]]))
-    print(table(found))
-    if given.record:
-        record({"roles": found}, "python benchmarks/roles.py --record", ROOT / "docs/results")
+    table_rows = [row for counts in measured for row in rows(counts)]
+    table_rows.append(held_out([counts["now"] for counts in measured if counts["first"]]))
+    print(table(table_rows))
+    if options.record:
+        record({"roles": table_rows}, "python benchmarks/roles.py --record", ROOT / "docs/results")
 
 
 if __name__ == "__main__":

@@ -57,8 +57,8 @@ def record(tables: Mapping[str, list[Row]], command: str, folder: Path, device: 
     device: that computed, if it is not the machine's processor.
     """
     for name, rows in tables.items():
-        found = {**origin(command, device), "rows": _plain(rows)}
-        (folder / f"{name}.json").write_text(compact(found) + "\n", encoding="utf-8")
+        recorded = {**origin(command, device), "rows": _plain(rows)}
+        (folder / f"{name}.json").write_text(compact(recorded) + "\n", encoding="utf-8")
 
 
 def compact(value: object, indent: int = 0) -> str:
@@ -66,20 +66,20 @@ def compact(value: object, indent: int = 0) -> str:
     line = json.dumps(value, ensure_ascii=False)
     if len(line) <= WIDTH or not isinstance(value, dict | list):
         return line
-    parts = (
-        [f"{json.dumps(key)}: {compact(part, indent + 1)}" for key, part in value.items()]
+    items = (
+        [f"{json.dumps(key)}: {compact(item, indent + 1)}" for key, item in value.items()]
         if isinstance(value, dict)
-        else [compact(part, indent + 1) for part in value]
+        else [compact(item, indent + 1) for item in value]
     )
     start, end = "{}" if isinstance(value, dict) else "[]"
-    lines = ",\n".join(" " * (indent + 1) + part for part in parts)
+    lines = ",\n".join(" " * (indent + 1) + item for item in items)
     return f"{start}\n{lines}\n{' ' * indent}{end}"
 
 
 def origin(command: str, device: str = "") -> dict[str, str]:
     """Return the command, the date and the machine of figures that are measured now."""
-    parts = platform.machine(), platform.system(), f"Python {platform.python_version()}", device
-    machine = ", ".join(filter(None, parts))
+    facts = platform.machine(), platform.system(), f"Python {platform.python_version()}", device
+    machine = ", ".join(filter(None, facts))
     return {"command": command, "date": f"{datetime.now(UTC):%Y-%m-%d}", "machine": machine}
 
 

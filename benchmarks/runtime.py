@@ -35,63 +35,64 @@ class Asked:
         return self.session.run(outputs, self.feed)
 
 
-def rows(made: Family) -> list[Row]:
+def rows(trained_family: Family) -> list[Row]:
     """A clip of 100 frames, a single pose, what pruning saves, and the file's size."""
-    model = made.trained.model
+    model = trained_family.trained.model
     content, same = (
-        naive_graphs.fitted(made, chart) for chart in (naive_graphs.VECTORS, "stereographic")
+        naive_graphs.fitted(trained_family, chart)
+        for chart in (naive_graphs.VECTORS, "stereographic")
     )
-    point = _between(made)
+    point = _between(trained_family)
     duration = model.evaluate(point, np.zeros((1, 1))).duration[0]
     times = np.linspace(0.0, duration, FRAMES)[None]
-    asked = {"controls": point.astype(np.float32), "time": times.astype(np.float32)}
-    ours = {name: Asked(_own(made, outputs), asked) for name, outputs in OURS.items()}
+    query = {"controls": point.astype(np.float32), "time": times.astype(np.float32)}
+    ours = {name: Asked(_own(trained_family, outputs), query) for name, outputs in OURS.items()}
     rivals = {
-        name: Asked(_session(made_by()), asked)
+        name: Asked(_session(made_by()), query)
         for name, made_by in (
             ("once", content.every_frame_once),
             ("dual", content.every_frame_once_dual),
             ("gathered", content.gathered),
         )
     }
-    chart = {"same": Asked(_session(same.every_frame_once_dual()), asked)}
+    chart = {"same": Asked(_session(same.every_frame_once_dual()), query)}
     naive_graphs.check(content, rivals, point, times)
     naive_graphs.check(same, chart, point, times)
-    taken = in_turn({**ours, **rivals, **chart}, rounds=15, repeats=30)
+    timings = in_turn({**ours, **rivals, **chart}, rounds=15, repeats=30)
     return [
-        *(_clip_row(taken, name, words, goal) for name, words, goal in RIVALS),
-        _clip_row(taken, "dual", f"{DUAL}, rotations and root alone", 5.0, "alone"),
-        *_batch_rows(made, content, ours["ours"]),
-        *_small_rows(made, ours["ours"], asked),
+        *(_clip_row(timings, name, words, goal) for name, words, goal in RIVALS),
+        _clip_row(timings, "dual", f"{DUAL}, rotations and root alone", 5.0, "alone"),
+        *_batch_rows(trained_family, content, ours["ours"]),
+        *_small_rows(trained_family, ours["ours"], query),
     ]
 
 
-def _own(made: Family, outputs: tuple[str, ...]) -> Any:
+def _own(trained_family: Family, outputs: tuple[str, ...]) -> Any:
     """Return a session on outputs of the model at its finest level, as the service opens it."""
     values = [ROW_VALUES[output] for output in outputs]
-    fixed = onnx_file.fix_level(made.exported.content, 0)
+    fixed = onnx_file.fix_level(trained_family.exported.content, 0)
     return _session(onnx_file.select_outputs(fixed, *values))
 
 
-def _batch_rows(made: Family, content: Contents, ours: Asked) -> list[Row]:
+def _batch_rows(trained_family: Family, content: Contents, ours: Asked) -> list[Row]:
     """Poses of as many questions, each at its own time."""
-    model = made.trained.model
+    model = trained_family.trained.model
     rng = np.random.Generator(np.random.PCG64(POSES))
     controls = rng.uniform(model.bank.low, model.bank.high, (POSES, len(model.bank.low)))
     controls = controls.astype(np.float32).astype(float)
     durations = model.evaluate(controls, np.zeros((POSES, 1))).duration
     times = (rng.uniform(0.0, 1.0, POSES) * durations).astype(np.float32).astype(float)[:, None]
-    asked = {"controls": controls.astype(np.float32), "time": times.astype(np.float32)}
+    query = {"controls": controls.astype(np.float32), "time": times.astype(np.float32)}
     rivals = {
         "for each question its two frames' inverses and samples": content.batch,
         "the same with inverse and samples multiplied beforehand": content.batch_dual,
     }
-    runs = {words: Asked(_session(made_by()), asked) for words, made_by in rivals.items()}
+    runs = {words: Asked(_session(made_by()), query) for words, made_by in rivals.items()}
     naive_graphs.check(content, runs, controls, times)
-    taken = in_turn({"ours": Asked(ours.session, asked), **runs}, rounds=15, repeats=10)
-    name, mine = f"{POSES} poses, one call", taken["ours"]
+    timings = in_turn({"ours": Asked(ours.session, query), **runs}, rounds=15, repeats=10)
+    name, mine = f"{POSES} poses, one call", timings["ours"]
     return [
-        Row(name, 1e6 * mine, "µs", WORDS + words, taken[words] / mine, 7.0) for words in rivals
+        Row(name, 1e6 * mine, "µs", WORDS + words, timings[words] / mine, 7.0) for words in rivals
     ]
 
 
@@ -119,40 +120,42 @@ OURS = {"ours": POSE_OUTPUTS, "alone": ("rotations", "root_position")}
 
 
 def _clip_row(
-    taken: dict[str, float], name: str, words: str, goal: float | None, ours: str = "ours"
+    timings: dict[str, float], name: str, words: str, goal: float | None, ours: str = "ours"
 ) -> Row:
-    ratio = taken[name] / taken[ours]
-    return Row(f"clip of {FRAMES} frames, one call", 1e6 * taken[ours], "µs", words, ratio, goal)
+    ratio = timings[name] / timings[ours]
+    return Row(f"clip of {FRAMES} frames, one call", 1e6 * timings[ours], "µs", words, ratio, goal)
 
 
-def _small_rows(made: Family, ours: Asked, asked: dict[str, Any]) -> list[Row]:
-    one = Asked(ours.session, {**asked, "time": asked["time"][:, :1]})
-    taken = in_turn(
+def _small_rows(trained_family: Family, ours: Asked, query: dict[str, Any]) -> list[Row]:
+    one = Asked(ours.session, {**query, "time": query["time"][:, :1]})
+    timings = in_turn(
         {
             "pose": one,
-            "duration": Asked(_own(made, ("duration",)), {"controls": asked["controls"]}),
+            "duration": Asked(_own(trained_family, ("duration",)), {"controls": query["controls"]}),
         },
         rounds=15,
         repeats=100,
     )
     return [
-        Row("single pose, one call", 1e6 * taken["pose"], "µs", "", None, None),
+        Row("single pose, one call", 1e6 * timings["pose"], "µs", "", None, None),
         Row(
             "duration alone, one call",
-            1e6 * taken["duration"],
+            1e6 * timings["duration"],
             "µs",
             "all outputs, which a session computes whether or not they are asked for",
-            taken["pose"] / taken["duration"],
+            timings["pose"] / timings["duration"],
             None,
         ),
-        Row("model file", len(made.exported.content) / 1e3, "kB", "", None, 120.0),
-        Row(TRAINING, made.seconds, "s", "", None, 30.0),
+        Row("model file", len(trained_family.exported.content) / 1e3, "kB", "", None, 120.0),
+        Row(TRAINING, trained_family.seconds, "s", "", None, 30.0),
     ]
 
 
-def _between(made: Family) -> Any:
+def _between(trained_family: Family) -> Any:
     """A control point (1, d) between two samples."""
-    return np.mean([made.examples[4].controls, made.examples[9].controls], axis=0)[None]
+    return np.mean(
+        [trained_family.examples[4].controls, trained_family.examples[9].controls], axis=0
+    )[None]
 
 
 def _session(content: bytes) -> Any:

@@ -48,17 +48,17 @@ PICTURE = ROOT / "docs/scale.png"
 
 def measure(clips: int) -> dict[str, Any]:
     """Return the figures of a family of some clips: this process trains it and nothing else."""
-    place = FOLDER / f"reaching_{clips}"
-    file = sample_files.write_family(place, sample_files.samples(clips))
+    folder = FOLDER / f"reaching_{clips}"
+    file = sample_files.write_family(folder, sample_files.samples(clips))
     before, start = _cpu(), time.perf_counter()
-    own = recipe.read(file)
-    trained = posefield_train.train(own, file.parent)
+    family_recipe = recipe.read(file)
+    trained = posefield_train.train(family_recipe, file.parent)
     exported = onnx_export.export_model(trained)
     spent, wall = _cpu() - before, time.perf_counter() - start
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     used = use(exported.content) if clips == USED else {}
     with single_threaded():
-        compared = compare(own, trained)
+        compared = compare(family_recipe, trained)
     return {
         "clips": clips,
         "listed": exported.card.samples,
@@ -98,7 +98,7 @@ def _children_seconds(words: Sequence[object]) -> float:
     return round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, 1)
 
 
-def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
+def compare(family_recipe: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
     """Return distances to the truth, cm, and the error of new clips over their sigma.
 
     truth_cm: over the whole range of the controls. among_cm: at control points among the clips, of
@@ -107,93 +107,95 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
     squares.
     """
     points = ground_truth.truth_points(ASKED)
-    found = _answers(own, trained, points)
+    motions = _answers(family_recipe, trained, points)
     rng = np.random.Generator(np.random.PCG64(SEED))
     clips = [sample_files.noisy_trial(parse_controls(list(point)), rng) for point in points]
     captured = [motion_errors.motion_of_clip(clip, None) for clip in clips]
     squares = [
-        motion_errors.compare_motions(made, one, ()).mean_squared_error
-        for made, one in zip(found, captured, strict=True)
+        motion_errors.compare_motions(motion, one, ()).mean_squared_error
+        for motion, one in zip(motions, captured, strict=True)
     ]
     bank = trained.model.bank
-    places = bank.points(points, np.zeros((len(points), bank.label_count)))
-    sigma = bank.sigma(bank.numpy(places)[VARIANCE])
+    positions = bank.points(points, np.zeros((len(points), bank.label_count)))
+    sigma = bank.sigma(bank.numpy(positions)[VARIANCE])
     among = np.array([astuple(controls) for _, controls in sample_files.design(ASKED)])
     return {
-        "truth_cm": _distance(found, points),
-        "among_cm": _distance(_answers(own, trained, among), among),
+        "truth_cm": _distance(motions, points),
+        "among_cm": _distance(_answers(family_recipe, trained, among), among),
         "sigma_ratio": round(float(np.sqrt(np.mean(squares) / np.mean(np.square(sigma)))), 3),
     }
 
 
-def _answers(own: recipe.Recipe, trained: TrainedModel, points: Floats) -> list[ComparedMotion]:
+def _answers(
+    family_recipe: recipe.Recipe, trained: TrainedModel, points: Floats
+) -> list[ComparedMotion]:
     return predictions.predict_posefield(trained, Queries(points, [{}] * len(points)))
 
 
-def _distance(found: Sequence[ComparedMotion], points: Floats) -> float:
+def _distance(motions: Sequence[ComparedMotion], points: Floats) -> float:
     """Return the mean distance, cm, of motions from the noise-free ones at control points."""
     truths = ground_truth.truth_motions(points, None)
-    pairs = zip(found, truths, strict=True)
-    errors = [motion_errors.compare_motions(made, true, ()) for made, true in pairs]
+    pairs = zip(motions, truths, strict=True)
+    errors = [motion_errors.compare_motions(motion, true, ()) for motion, true in pairs]
     return round(100 * motion_errors.mean(errors).absolute.mean, 3)
 
 
 def _cpu() -> float:
-    own = resource.getrusage(resource.RUSAGE_SELF)
-    return own.ru_utime + own.ru_stime
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
 
 
 def curve(counts: Sequence[int]) -> list[dict[str, Any]]:
     """Return the figures of families, those that are not kept measured in processes."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    found = []
+    measurements = []
     for clips in counts:
-        kept = FOLDER / f"{clips}.json"
-        if not kept.exists():
+        path = FOLDER / f"{clips}.json"
+        if not path.exists():
             words = [sys.executable, __file__, "--one", str(clips)]
-            told = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout
-            kept.write_text(told, encoding="utf-8")
-        found.append(json.loads(kept.read_text(encoding="utf-8")))
-    return found
+            output = subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout
+            path.write_text(output, encoding="utf-8")
+        measurements.append(json.loads(path.read_text(encoding="utf-8")))
+    return measurements
 
 
-def rows(found: Sequence[dict[str, Any]]) -> list[Row]:
+def rows(measurements: Sequence[dict[str, Any]]) -> list[Row]:
     """Return the rows of the documentation's table."""
-    first = found[0]
-    return [row for own in found for row in _rows(own, first)]
+    first = measurements[0]
+    return [row for measurement in measurements for row in _rows(measurement, first)]
 
 
-def _rows(own: dict[str, Any], first: dict[str, Any]) -> list[Row]:
-    clips = own["clips"]
+def _rows(measurement: dict[str, Any], first: dict[str, Any]) -> list[Row]:
+    clips = measurement["clips"]
     name = f"{clips:,} clips"
     goal = GOALS.get(clips, (None, None))[1]
-    listed = "all" if own["listed"] == clips else f"{own['listed']} inducing"
-    twice = own["disagreement"]
-    said = "" if twice is None else f"; two tunings {100 * twice:.1f} % apart"
+    listed = "all" if measurement["listed"] == clips else f"{measurement['listed']} inducing"
+    twice = measurement["disagreement"]
+    note = "" if twice is None else f"; two tunings {100 * twice:.1f} % apart"
     large, largest = clips >= 300, clips == 2_000
     return [
-        Row(f"{name}: processor time", own["cpu_s"], "s", f"{listed}{said}", None, goal),
+        Row(f"{name}: processor time", measurement["cpu_s"], "s", f"{listed}{note}", None, goal),
         Row(
             f"{name}: peak memory",
-            own["memory_mb"],
+            measurement["memory_mb"],
             "MB",
             "",
             None,
             2_000.0 if largest else None,
         ),
-        Row(f"{name}: file", own["file_kb"], "kB", "", None, 350.0 if large else None),
+        Row(f"{name}: file", measurement["file_kb"], "kB", "", None, 350.0 if large else None),
         Row(
             f"{name}: distance to the truth",
-            own["truth_cm"],
+            measurement["truth_cm"],
             "cm",
             f"{first['truth_cm']} cm of {first['clips']} clips",
             None,
             0.5 if largest else None,
         ),
-        Row(f"{name}: the same among the clips", own["among_cm"], "cm", "", None, None),
+        Row(f"{name}: the same among the clips", measurement["among_cm"], "cm", "", None, None),
         Row(
             f"{name}: error of new clips over sigma",
-            own["sigma_ratio"],
+            measurement["sigma_ratio"],
             "",
             "at least 0.6" if largest else "",
             None,
@@ -201,12 +203,12 @@ def _rows(own: dict[str, Any], first: dict[str, Any]) -> list[Row]:
         ),
         *(
             Row(f"{name}: {done}", seconds, "s", "processor time of the command", None, None)
-            for done, seconds in own["used"].items()
+            for done, seconds in measurement["used"].items()
         ),
     ]
 
 
-def draw(found: Sequence[dict[str, Any]], path: Path) -> None:
+def draw(measurements: Sequence[dict[str, Any]], path: Path) -> None:
     """Draw processor time, memory, file and distance to the truth over the number of clips."""
     import matplotlib
 
@@ -220,11 +222,11 @@ def draw(found: Sequence[dict[str, Any]], path: Path) -> None:
         ("truth_cm", "distance to the truth, cm"),
     )
     figure, axes = pyplot.subplots(1, len(panels), figsize=(11.0, 2.6), layout="constrained")
-    clips = [own["clips"] for own in found]
+    clips = [measurement["clips"] for measurement in measurements]
     for ax, (key, title) in zip(axes, panels, strict=True):
-        ax.plot(clips, [own[key] for own in found], "o-", color="#2d64c8")
+        ax.plot(clips, [measurement[key] for measurement in measurements], "o-", color="#2d64c8")
         ax.set(xlabel="clips", title=title, ylim=(0.0, None), xscale="log")
-        ax.set_xticks(clips, [f"{own:,}" for own in clips])
+        ax.set_xticks(clips, [f"{measurement:,}" for measurement in clips])
         ax.minorticks_off()
         ax.grid(alpha=0.3)
     figure.savefig(path, dpi=90, metadata={"Software": None})
@@ -236,15 +238,15 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--clips", type=int, nargs="+", default=CLIPS)
     parser.add_argument("--record", action="store_true")
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
-    given = parser.parse_args(arguments)
-    if given.one:
-        print(json.dumps(measure(given.one)))
+    options = parser.parse_args(arguments)
+    if options.one:
+        print(json.dumps(measure(options.one)))
         return
-    found = curve(given.clips)
-    print(table(rows(found)))
-    if given.record:
-        record({"scaled": rows(found)}, "make bench-scale", ROOT / "docs/results")
-        draw(found, PICTURE)
+    measurements = curve(options.clips)
+    print(table(rows(measurements)))
+    if options.record:
+        record({"scaled": rows(measurements)}, "make bench-scale", ROOT / "docs/results")
+        draw(measurements, PICTURE)
 
 
 if __name__ == "__main__":

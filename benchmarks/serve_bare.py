@@ -30,8 +30,8 @@ def main(model: Path, port: int) -> None:
     outputs = [*POSE_OUTPUTS]
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
-        given = dict(parse_qsl(scope["query_string"].decode()))
-        controls, when = [float(given[name]) for name in names], float(given["time"])
+        options = dict(parse_qsl(scope["query_string"].decode()))
+        controls, when = [float(options[name]) for name in names], float(options["time"])
         feed = {
             "controls": np.array([controls], np.float32),
             "time": np.array([[when]], np.float32),

@@ -73,9 +73,9 @@ def rows(checkout: Path, rounds: int) -> list[Row]:
 def _serving(name: str, checkout: Path) -> Iterator[Server]:
     """Serve the model by the code of a checkout."""
     port = free_port()
-    told = {"POSEFIELD_PORT": str(port), "PYTHONPATH": str(checkout / "service")}
+    environment = {"POSEFIELD_PORT": str(port), "PYTHONPATH": str(checkout / "service")}
     command: list[str | Path] = [POSEFIELD, "serve", MODEL]
-    with started(name, command, port, "/readyz", told) as server:
+    with started(name, command, port, "/readyz", environment) as server:
         yield server
 
 
@@ -97,15 +97,15 @@ def _clip_rows(pairs: Pairs, before: str) -> list[Row]:
         f"ratio {QUIET * ratio:,.0f}"
     )
     value = statistics.median(cost.each for cost in pairs["usdc"][1])
-    kept = [
-        Row(f"{what}, 1 connection", _value(pairs[key]), UNIT, said, share, 0.97)
+    table_rows = [
+        Row(f"{what}, 1 connection", _value(pairs[key]), UNIT, note, share, 0.97)
         for what, key in (("clip as usdc", "usdc alone"), ("clip as JSON", "JSON alone"))
-        for share, said in [_against(pairs[key], before)]
+        for share, note in [_against(pairs[key], before)]
     ]
     return [
         Row(name, value, UNIT, quiet, ratio, GOAL / QUIET),
         Row(f"{name}, the wish", value, UNIT, quiet, ratio, WISH / QUIET),
-        *kept,
+        *table_rows,
     ]
 
 
@@ -118,24 +118,26 @@ def _crowd_rows(pairs: Pairs, encoding: dict[str, float], before: str) -> list[R
     encoding: processor time of each format's encoder alone, s.
     """
     ratio, words = _against(pairs["json"], before)
-    found = [Row(f"crowd of {MANY} poses as JSON", _value(pairs["json"]), UNIT, words, ratio, 0.97)]
+    table_rows = [
+        Row(f"crowd of {MANY} poses as JSON", _value(pairs["json"]), UNIT, words, ratio, 0.97)
+    ]
     for name, title in BINARY.items():
-        own, json = pairs[name][1], pairs["json"][1]
-        ratios = [b.each / a.each for a, b in zip(own, json, strict=True)]
-        rest = [cost.each - 1e6 * encoding[name] for cost in own]
+        costs, json = pairs[name][1], pairs["json"][1]
+        ratios = [b.each / a.each for a, b in zip(costs, json, strict=True)]
+        rest = [cost.each - 1e6 * encoding[name] for cost in costs]
         bound = statistics.median(b.each / a for a, b in zip(rest, json, strict=True))
-        said = (
+        note = (
             f"as JSON; rounds {min(ratios):.2f} to {max(ratios):.2f}; with an encoder that costs "
             f"nothing it would be {bound:.1f}, the rest is common to all formats"
         )
         subject = f"crowd of {MANY} poses as {title}"
         share, against = _against(pairs[name], before)
         value = _value(pairs[name])
-        found += [
-            Row(subject, value, UNIT, said, statistics.median(ratios), 5.0),
+        table_rows += [
+            Row(subject, value, UNIT, note, statistics.median(ratios), 5.0),
             Row(subject, value, UNIT, against, share, None),
         ]
-    return found
+    return table_rows
 
 
 def _together_rows(model: Synthesizer, many: Sequence[dict[str, float]]) -> list[Row]:
@@ -150,12 +152,26 @@ def _together_rows(model: Synthesizer, many: Sequence[dict[str, float]]) -> list
             "encoded": lambda: encoder.write(answers, METRES),
         }
     )
-    each = {name: 1e6 * seconds / TOGETHER for name, seconds in spent.items()}
-    share = each["alone"] / each["together"]
-    said = f"one by one: {each['alone']:.0f} µs"
+    microseconds = {name: 1e6 * seconds / TOGETHER for name, seconds in spent.items()}
+    share = microseconds["alone"] / microseconds["together"]
+    note = f"one by one: {microseconds['alone']:.0f} µs"
     return [
-        Row(f"synthesis of a clip among {TOGETHER}", each["together"], UNIT, said, share, None),
-        Row(f"encoding of a clip among {TOGETHER} as usdc", each["encoded"], UNIT, "", None, None),
+        Row(
+            f"synthesis of a clip among {TOGETHER}",
+            microseconds["together"],
+            UNIT,
+            note,
+            share,
+            None,
+        ),
+        Row(
+            f"encoding of a clip among {TOGETHER} as usdc",
+            microseconds["encoded"],
+            UNIT,
+            "",
+            None,
+            None,
+        ),
     ]
 
 
@@ -199,12 +215,12 @@ def main() -> None:
     parser.add_argument("checkout", type=Path)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--record", action="store_true")
-    given = parser.parse_args()
-    found = rows(given.checkout.resolve(), given.rounds)
-    sys.stdout.write(table(found) + "\n")
-    if given.record:
+    options = parser.parse_args()
+    table_rows = rows(options.checkout.resolve(), options.rounds)
+    sys.stdout.write(table(table_rows) + "\n")
+    if options.record:
         command = "python benchmarks/serve_before.py CHECKOUT --record"
-        record({"before": found}, command, ROOT / "docs/results/speed")
+        record({"before": table_rows}, command, ROOT / "docs/results/speed")
 
 
 if __name__ == "__main__":

@@ -39,9 +39,11 @@ def main() -> None:
     words.add_argument("model", nargs="?", type=Path, default=MODEL)
     words.add_argument("--seconds", type=float, default=600.0)
     words.add_argument("--seed", type=int, default=1)
-    given = words.parse_args()
+    options = words.parse_args()
     with TemporaryDirectory() as name:
-        faults = asyncio.run(run(Path(name), given.model.read_bytes(), given.seconds, given.seed))
+        faults = asyncio.run(
+            run(Path(name), options.model.read_bytes(), options.seconds, options.seed)
+        )
     print("\n".join(faults) or "no fault")
     sys.exit(bool(faults))
 
@@ -49,12 +51,12 @@ def main() -> None:
 async def run(folder: Path, model: bytes, seconds: float, seed: int) -> list[str]:
     """Return the faults, a line each."""
     book, contents = Book(), (model, faults_known.other_version(model))
-    known = await asyncio.to_thread(faults_known.of, ("reaching", "plain"), contents)
-    print(f"{len(known)} questions of known answers", flush=True)
+    references = await asyncio.to_thread(faults_known.of, ("reaching", "plain"), contents)
+    print(f"{len(references)} questions of known answers", flush=True)
     stage = Stage(folder / "models", folder / "log", contents, free_port(), book)
     stage.lay_out()
     await stage.start()
-    site, begun = Site(stage.port, known, book, seed), monotonic()
+    site, start = Site(stage.port, references, book, seed), monotonic()
     async with asyncio.TaskGroup() as group:
         group.create_task(stage.watch())
         for client, count in CLIENTS:
@@ -63,7 +65,7 @@ async def run(folder: Path, model: bytes, seconds: float, seed: int) -> list[str
         await stage.play(seconds, random.Random(seed))
         book.ended = True
     await stage.end()
-    report(stage, monotonic() - begun)
+    report(stage, monotonic() - start)
     return [*book.wrong, *_untried(stage), *_logged(stage.log), *_grown(stage)]
 
 
@@ -113,7 +115,8 @@ def _grown(stage: Stage) -> list[str]:
             continue
         quarter, sizes = len(life) // 4, [size for _, size in life]
         early, late = (
-            statistics.mean(part) for part in (sizes[quarter : 2 * quarter], sizes[-quarter:])
+            statistics.mean(quarter_sizes)
+            for quarter_sizes in (sizes[quarter : 2 * quarter], sizes[-quarter:])
         )
         if late > early + FLAT:
             lines.append(f"worker {worker} grew from {early:.0f} to {late:.0f} MB")

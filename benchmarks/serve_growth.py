@@ -30,23 +30,23 @@ def rows(model: Path, total: int = TOTAL) -> list[Row]:
     """Return the growth of memory, in all and per request."""
     counts, sizes = measured(model, total)
     slope = np.polyfit(counts[1:], sizes[1:], 1)[0] * 1e6
-    said = (
+    note = (
         f"after {counts[1]:,} requests, {sizes[1]:.1f} MB; slope {slope:.2f} bytes a request; MB "
         f"at each step: {', '.join(f'{size:.1f}' for size in sizes)}"
     )
     grown = sizes[-1] - sizes[1]
-    return [Row(f"memory grown after {counts[-1]:,} requests", grown, "MB", said, None, FLAT)]
+    return [Row(f"memory grown after {counts[-1]:,} requests", grown, "MB", note, None, FLAT)]
 
 
 def measured(model: Path, total: int) -> tuple[list[int], list[float]]:
     """Requests answered until then, and resident memory, MB, before the first and at each step."""
     questions = pose_questions(session.load(model).card.controls)
     path = f"/v1/models/{model.stem}/pose"
-    asked = tuple(get(f"{path}?{urlencode(question)}") for question in questions)
+    query = tuple(get(f"{path}?{urlencode(question)}") for question in questions)
     with posefield(model) as ours:
         counts, sizes, done = [0], [ours.resident()], 0
         while done < total:
-            done += run(ours, Load(asked, TOGETHER, SECONDS)).requests
+            done += run(ours, Load(query, TOGETHER, SECONDS)).requests
             if done >= len(counts) * total * STEP // TOTAL:
                 counts.append(done)
                 sizes.append(ours.resident())

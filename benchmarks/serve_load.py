@@ -69,23 +69,23 @@ def run(server: Server, load: Load) -> Cost:
         file = Path(name, "requests")
         file.write_bytes(b"".join(b"%d\n%b\n" % (len(one), one) for one in load.requests))
         before = server.processor()
-        said = _wrk(server.url, file, load)
+        note = _wrk(server.url, file, load)
         spent = server.processor() - before
-    found = json.loads(said.splitlines()[-1])
-    if found["wrong"] or not found["requests"]:
-        sys.exit(f"{server.name}: {said}")
-    count, waits = found["requests"], (found["median"], found["p99"])
-    return Cost(count, found["seconds"], spent, *waits, found["bytes"] / count)
+    answer = json.loads(note.splitlines()[-1])
+    if answer["wrong"] or not answer["requests"]:
+        sys.exit(f"{server.name}: {note}")
+    count, waits = answer["requests"], (answer["median"], answer["p99"])
+    return Cost(count, answer["seconds"], spent, *waits, answer["bytes"] / count)
 
 
 def _wrk(url: str, file: Path, load: Load) -> str:
     if not (wrk := shutil.which("wrk")):
         sys.exit("wrk is missing; Debian: apt-get install wrk")
     count, seconds = f"-c{load.connections}", f"-d{load.seconds:g}s"
-    told = [wrk, "-t1", count, seconds, "-s", SCRIPT, url, "--", file, f"{load.think:g}"]
+    arguments = [wrk, "-t1", count, seconds, "-s", SCRIPT, url, "--", file, f"{load.think:g}"]
     core = {max(os.sched_getaffinity(0))}
     done = subprocess.run(
-        told,
+        arguments,
         capture_output=True,
         text=True,
         preexec_fn=lambda: os.sched_setaffinity(0, core),

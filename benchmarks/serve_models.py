@@ -63,9 +63,9 @@ def _serving(
     folder: Path, **environ: str
 ) -> Iterator[tuple[subprocess.Popen[bytes], httpx.Client, float]]:
     """The server, a client of it, and seconds until it said that it listens."""
-    given = {**os.environ, **QUIET, **environ}
+    environment = {**os.environ, **QUIET, **environ}
     begin, command = time.perf_counter(), [POSEFIELD, "serve", str(folder)]
-    with subprocess.Popen(command, env=given, stdout=subprocess.PIPE) as process:
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as process:
         assert process.stdout
         base = process.stdout.readline().decode().split()[-1]
         took = time.perf_counter() - begin
@@ -78,22 +78,22 @@ def _serving(
 
 
 def _taken(folder: Path, **environ: str) -> list[float]:
-    found = []
+    seconds = []
     for _ in range(STARTS):
         with _serving(folder, **environ) as (_, _, took):
-            found.append(took)
-    return sorted(found)
+            seconds.append(took)
+    return sorted(seconds)
 
 
 def _start(folder: Path) -> list[Row]:
     took, count = _taken(folder), len(list(folder.iterdir()))
     with _serving(folder) as (process, _, _):
-        own = _processor_time(process.pid)
-    said = (
-        f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s; {own:.2f} s of processor time, "
+        processor_time = _processor_time(process.pid)
+    note = (
+        f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s; {processor_time:.2f} s of CPU time, "
         f"where its libraries take {_imported():.2f}"
     )
-    return [Row(f"start to ready, {count} models", statistics.median(took), "s", said, None, READY)]
+    return [Row(f"start to ready, {count} models", statistics.median(took), "s", note, None, READY)]
 
 
 def _imported() -> float:
@@ -106,33 +106,35 @@ def _imported() -> float:
 
 def _workers(folder: Path) -> list[Row]:
     took = _taken(folder, POSEFIELD_WORKERS="2")
-    said = f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s, on {os.cpu_count()} cores"
+    note = f"of {STARTS}; {took[0]:.2f} to {took[-1]:.2f} s, on {os.cpu_count()} cores"
     return [
-        Row("start to ready, 10 models, 2 workers", statistics.median(took), "s", said, None, None)
+        Row("start to ready, 10 models, 2 workers", statistics.median(took), "s", note, None, None)
     ]
 
 
 def _memory(one: Path, ten: Path) -> list[Row]:
-    found = []
+    table_rows = []
     for folder, goal in ((one, None), (ten, MEMORY)):
         with _serving(folder) as (process, client, _):
-            begun = resident(process.pid)
+            initial = resident(process.pid)
             names = [model["name"] for model in client.get("/v1/models").json()["models"]]
             for name in names:
                 _use(client, name)
             used = resident(process.pid)
-        said = f"{begun:.0f} MB before a pose and a clip of each level of each was asked"
-        found.append(Row(f"resident memory, {len(names)} models", used, "MB", said, None, goal))
-    return found
+        note = f"{initial:.0f} MB before a pose and a clip of each level of each was asked"
+        table_rows.append(
+            Row(f"resident memory, {len(names)} models", used, "MB", note, None, goal)
+        )
+    return table_rows
 
 
 def _use(client: httpx.Client, name: str) -> None:
     card = client.get(f"/v1/models/{name}").json()
     controls = {control["name"]: control["default"] for control in card["controls"]}
     for level in range(len(card["levels"])):
-        asked = {**controls, "level": level}
-        client.get(f"/v1/models/{name}/pose", params={**asked, "time": 0}).raise_for_status()
-        client.get(f"/v1/models/{name}/clip.usdc", params=asked).raise_for_status()
+        query = {**controls, "level": level}
+        client.get(f"/v1/models/{name}/pose", params={**query, "time": 0}).raise_for_status()
+        client.get(f"/v1/models/{name}/clip.usdc", params=query).raise_for_status()
 
 
 def _reloads(folder: Path) -> list[Row]:
@@ -140,24 +142,26 @@ def _reloads(folder: Path) -> list[Row]:
     with _serving(folder, POSEFIELD_RELOAD="1") as (process, client, _):
         _use(client, "model0")
         controls = client.get("/v1/models/model0").json()["controls"]
-        asked = {**{c["name"]: c["default"] for c in controls}, "time": 0}
+        query = {**{c["name"]: c["default"] for c in controls}, "time": 0}
         quiet, busy, sizes = [], [], []
         for number in range(RELOADS):
-            quiet += _asked(client, asked, 0.3)
+            quiet += _asked(client, query, 0.3)
             _replace(folder, number)
             before = client.get("/readyz").json()["reload"]["opened"]
             while client.get("/readyz").json()["reload"]["opened"] == before:
-                busy += _asked(client, asked, 0.05)
+                busy += _asked(client, query, 0.05)
             sizes.append(resident(process.pid))
     rows = []
     for what, share in (("median", 0.5), ("p99", 0.99), ("slowest", 1.0)):
-        own, other = (1e3 * _at(times, share) for times in (busy, quiet))
-        said = f"without: {other:.1f} ms"
-        rows.append(Row(f"request while models are reloaded, {what}", own, "ms", said, None, None))
+        busy_time, other = (1e3 * _at(times, share) for times in (busy, quiet))
+        note = f"without: {other:.1f} ms"
+        rows.append(
+            Row(f"request while models are reloaded, {what}", busy_time, "ms", note, None, None)
+        )
     half = RELOADS // 2
-    said = f"of {half} more; {sizes[half - 1]:.0f} MB after {half}"
+    note = f"of {half} more; {sizes[half - 1]:.0f} MB after {half}"
     grown = sizes[-1] - sizes[half - 1]
-    return [*rows, Row("memory that reloads add", grown, "MB", said, None, None)]
+    return [*rows, Row("memory that reloads add", grown, "MB", note, None, None)]
 
 
 def _asked(client: httpx.Client, question: dict[str, float], seconds: float) -> list[float]:

@@ -38,12 +38,12 @@ class Server:
 
 
 @contextmanager
-def posefield(*places: Path, **environ: str) -> Iterator[Server]:
+def posefield(*paths: Path, **environ: str) -> Iterator[Server]:
     """Our own service with its usual settings; its log goes to a file, as it would."""
     port = free_port()
-    command = [POSEFIELD, "serve", *places]
-    told = {"POSEFIELD_PORT": str(port), **environ}
-    with started("posefield", command, port, "/readyz", told) as server:
+    command = [POSEFIELD, "serve", *paths]
+    environment = {"POSEFIELD_PORT": str(port), **environ}
+    with started("posefield", command, port, "/readyz", environment) as server:
         yield server
 
 
@@ -69,13 +69,13 @@ def started(
     log = HERE.parent / f"build/serve/{name}.log"
     log.parent.mkdir(parents=True, exist_ok=True)
     core = {min(os.sched_getaffinity(0))}
-    with log.open("wb") as said:
+    with log.open("wb") as log_file:
         child = subprocess.Popen(
             command,
             env={**os.environ, **(environ or {})},
             cwd=folder,
-            stdout=said,
-            stderr=said,
+            stdout=log_file,
+            stderr=log_file,
             start_new_session=True,
             preexec_fn=lambda: os.sched_setaffinity(0, core),
         )
@@ -90,8 +90,8 @@ def started(
 
 def free_port() -> int:
     """Return a free TCP port."""
-    with socket.create_server(("127.0.0.1", 0)) as held:
-        return int(held.getsockname()[1])
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])
 
 
 def resident(process: int) -> float:
@@ -110,13 +110,13 @@ def command(process: int) -> bytes:
 
 def children(process: int) -> list[int]:
     """Processes that a process has started, from any of its threads."""
-    found = []
+    processes = []
     for thread in Path(f"/proc/{process}/task").iterdir():
         try:
-            found += [int(word) for word in (thread / "children").read_text().split()]
+            processes += [int(word) for word in (thread / "children").read_text().split()]
         except (FileNotFoundError, ProcessLookupError):
             continue
-    return found
+    return processes
 
 
 def accepts(process: int, port: int) -> bool:
@@ -127,8 +127,8 @@ def accepts(process: int, port: int) -> bool:
         if fields[1].endswith(f":{port:04X}") and fields[3] == LISTENING
     }
     try:
-        own = Path(f"/proc/{process}/fd").iterdir()
-        listening = {fd.name for fd in own if str(fd.readlink()) in sockets}
+        descriptors = Path(f"/proc/{process}/fd").iterdir()
+        listening = {fd.name for fd in descriptors if str(fd.readlink()) in sockets}
         watched = "".join(fd.read_text() for fd in Path(f"/proc/{process}/fdinfo").iterdir())
     except (FileNotFoundError, ProcessLookupError):
         return False

@@ -74,32 +74,32 @@ def _row(ours: Server, rival: Rival, model: Path, rounds: int) -> Row:
     names = [control.name for control in session.load(model).card.controls]
     questions = pose_questions(session.load(model).card.controls)
     path = f"/v1/models/{model.stem}/pose"
-    own = tuple(get(f"{path}?{urlencode(question)}") for question in questions)
+    requests = tuple(get(f"{path}?{urlencode(question)}") for question in questions)
     bodies = [rival.body([q[name] for name in names], q["time"]) for q in questions]
-    asked = tuple(post(rival.path, orjson.dumps(body)) for body in bodies)
+    requests = tuple(post(rival.path, orjson.dumps(body)) for body in bodies)
     with _serving(rival, model) as other:
         for question, body in list(zip(questions, bodies, strict=True))[:10]:
             _check(ours.url + path, question, other.url + rival.path, body, rival.rotations)
-        runs = [(ours, Load(own, TOGETHER)), (other, Load(asked, TOGETHER))]
+        runs = [(ours, Load(requests, TOGETHER)), (other, Load(requests, TOGETHER))]
         return _compared(rival, *in_turn(runs, rounds))
 
 
-def _compared(rival: Rival, ours: Sequence[Cost], others: Sequence[Cost]) -> Row:
-    ratios = [a.rate / b.rate for a, b in zip(ours, others, strict=True)]
-    rate, other = (max(cost.rate for cost in costs) for costs in (ours, others))
-    cost, spent = (min(cost.each for cost in costs) for costs in (ours, others))
-    said = (
+def _compared(rival: Rival, ours: Sequence[Cost], rest: Sequence[Cost]) -> Row:
+    ratios = [a.rate / b.rate for a, b in zip(ours, rest, strict=True)]
+    rate, other = (max(cost.rate for cost in costs) for costs in (ours, rest))
+    cost, spent = (min(cost.each for cost in costs) for costs in (ours, rest))
+    note = (
         f"{rival.name}: {other:.0f} a second, {spent:.0f} µs of processor time each, ours "
         f"{cost:.0f} µs; rounds {min(ratios):.1f} to {max(ratios):.1f}"
     )
     name = f"poses a second, {TOGETHER} connections"
-    return Row(name, rate, "/s", said, statistics.median(ratios), rival.goal)
+    return Row(name, rate, "/s", note, statistics.median(ratios), rival.goal)
 
 
 def _check(url: str, question: Numbers, other: str, body: Any, rotations: Read) -> None:
-    found = httpx.get(url, params=question).raise_for_status().json()["rotations"]
+    answers = httpx.get(url, params=question).raise_for_status().json()["rotations"]
     answer = _first(other, body)
-    np.testing.assert_allclose(np.ravel(rotations(answer)), np.ravel(found), atol=CLOSE)
+    np.testing.assert_allclose(np.ravel(rotations(answer)), np.ravel(answers), atol=CLOSE)
 
 
 @contextmanager
@@ -110,8 +110,8 @@ def _serving(rival: Rival, model: Path) -> Iterator[Server]:
     path = model.resolve()
     command = rival.command(Place(_environment(key), folder, path, port))
     # None of them is to tell its makers of this.
-    told = {"PYTHONPATH": str(ADAPTERS), "MODEL": str(path), "BENTOML_DO_NOT_TRACK": "True"}
-    with started(key, command, port, environ=told, folder=folder) as server:
+    environment = {"PYTHONPATH": str(ADAPTERS), "MODEL": str(path), "BENTOML_DO_NOT_TRACK": "True"}
+    with started(key, command, port, environ=environment, folder=folder) as server:
         yield server
 
 
@@ -129,43 +129,43 @@ def _first(url: str, body: Any) -> Any:
 
 def _environment(key: str) -> Path:
     """Folder of programs of the environment, made where it is not the one wanted."""
-    wanted, venv = ADAPTERS / f"{key}.txt", VENVS / key
+    requirements, venv = ADAPTERS / f"{key}.txt", VENVS / key
     stamp = venv / ".installed"
-    if not stamp.exists() or stamp.read_text() != wanted.read_text():
+    if not stamp.exists() or stamp.read_text() != requirements.read_text():
         subprocess.run([UV, "venv", "-q", "--clear", "-p", sys.executable, venv], check=True)
         python = venv / "bin/python"
-        subprocess.run([UV, "pip", "install", "-q", "-p", python, "-r", wanted], check=True)
-        stamp.write_text(wanted.read_text())
+        subprocess.run([UV, "pip", "install", "-q", "-p", python, "-r", requirements], check=True)
+        stamp.write_text(requirements.read_text())
     return venv / "bin"
 
 
-def _mlserver(place: Place) -> list[str | Path]:
-    ports = {"http_port": place.port, "grpc_port": free_port(), "metrics_port": free_port()}
+def _mlserver(location: Place) -> list[str | Path]:
+    ports = {"http_port": location.port, "grpc_port": free_port(), "metrics_port": free_port()}
     settings = {"host": "127.0.0.1", "parallel_workers": 0, "debug": False, "gzip_enabled": False}
-    own = {"uri": str(place.model)}
-    model = {"name": "pose", "implementation": "mlserver_pose.Pose", "parameters": own}
-    (place.folder / "settings.json").write_text(json.dumps({**settings, **ports}))
-    (place.folder / "model-settings.json").write_text(json.dumps(model))
-    return [place.programs / "mlserver", "start", place.folder]
+    parameters = {"uri": str(location.model)}
+    model = {"name": "pose", "implementation": "mlserver_pose.Pose", "parameters": parameters}
+    (location.folder / "settings.json").write_text(json.dumps({**settings, **ports}))
+    (location.folder / "model-settings.json").write_text(json.dumps(model))
+    return [location.programs / "mlserver", "start", location.folder]
 
 
-def _litserve(place: Place) -> list[str | Path]:
+def _litserve(location: Place) -> list[str | Path]:
     script = ADAPTERS / "litserve_pose.py"
-    return [place.programs / "python", script, place.model, str(place.port)]
+    return [location.programs / "python", script, location.model, str(location.port)]
 
 
-def _bentoml(place: Place) -> list[str | Path]:
-    told = ["--host", "127.0.0.1", "--port", str(place.port), "--working-dir", ADAPTERS]
-    return [place.programs / "bentoml", "serve", "bentoml_pose:Pose", *told]
+def _bentoml(location: Place) -> list[str | Path]:
+    arguments = ["--host", "127.0.0.1", "--port", str(location.port), "--working-dir", ADAPTERS]
+    return [location.programs / "bentoml", "serve", "bentoml_pose:Pose", *arguments]
 
 
 def _tensors(controls: list[float], when: float) -> dict[str, Any]:
     """A question of the Open Inference Protocol."""
-    given = {"controls": controls, "time": [when]}
+    body = {"controls": controls, "time": [when]}
     return {
         "inputs": [
             {"name": name, "shape": [1, len(row)], "datatype": "FP32", "data": row}
-            for name, row in given.items()
+            for name, row in body.items()
         ]
     }
 

@@ -15,7 +15,7 @@ def in_turn(
     Every round times each function once, for `repeats` calls, so that a change of the machine's
     speed affects all of them. Each is called once beforehand to fill caches and compile.
     """
-    taken: dict[str, list[float]] = {name: [] for name in runs}
+    timings: dict[str, list[float]] = {name: [] for name in runs}
     with threadpool_limits(limits=1):
         for run in runs.values():
             run()
@@ -24,5 +24,5 @@ def in_turn(
                 start = time.perf_counter()
                 for _ in range(repeats):
                     run()
-                taken[name].append((time.perf_counter() - start) / repeats)
-    return {name: median(times) for name, times in taken.items()}
+                timings[name].append((time.perf_counter() - start) / repeats)
+    return {name: median(times) for name, times in timings.items()}

@@ -27,7 +27,7 @@ class Question:
     """A request of a model's file: GET, or POST where there is a body."""
 
     operation: str
-    said: str
+    note: str
     model: Path
     path: str
     body: bytes = b""
@@ -70,12 +70,12 @@ class _Asked:
             for i in range(count)
         ]
 
-    def post(self, operation: str, said: str, rest: str, body: Mapping[str, Any]) -> Question:
+    def post(self, operation: str, note: str, rest: str, body: Mapping[str, Any]) -> Question:
         content = json.dumps(body, separators=(",", ":")).encode()
-        return Question(operation, said, self.file, f"{self.path}/{rest}", content)
+        return Question(operation, note, self.file, f"{self.path}/{rest}", content)
 
-    def get(self, operation: str, said: str, rest: str) -> Question:
-        return Question(operation, said, self.file, f"{self.path}/{rest}")
+    def get(self, operation: str, note: str, rest: str) -> Question:
+        return Question(operation, note, self.file, f"{self.path}/{rest}")
 
 
 def _poses(one: _Asked) -> Iterator[Question]:
@@ -83,20 +83,22 @@ def _poses(one: _Asked) -> Iterator[Question]:
     # Of few digits: the body is bounded, too.
     times = [round(end * i / MAX_POSES, 3) for i in range(MAX_POSES)]
     for ending in POSE_ENCODERS:
-        asked = {"controls": one.controls, "times": times}
-        yield one.post("pose", f"{MAX_POSES} times, {ending}", f"pose.{ending}", asked)
-    held = {"controls": {}, "targets": one.targets(MAX_TARGETS), "times": times}
-    yield one.post("pose", f"{MAX_TARGETS} targets, open controls, all times, json", "pose", held)
+        query = {"controls": one.controls, "times": times}
+        yield one.post("pose", f"{MAX_POSES} times, {ending}", f"pose.{ending}", query)
+    constrained = {"controls": {}, "targets": one.targets(MAX_TARGETS), "times": times}
+    yield one.post(
+        "pose", f"{MAX_TARGETS} targets, open controls, all times, json", "pose", constrained
+    )
 
 
 def _clips(one: _Asked) -> Iterator[Question]:
     for ending in CLIP_ENCODERS:
-        asked = {"controls": one.controls, "fps": 1000}
-        yield one.post("clip", f"fps=1000, {ending}", f"clip.{ending}", asked)
+        query = {"controls": one.controls, "fps": 1000}
+        yield one.post("clip", f"fps=1000, {ending}", f"clip.{ending}", query)
     targets = {"controls": {}, "targets": one.targets(MAX_TARGETS), "fps": 1000}
-    said = f"{MAX_TARGETS} targets, fps=1000, json"
-    yield one.post("clip", said, "clip.json", targets | {"controls": one.controls})
-    yield one.post("clip", f"{said}, open controls", "clip.json", targets)
+    note = f"{MAX_TARGETS} targets, fps=1000, json"
+    yield one.post("clip", note, "clip.json", targets | {"controls": one.controls})
+    yield one.post("clip", f"{note}, open controls", "clip.json", targets)
 
 
 def _archives(one: _Asked) -> Iterator[Question]:
@@ -105,43 +107,43 @@ def _archives(one: _Asked) -> Iterator[Question]:
     rate = int(SETTINGS.clips_poses / count / one.model.session.card.durations[1]) - 1
     for ending in CLIP_ENCODERS:
         clips = [{"controls": one.controls, "fps": rate}] * count
-        said = f"{count} clips of {rate} frames a second, {ending}"
-        yield one.post("clips", said, "clips.zip", {"format": ending, "clips": clips})
+        note = f"{count} clips of {rate} frames a second, {ending}"
+        yield one.post("clips", note, "clips.zip", {"format": ending, "clips": clips})
     cost = SETTINGS.clips_targets
-    given = {"controls": one.controls, "targets": one.targets(MAX_TARGETS)}
-    clips = [given] * (cost // MAX_TARGETS)
-    said = f"{len(clips)} clips of {MAX_TARGETS} targets, json"
-    yield one.post("clips", said, "clips.tar", {"format": "json", "clips": clips})
+    body = {"controls": one.controls, "targets": one.targets(MAX_TARGETS)}
+    clips = [body] * (cost // MAX_TARGETS)
+    note = f"{len(clips)} clips of {MAX_TARGETS} targets, json"
+    yield one.post("clips", note, "clips.tar", {"format": "json", "clips": clips})
     clips = [{"controls": {}, "targets": one.targets(1)}] * (cost // 4)
-    said = f"{len(clips)} clips of a target, open controls, json"
-    yield one.post("clips", said, "clips.tar", {"format": "json", "clips": clips})
+    note = f"{len(clips)} clips of a target, open controls, json"
+    yield one.post("clips", note, "clips.tar", {"format": "json", "clips": clips})
 
 
 def _crowds(one: _Asked) -> Iterator[Question]:
     for ending, encoder in CROWD_ENCODERS.items():
         count = int(min(SETTINGS.crowd_limit, encoder.most))
-        asked = {"controls": one.controls, "time": [0.1] * count}
-        yield one.post("crowd of poses", f"{count} characters, {ending}", f"crowd.{ending}", asked)
-        said = f"{count} characters, all columns, blended, {ending}"
-        yield one.post("crowd of poses", said, f"crowd.{ending}", _columns(one, count))
+        query = {"controls": one.controls, "time": [0.1] * count}
+        yield one.post("crowd of poses", f"{count} characters, {ending}", f"crowd.{ending}", query)
+        note = f"{count} characters, all columns, blended, {ending}"
+        yield one.post("crowd of poses", note, f"crowd.{ending}", _columns(one, count))
     # As many numbers as are decoded, to be refused then.
     count = crowd_operations.VALUES * SETTINGS.crowd_limit - 1000
-    asked = {"controls": one.controls, "time": [0] * count}
-    yield one.post("crowd of poses", f"{count} numbers", "crowd.arrow", asked)
+    query = {"controls": one.controls, "time": [0] * count}
+    yield one.post("crowd of poses", f"{count} numbers", "crowd.arrow", query)
 
 
 def _columns(one: _Asked, count: int) -> dict[str, Any]:
     """Question for a crowd in which each character has a number of its own for everything."""
-    own = [1.0 + i / 7 / count for i in range(count)]
-    controls = {name: [value * share for share in own] for name, value in one.controls.items()}
+    column = [1.0 + i / 7 / count for i in range(count)]
+    controls = {name: [value * share for share in column] for name, value in one.controls.items()}
     return {
         "controls": controls,
-        "time": [share / 9 for share in own],
-        "position": [[share * 7, 0.0, share * 3] for share in own],
-        "heading": own,
+        "time": [share / 9 for share in column],
+        "position": [[share * 7, 0.0, share * 3] for share in column],
+        "heading": column,
         "level": [0] * count,
         "from_level": [1] * count,
-        "blend": [share / 2 for share in own],
+        "blend": [share / 2 for share in column],
     }
 
 
@@ -165,29 +167,29 @@ def _walks(one: _Asked) -> Iterator[Question]:
         "motions of 10 s, seen by a camera": lambda n: f"count={n}&seconds=10&camera=0,2,0",
     }
     for ending in ("usdz", "usdc", "usda"):
-        for said, shape in shapes.items():
-            yield _largest(one, ending, "references", said, shape)
-        for said in ("characters of one motion", "motions of 10 s"):
-            yield _largest(one, ending, "flatten", said, shapes[said])
+        for note, shape in shapes.items():
+            yield _largest(one, ending, "references", note, shape)
+        for note in ("characters of one motion", "motions of 10 s"):
+            yield _largest(one, ending, "flatten", note, shapes[note])
 
 
 def _largest(
-    one: _Asked, ending: str, instancing: str, said: str, shape: Callable[[int], str]
+    one: _Asked, ending: str, instancing: str, note: str, shape: Callable[[int], str]
 ) -> Question:
     def query(number: int) -> str:
         return f"{shape(number)}&instancing={instancing}"
 
     number = most(lambda n: _legal(one, ending, query(n)))
     rest = f"crowd.{ending}?{query(number)}"
-    return one.get("walking crowd", f"{number} {said}: {rest}", rest)
+    return one.get("walking crowd", f"{number} {note}: {rest}", rest)
 
 
 def _legal(one: _Asked, ending: str, query: str) -> bool:
     pairs = [tuple(pair.split("=")) for pair in query.split("&")]
     try:
-        asked = text_decoding.decode_question(WalkQuestion, pairs)
+        question = text_decoding.decode_question(WalkQuestion, pairs)
         joints = len(one.model.session.card.skeleton)
-        crowd_operations.checked_order(asked, ending, joints, SETTINGS)
+        crowd_operations.checked_order(question, ending, joints, SETTINGS)
     except InvalidField:
         return False
     return True

@@ -62,7 +62,7 @@ def measured(question: Question) -> Cost:
     late = _late(question) if seconds > 1.0 else None
     return Cost(
         question.operation,
-        question.said,
+        question.note,
         status,
         size / MB,
         seconds,
@@ -105,8 +105,8 @@ def _sent(
 ) -> http.client.HTTPConnection:
     """Connection over which a request has been sent."""
     wire = http.client.HTTPConnection(server.url.removeprefix("http://"), timeout=3600)
-    given = {"Content-Type": "application/json"} | headers
-    wire.request("POST" if question.body else "GET", question.path, question.body, given)
+    body = {"Content-Type": "application/json"} | headers
+    wire.request("POST" if question.body else "GET", question.path, question.body, body)
     return wire
 
 
@@ -149,8 +149,8 @@ def _peak(process: int) -> float:
         lines = Path(f"/proc/{process}/status").read_text().splitlines()
     except OSError:
         return 0.0
-    found = [line.split()[1] for line in lines if line.startswith("VmHWM:")]
-    return int(found[0]) * 1024 / MB if found else 0.0
+    peaks = [line.split()[1] for line in lines if line.startswith("VmHWM:")]
+    return int(peaks[0]) * 1024 / MB if peaks else 0.0
 
 
 def table(costs: list[Cost]) -> str:
@@ -172,13 +172,13 @@ def table(costs: list[Cost]) -> str:
 
 def worst(costs: list[Cost]) -> list[Cost]:
     """The costs that are the most of their operation, in CPU time or in memory of a process."""
-    found = []
+    table_rows = []
     for operation in dict.fromkeys(cost.operation for cost in costs):
-        own = [cost for cost in costs if cost.operation == operation]
-        most = max(own, key=lambda cost: cost.seconds)
-        largest = max(own, key=lambda cost: max(cost.memory, cost.child))
-        found += [most] if most is largest else [most, largest]
-    return found
+        operation_costs = [cost for cost in costs if cost.operation == operation]
+        slowest = max(operation_costs, key=lambda cost: cost.seconds)
+        largest = max(operation_costs, key=lambda cost: max(cost.memory, cost.child))
+        table_rows += [slowest] if slowest is largest else [slowest, largest]
+    return table_rows
 
 
 def main(reaching: Path, walk: Path) -> None:
@@ -195,8 +195,8 @@ def main(reaching: Path, walk: Path) -> None:
 
 def _write(costs: list[Cost]) -> None:
     CANDIDATES.parent.mkdir(parents=True, exist_ok=True)
-    said = (__doc__ or "").partition("\n")[0]
-    head = f"# {said}\n\nWorst of {len(costs)} candidates, by `benchmarks/worst_requests.py`."
+    note = (__doc__ or "").partition("\n")[0]
+    head = f"# {note}\n\nWorst of {len(costs)} candidates, by `benchmarks/worst_requests.py`."
     RESULTS.write_text(f"{head}\n\n{table(worst(costs))}\n")
     listed = json.dumps([asdict(cost) for cost in costs], indent=1)
     CANDIDATES.write_text(listed + "\n")

@@ -87,7 +87,7 @@ class _MotionCorrector:
     """An opened model, its constraint solver, and the event."""
 
     opened: Session
-    bench: LevelCorrector
+    corrector: LevelCorrector
     event: truncation_error.EventFrame
 
     def state(self, controls: Floats, labels: Floats) -> PredictionState:
@@ -95,24 +95,26 @@ class _MotionCorrector:
         (durations,) = self.opened.run(controls, None, "duration", labels=labels)
         return self.opened.state(controls, UNIFORM_SHARES * durations, labels)
 
-    def held(self, begun: ConstrainedMotion, place: Floats) -> ConstrainedMotion:
+    def held(self, predicted: ConstrainedMotion, position: Floats) -> ConstrainedMotion:
         """Return the motion with the event's joint at a position (3,) at the event."""
-        own = Measure("height", (self.event.joint,), "landmark")
-        aim = PositionConstraint(("event",), own, (0, 1, 2), place, self.event.frame)
-        (found,) = self.bench.solve_all([(begun, [aim])])
-        return found
+        measure = Measure("height", (self.event.joint,), "landmark")
+        aim = PositionConstraint(("event",), measure, (0, 1, 2), position, self.event.frame)
+        (corrected,) = self.corrector.solve_all([(predicted, [aim])])
+        return corrected
 
-    def motion(self, held: ConstrainedMotion) -> ComparedMotion:
+    def motion(self, corrected: ConstrainedMotion) -> ComparedMotion:
         """Return a corrected motion as it is compared."""
-        state, parents = held.state, self.opened.card.skeleton.parents
-        rotations, path = held.poses(state.frames)
+        state, parents = corrected.state, self.opened.card.skeleton.parents
+        rotations, path = corrected.poses(state.frames)
         translations = skeleton.translations(state.bones, path)
         share = float(np.interp(self.event.frame, state.frames, UNIFORM_SHARES))
-        own = MotionEvent(self.event.joint, share)
-        made = motion_errors.motion_of_poses(parents, rotations, translations, held.duration, own)
+        event = MotionEvent(self.event.joint, share)
+        motion = motion_errors.motion_of_poses(
+            parents, rotations, translations, corrected.duration, event
+        )
         curves = self.opened.card.curves
-        values = held.curve_values(state.frames) if curves else np.zeros(0)
-        return motion_errors.with_curves([made], curves, values[None])[0]
+        values = corrected.curve_values(state.frames) if curves else np.zeros(0)
+        return motion_errors.with_curves([motion], curves, values[None])[0]
 
 
 def event_target(captured: ComparedMotion, event: MotionEvent) -> EventTarget:
@@ -126,50 +128,50 @@ def correct_motions(
     recipe: Recipe,
     trained: TrainedModel,
     file: bytes,
-    asked: Queries,
-    wanted: Sequence[EventTarget],
+    queries: Queries,
+    target: Sequence[EventTarget],
 ) -> tuple[list[ComparedMotion], list[Correction]]:
     """Return the predictions of a model file, each corrected to its target, and the corrections."""
     event = truncation_error.event_frame(recipe, trained.examples)
     assert event is not None
     opened = session.open_bytes(file, recipe.name)
     desk = _MotionCorrector(opened, constrained_motion.build_corrector(opened, 0), event)
-    known = {own.name: own.names for own in opened.card.labels}
-    labels = sample_points.label_weights(asked.labels, known)
-    clips = zip(asked.controls[:, None], labels[:, None], wanted, strict=True)
+    label_names = {label_set.name: label_set.names for label_set in opened.card.labels}
+    labels = sample_points.label_weights(queries.labels, label_names)
+    clips = zip(queries.controls[:, None], labels[:, None], target, strict=True)
     motions, corrections = zip(*(_correct(desk, *clip) for clip in clips), strict=True)
     return list(motions), list(corrections)
 
 
 def _correct(
-    desk: _MotionCorrector, controls: Floats, labels: Floats, wanted: EventTarget
+    desk: _MotionCorrector, controls: Floats, labels: Floats, target: EventTarget
 ) -> tuple[ComparedMotion, Correction]:
-    begun = desk.bench.predict(desk.state(controls, labels))
-    held = desk.held(begun, wanted.joint)
-    before, after = desk.motion(begun), desk.motion(held)
+    predicted = desk.corrector.predict(desk.state(controls, labels))
+    corrected = desk.held(predicted, target.joint)
+    before, after = desk.motion(predicted), desk.motion(corrected)
     # The root cannot be moved away from itself.
     outward = desk.event.joint != 0
     beyond = [
-        desk.held(begun, wanted.moved_outward(metres)) for metres in BEYOND_DISTANCES if outward
+        desk.held(predicted, target.moved_outward(metres)) for metres in BEYOND_DISTANCES if outward
     ]
     correction = Correction(
-        held.steps,
-        held.distance,
-        _is_reachable(held),
+        corrected.steps,
+        corrected.distance,
+        _is_reachable(corrected),
         tuple(map(_is_reachable, beyond)),
         _acceleration_ratio(after, before),
-        _thread_seconds(lambda: _run_corrected(desk, controls, labels, wanted)),
+        _thread_seconds(lambda: _run_corrected(desk, controls, labels, target)),
         _thread_seconds(lambda: _run_uncorrected(desk, controls, labels)),
-        _correct_far(desk, begun, before, wanted) if outward else None,
+        _correct_far(desk, predicted, before, target) if outward else None,
     )
     return after, correction
 
 
 def _run_corrected(
-    desk: _MotionCorrector, controls: Floats, labels: Floats, wanted: EventTarget
+    desk: _MotionCorrector, controls: Floats, labels: Floats, target: EventTarget
 ) -> None:
     state = desk.state(controls, labels)
-    desk.held(desk.bench.predict(state), wanted.joint).poses(state.frames)
+    desk.held(desk.corrector.predict(state), target.joint).poses(state.frames)
 
 
 def _run_uncorrected(desk: _MotionCorrector, controls: Floats, labels: Floats) -> None:
@@ -187,13 +189,16 @@ def _thread_seconds(run: Callable[[], None]) -> float:
 
 
 def _correct_far(
-    desk: _MotionCorrector, begun: ConstrainedMotion, before: ComparedMotion, wanted: EventTarget
+    desk: _MotionCorrector, started: ConstrainedMotion, before: ComparedMotion, target: EventTarget
 ) -> Far:
-    held = desk.held(begun, wanted.moved_outward(FAR))
-    after = desk.motion(held)
-    moved = np.linalg.norm(after.joints[:, 0] - before.joints[:, 0], axis=-1)
+    corrected = desk.held(started, target.moved_outward(FAR))
+    after = desk.motion(corrected)
+    distances = np.linalg.norm(after.joints[:, 0] - before.joints[:, 0], axis=-1)
     return Far(
-        _is_reachable(held), _acceleration_ratio(after, before), float(moved.max()), held.steps
+        _is_reachable(corrected),
+        _acceleration_ratio(after, before),
+        float(distances.max()),
+        corrected.steps,
     )
 
 
@@ -202,8 +207,8 @@ def _acceleration_ratio(after: ComparedMotion, before: ComparedMotion) -> float:
     return float(motion_errors.acceleration(after.points) / before_it)
 
 
-def _is_reachable(held: ConstrainedMotion) -> bool:
-    return all(met.reached for met in held.results)
+def _is_reachable(corrected: ConstrainedMotion) -> bool:
+    return all(met.reached for met in corrected.results)
 
 
 def facts(result: EvaluationResult, corrections: Sequence[Correction]) -> dict[str, float]:
@@ -228,8 +233,8 @@ def facts(result: EvaluationResult, corrections: Sequence[Correction]) -> dict[s
         "out_of_reach": np.mean(of(lambda c: not c.reached)),
     }
     for index, metres in enumerate(BEYOND_DISTANCES[: len(corrections[0].beyond)]):
-        missed = [not correction.beyond[index] for correction in corrections]
-        plain[f"out_of_reach_{round(100 * metres)}cm"] = np.mean(missed)
+        missing = [not correction.beyond[index] for correction in corrections]
+        plain[f"out_of_reach_{round(100 * metres)}cm"] = np.mean(missing)
     if far := [correction.far for correction in corrections if correction.far]:
         plain["far_out_of_reach"] = np.mean([not one.reached for one in far])
         spread["far_acceleration"] = np.array([one.acceleration for one in far])

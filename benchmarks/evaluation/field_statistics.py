@@ -44,8 +44,8 @@ def measure(weights: KrigingWeights, first_seed: int) -> FieldStatistics | None:
 
     None for a covariance without random fields, and for fewer than six samples.
     """
-    hyper, places = weights.hyper, _places(weights)
-    if not random_field.has_features(hyper) or len(places) < FEWEST_PLACES:
+    hyper, points = weights.hyper, _places(weights)
+    if not random_field.has_features(hyper) or len(points) < FEWEST_PLACES:
         return None
     seeds = [first_seed * SEEDS + step for step in range(SEEDS)]
     fields = [random_field.simulate(weights, seed, FIELDS) for seed in seeds]
@@ -53,33 +53,33 @@ def measure(weights: KrigingWeights, first_seed: int) -> FieldStatistics | None:
     errors = random_field.simulate(weights, first_seed * SEEDS + SEEDS, FIELDS).errors
     shared = [replace(field, errors=errors) for field in fields]
     wide = replace(hyper, scales=WRONG_SCALE * hyper.scales)
-    free = _stacked([field.field.evaluate(places) for field in fields])
+    free = _stacked([field.field.evaluate(points) for field in fields])
     wrong = _stacked(
-        [random_field.draw_field(wide, seed, FIELDS).evaluate(places) for seed in seeds]
+        [random_field.draw_field(wide, seed, FIELDS).evaluate(points) for seed in seeds]
     )
-    taken = _stacked([field.evaluate(places) for field in fields])
-    variances = _kriging_variances(weights, places)
+    timings = _stacked([field.evaluate(points) for field in fields])
+    variances = _kriging_variances(weights, points)
     return FieldStatistics(
-        _variogram_ratios(free, hyper, places),
-        _variance_ratio(taken, variances),
-        _mean_error(taken),
-        _variogram_ratios(wrong, hyper, places),
+        _variogram_ratios(free, hyper, points),
+        _variance_ratio(timings, variances),
+        _mean_error(timings),
+        _variogram_ratios(wrong, hyper, points),
         _variance_ratio(free, variances),
-        _mean_error(_stacked([field.evaluate(places) for field in shared])),
+        _mean_error(_stacked([field.evaluate(points) for field in shared])),
     )
 
 
 def _stacked(values: Sequence[PointValues]) -> Drawn:
     """Return the values (B, m) of several seeds as one array (seeds, m, B)."""
-    return np.array([own.T for own in values])
+    return np.array([value.T for value in values])
 
 
 def _places(weights: KrigingWeights) -> Points:
     """Return points (B, d + p): half way between neighbours on the card, named as the first."""
     d = len(weights.hyper.scales)
-    found = weights.samples[:-1].copy()
-    found[:, :d] = 0.5 * (weights.samples[:-1, :d] + weights.samples[1:, :d])
-    return found[:PLACES]
+    points = weights.samples[:-1].copy()
+    points[:, :d] = 0.5 * (weights.samples[:-1, :d] + weights.samples[1:, :d])
+    return points[:PLACES]
 
 
 def _variance_ratio(values: Drawn, variances: PerPoint) -> float:
@@ -92,21 +92,26 @@ def _mean_error(values: Drawn) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def _variogram_ratios(values: Drawn, hyper: Hyper, places: Points) -> tuple[float, ...]:
+def _variogram_ratios(values: Drawn, hyper: Hyper, positions: Points) -> tuple[float, ...]:
     """Return simulated over the model's semivariance of pairs of points, in bins of distance."""
-    rows, columns = np.triu_indices(len(places), 1)
-    prior = kriging_model.prior_variances(hyper, places)
-    own = kriging_model.covariances(hyper, places, places)[rows, columns]
-    model = 0.5 * (prior[rows] + prior[columns]) - own
+    rows, columns = np.triu_indices(len(positions), 1)
+    prior = kriging_model.prior_variances(hyper, positions)
+    covariances = kriging_model.covariances(hyper, positions, positions)[rows, columns]
+    model = 0.5 * (prior[rows] + prior[columns]) - covariances
     simulated = 0.5 * np.mean(np.square(values[..., rows] - values[..., columns]), axis=(0, 1))
     bins = np.array_split(np.argsort(model, kind="stable"), BINS)
     return tuple(float(simulated[pairs].sum() / model[pairs].sum()) for pairs in bins)
 
 
-def _kriging_variances(weights: KrigingWeights, places: Points) -> PerPoint:
+def _kriging_variances(weights: KrigingWeights, positions: Points) -> PerPoint:
     """Return the variances (B,) of a new observation about the prediction, in sills."""
     hyper, samples = weights.hyper, weights.samples
-    own, across = weights.weights(places), kriging_model.covariances(hyper, places, samples)
-    error = np.einsum("bn,nm,bm->b", own, kriging_model.noisy(hyper, samples), own)
-    prior = kriging_model.prior_variances(hyper, places) + hyper.nugget
-    return np.asarray(prior + error - 2.0 * np.sum(own * across, axis=1))
+    weights_at_points, across = (
+        weights.weights(positions),
+        kriging_model.covariances(hyper, positions, samples),
+    )
+    error = np.einsum(
+        "bn,nm,bm->b", weights_at_points, kriging_model.noisy(hyper, samples), weights_at_points
+    )
+    prior = kriging_model.prior_variances(hyper, positions) + hyper.nugget
+    return np.asarray(prior + error - 2.0 * np.sum(weights_at_points * across, axis=1))

@@ -57,7 +57,7 @@ def left_out_parts(samples: SamplePoints) -> list[Booleans]:
     functions = kriging_model.drift(samples.half_ranges, samples.controls, 1)
     if kriging_model.find_required_group(dealt, functions) is not None:
         dealt = groups
-    return [dealt == part for part in range(int(dealt.max()) + 1)]
+    return [dealt == index for index in range(int(dealt.max()) + 1)]
 
 
 def predict(choices: Sequence[LinearSmoother], values: Floats) -> Floats:
@@ -72,9 +72,9 @@ def predict_with_performers(
 
     queries: (q, d + p), with zeros as the label of an unknown performer, who has no offset.
     """
-    own = chosen_offsets(choices, samples, values)
+    chosen = chosen_offsets(choices, samples, values)
     labels = samples.points[:, samples.controls :]
-    return predict(choices, values - labels @ own) + queries[:, samples.controls :] @ own
+    return predict(choices, values - labels @ chosen) + queries[:, samples.controls :] @ chosen
 
 
 def chosen_offsets(
@@ -84,32 +84,32 @@ def chosen_offsets(
     return performer_offsets(_best(choices, values), samples, values)
 
 
-def performer_offsets(own: LinearSmoother, samples: SamplePoints, values: Floats) -> Floats:
+def performer_offsets(smoother: LinearSmoother, samples: SamplePoints, values: Floats) -> Floats:
     """Return the offset (p, m) of each performer from what a peer predicts without performers."""
     labels = samples.points[:, samples.controls :]
-    shrinkage = _best_shrinkage(samples, own.residuals(values))
+    shrinkage = _best_shrinkage(samples, smoother.residuals(values))
     sums = _shares(labels.sum(axis=0), shrinkage)[:, None] * labels.T
-    found = np.zeros((labels.shape[1], values.shape[1]))
+    result = np.zeros((labels.shape[1], values.shape[1]))
     for _ in range(ROUNDS):
-        found = sums @ (own.residuals(values - labels @ found) + labels @ found)
-    return found
+        result = sums @ (smoother.residuals(values - labels @ result) + labels @ result)
+    return result
 
 
 def _best(choices: Sequence[LinearSmoother], values: Floats) -> LinearSmoother:
     if len(choices) == 1:
         return choices[0]
-    losses = [float(np.sum(np.square(own.residuals(values)))) for own in choices]
+    losses = [float(np.sum(np.square(choice.residuals(values)))) for choice in choices]
     return choices[int(np.argmin(losses))]
 
 
 def _best_shrinkage(samples: SamplePoints, residuals: Floats) -> float:
     """Return the shrinkage with which other takes of the performer predict the residuals best."""
     labels = samples.points[:, samples.controls :]
-    others = labels @ labels.T * (samples.groups[:, None] != samples.groups)
-    sums, counts = others @ residuals, others.sum(axis=1)
+    rest = labels @ labels.T * (samples.groups[:, None] != samples.groups)
+    sums, counts = rest @ residuals, rest.sum(axis=1)
     losses = [
-        float(np.sum(np.square(residuals - _shares(counts, own)[:, None] * sums)))
-        for own in SHRINKAGES
+        float(np.sum(np.square(residuals - _shares(counts, shrinkage)[:, None] * sums)))
+        for shrinkage in SHRINKAGES
     ]
     # Of equal ones the strongest.
     return SHRINKAGES[len(losses) - 1 - int(np.argmin(losses[::-1]))]

@@ -70,7 +70,9 @@ def predict(recipe: Recipe, trained: TrainedModel, queries: Queries) -> Predicti
     samples = _groups_for_lines(trained.samples)
     values, offsets = peer_values(samples, trained.values, points)
     naive = _naive(trained, samples, points, offsets if samples.labels else {})
-    listed = {name: predictions.with_pose_vectors(trained, own) for name, own in values.items()}
+    listed = {
+        name: predictions.with_pose_vectors(trained, vectors) for name, vectors in values.items()
+    }
     return predictions.with_sigma(trained, queries, naive | listed)
 
 
@@ -114,8 +116,8 @@ def peer_values(
         predicted |= _linear(name, choices, samples, values, points)
         if name == OFFSETS_OF:
             offsets = {
-                key: linear_smoothers.chosen_offsets(choices, samples, known)
-                for key, known in values.items()
+                key: linear_smoothers.chosen_offsets(choices, samples, sample_values)
+                for key, sample_values in values.items()
             }
     predicted[GP] = _by_quantity(predictions.predict_process, samples, values, points)
     if samples.labels:
@@ -135,7 +137,7 @@ def gp_without_performers(samples: SamplePoints, values: Floats, queries: Floats
 def _by_quantity(
     peer: Interpolator, samples: SamplePoints, values: Values, points: Floats
 ) -> Values:
-    return {key: peer(samples, known, points) for key, known in values.items()}
+    return {key: peer(samples, sample_values, points) for key, sample_values in values.items()}
 
 
 def _linear(
@@ -145,12 +147,15 @@ def _linear(
     values: Values,
     points: Floats,
 ) -> dict[str, Values]:
-    alone = {key: linear_smoothers.predict(choices, known) for key, known in values.items()}
+    alone = {
+        key: linear_smoothers.predict(choices, sample_values)
+        for key, sample_values in values.items()
+    }
     if not samples.labels:
         return {name: alone}
     with_performer = {
-        key: linear_smoothers.predict_with_performers(choices, samples, known, points)
-        for key, known in values.items()
+        key: linear_smoothers.predict_with_performers(choices, samples, sample_values, points)
+        for key, sample_values in values.items()
     }
     return {name: with_performer, name + OPEN: alone}
 
@@ -163,9 +168,9 @@ def _naive(
     offsets: of performers (p, m) by quantity, taken from the samples and added to the prediction;
     empty for a family without labels.
     """
-    whole, parents = trained.tensor, trained.skeleton.parents
+    tensor, parents = trained.tensor, trained.skeleton.parents
     bones = np.stack([example.offsets for example in trained.examples])
-    positions = truncation_error.positions(whole, whole.values, parents, bones)
+    positions = truncation_error.positions(tensor, tensor.values, parents, bones)
     controls = samples.controls
     # Variograms are of the captured motions, whose performers differ.
     shown = {name: values[:, None, :, None] for name, values in trained.values.items()}
@@ -173,8 +178,8 @@ def _naive(
 
     def krige(values: Values) -> Values:
         predicted = {}
-        for name, known in values.items():
-            frames = known if name == "pose" else known[:, None]
+        for name, offset_values in values.items():
+            frames = offset_values if name == "pose" else offset_values[:, None]
             model = naive_kriging.fit_naive(
                 samples.half_ranges, shown[name], frames, "matern52", variogram.fit_by_grid
             )
@@ -182,11 +187,11 @@ def _naive(
             predicted[name] = rows if name == "pose" else rows[:, 0]
         return predicted
 
-    alone = {**trained.values, "pose": whole.numbers(whole.values)}
+    alone = {**trained.values, "pose": tensor.numbers(tensor.values)}
     if not offsets:
         return {NAIVE: krige(alone)}
-    known = _offset_values(trained, offsets, samples.points[:, controls:])
-    rest = krige({name: values - known[name] for name, values in alone.items()})
+    offset_values = _offset_values(trained, offsets, samples.points[:, controls:])
+    rest = krige({name: values - offset_values[name] for name, values in alone.items()})
     queried = _offset_values(trained, offsets, points[:, controls:])
     return {
         NAIVE: {name: values + queried[name] for name, values in rest.items()},

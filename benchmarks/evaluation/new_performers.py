@@ -27,7 +27,7 @@ MIN_OTHER_TAKES = 3
 
 
 def predict_unnamed(
-    recipe: Recipe, trained: TrainedModel, shown: Sequence[Example], asked: Queries
+    recipe: Recipe, trained: TrainedModel, clips: Sequence[Example], queries: Queries
 ) -> dict[str, list[ComparedMotion]]:
     """Return answers without performers: of a model trained without them, and of the same model.
 
@@ -35,15 +35,15 @@ def predict_unnamed(
     """
     if PERFORMER not in trained.model.bank.labels:
         return {}
-    others = [
+    rest = [
         {name: label for name, label in labels.items() if name != PERFORMER}
-        for labels in asked.labels
+        for labels in queries.labels
     ]
-    unnamed = replace(asked, labels=others)
+    unnamed = replace(queries, labels=rest)
     alone = [name for name in recipe.kriging.label if name != PERFORMER]
     kriging = recipe.kriging.model_copy(update={"label": alone})
     plain = recipe.model_copy(update={"kriging": kriging})
-    untold = train_examples(plain, shown)
+    untold = train_examples(plain, clips)
     return {
         NO_PERFORMER: predictions.predict_posefield(untold, unnamed),
         ASKED_OPEN: predictions.predict_posefield(trained, unnamed),
@@ -51,7 +51,7 @@ def predict_unnamed(
 
 
 def predict_adapted(
-    recipe: Recipe, trained: TrainedModel, held: Sequence[Example]
+    recipe: Recipe, trained: TrainedModel, held_out: Sequence[Example]
 ) -> dict[str, list[ComparedMotion | None]]:
     """Return the motions of held-out clips by models adapted with some of the others.
 
@@ -59,11 +59,11 @@ def predict_adapted(
     """
     if PERFORMER not in trained.model.bank.labels:
         return {}
-    if len(np.unique(sample_points.recording_numbers(held))) <= MIN_OTHER_TAKES:
-        return {name: [None] * len(held) for name in ADAPTATION_COUNTS}
-    known = canonical_clips.adaptable(trained)
+    if len(np.unique(sample_points.recording_numbers(held_out))) <= MIN_OTHER_TAKES:
+        return {name: [None] * len(held_out) for name in ADAPTATION_COUNTS}
+    adaptable = canonical_clips.adaptable(trained)
     return {
-        name: _motions(recipe, trained, known, held, count)
+        name: _motions(recipe, trained, adaptable, held_out, count)
         for name, count in ADAPTATION_COUNTS.items()
     }
 
@@ -71,50 +71,52 @@ def predict_adapted(
 def _motions(
     recipe: Recipe,
     trained: TrainedModel,
-    known: canonical_clips.AdaptableModel,
-    held: Sequence[Example],
+    adaptable: canonical_clips.AdaptableModel,
+    held_out: Sequence[Example],
     count: int,
 ) -> list[ComparedMotion | None]:
     models: dict[tuple[int, ...], TrainedModel] = {}
-    found: list[ComparedMotion | None] = []
-    for place, example in enumerate(held):
-        shown = choose_clips(held, place, count)
-        if shown not in models:
-            own = adaptation.adapt(known, [held[i] for i in shown], example.row.performer)
-            models[shown] = replace(trained, model=own.model)
-        asked = Queries(example.controls[None], [example.row.labels])
-        found += predictions.predict_posefield(models[shown], asked)
-    return found
+    motions: list[ComparedMotion | None] = []
+    for index, example in enumerate(held_out):
+        indices = choose_clips(held_out, index, count)
+        if indices not in models:
+            adapted = adaptation.adapt(
+                adaptable, [held_out[i] for i in indices], example.row.performer
+            )
+            models[indices] = replace(trained, model=adapted.model)
+        queries = Queries(example.controls[None], [example.row.labels])
+        motions += predictions.predict_posefield(models[indices], queries)
+    return motions
 
 
-def choose_clips(held: Sequence[Example], asked: int, count: int) -> tuple[int, ...]:
+def choose_clips(held_out: Sequence[Example], index: int, count: int) -> tuple[int, ...]:
     """Return the indices of `count` clips to adapt with, from different takes than the asked one.
 
     The first is the nearest to the mean of the controls; each further one is the farthest from
     those before it. Fewer if there are fewer takes.
     """
-    takes, points = sample_points.recording_numbers(held), _points(held)
+    takes, points = sample_points.recording_numbers(held_out), _points(held_out)
     chosen: list[int] = []
     while len(chosen) < count:
-        left = _other_takes(takes, [asked, *chosen])
+        left = _other_takes(takes, [index, *chosen])
         if not len(left):
             break
         if chosen:
-            apart = np.linalg.norm(points[left, None] - points[chosen], axis=-1).min(axis=1)
+            distances = np.linalg.norm(points[left, None] - points[chosen], axis=-1).min(axis=1)
         else:
-            apart = -np.linalg.norm(points[left] - points[left].mean(axis=0), axis=-1)
+            distances = -np.linalg.norm(points[left] - points[left].mean(axis=0), axis=-1)
         # Rounded, so that rounding errors do not decide ties.
-        chosen.append(int(left[np.argmax(np.round(apart, 9))]))
+        chosen.append(int(left[np.argmax(np.round(distances, 9))]))
     return tuple(sorted(chosen))
 
 
-def _other_takes(takes: Indices, taken: list[int]) -> Indices:
-    return np.flatnonzero(~np.isin(takes, takes[taken]))
+def _other_takes(takes: Indices, timings: list[int]) -> Indices:
+    return np.flatnonzero(~np.isin(takes, takes[timings]))
 
 
-def _points(held: Sequence[Example]) -> Floats:
+def _points(held_out: Sequence[Example]) -> Floats:
     """Return the controls (k, d) in half-ranges of these clips."""
-    controls = np.stack([example.controls for example in held])
+    controls = np.stack([example.controls for example in held_out])
     low, high = controls.min(axis=0), controls.max(axis=0)
     return half_ranges(controls, low, np.where(high > low, high, low + 1.0))
 
@@ -125,22 +127,24 @@ def facts(results: Sequence[EvaluationResult]) -> dict[str, Any]:
     Empty unless both protocols were run on a model that distinguishes performers.
     """
     by_name = {result.protocol: result for result in results}
-    clips, others = (by_name.get(f"leave_one_{held}_out") for held in ("clip", "performer"))
-    if not clips or not others or ASKED_OPEN not in clips.errors:
+    clips, rest = (by_name.get(f"leave_one_{unit}_out") for unit in ("clip", "performer"))
+    if not clips or not rest or ASKED_OPEN not in clips.errors:
         return {}
     everyone = clips.predicted(ASKED_OPEN)
-    named, unnamed = (_mean_distance(clips, name, everyone) for name in (OURS, ASKED_OPEN))
-    figures: dict[str, Any] = {"named_nearer": round_number(1.0 - named / unnamed)}
+    known_performer, unnamed = (
+        _mean_distance(clips, name, everyone) for name in (OURS, ASKED_OPEN)
+    )
+    figures: dict[str, Any] = {"named_nearer": round_number(1.0 - known_performer / unnamed)}
     for name in ADAPTATION_COUNTS:
-        if shown := others.predicted(name):
-            adapted, none = (_mean_distance(others, row, shown) for row in (name, OURS))
-            whole = _mean_distance(clips, OURS, shown)
+        if predicted := rest.predicted(name):
+            adapted, none = (_mean_distance(rest, row, predicted) for row in (name, OURS))
+            distance = _mean_distance(clips, OURS, predicted)
             figures[name] = {
-                "clips": len(shown),
+                "clips": len(predicted),
                 "relative_cm": summary.centimetres(adapted),
                 "shown_none_cm": summary.centimetres(none),
-                "shown_all_cm": summary.centimetres(whole),
-                "farther_than_all": round_number(adapted / whole - 1.0),
+                "shown_all_cm": summary.centimetres(distance),
+                "farther_than_all": round_number(adapted / distance - 1.0),
             }
     return figures
 

@@ -33,25 +33,27 @@ Kernel = Literal["thin_plate_spline", "linear", "cubic"]
 
 def _rbf(kernel: Kernel) -> Interpolator:
     def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-        known, asked = _controls(samples, queries)
-        return _rbf_interpolator(known, values, kernel, 0.0)(asked)
+        sample_points, query_points = _controls(samples, queries)
+        return _rbf_interpolator(sample_points, values, kernel, 0.0)(query_points)
 
     return predict
 
 
 def _rbf_interpolator(
-    known: Floats, values: Floats, kernel: Kernel, smoothing: float
+    sample_points: Floats, values: Floats, kernel: Kernel, smoothing: float
 ) -> RBFInterpolator:
     return RBFInterpolator(
-        *_distinct_points(known, values), kernel=kernel, degree=1, smoothing=smoothing
+        *_distinct_points(sample_points, values), kernel=kernel, degree=1, smoothing=smoothing
     )
 
 
-def _distinct_points(known: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _distinct_points(sample_points: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return distinct points and the mean value at each: an interpolator needs distinct points."""
-    points, place, counts = np.unique(known, axis=0, return_inverse=True, return_counts=True)
+    points, indices, counts = np.unique(
+        sample_points, axis=0, return_inverse=True, return_counts=True
+    )
     sums = np.zeros((len(points), values.shape[1]))
-    np.add.at(sums, np.ravel(place), values)
+    np.add.at(sums, np.ravel(indices), values)
     return points, sums / counts[:, None]
 
 
@@ -59,26 +61,30 @@ def thin_plate(smoothing: float) -> Interpolator:
     """Return thin-plate interpolation with a smoothing."""
 
     def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-        known, asked = _controls(samples, queries)
-        return _rbf_interpolator(known, values, "thin_plate_spline", smoothing)(asked)
+        sample_points, query_points = _controls(samples, queries)
+        return _rbf_interpolator(sample_points, values, "thin_plate_spline", smoothing)(
+            query_points
+        )
 
     return predict
 
 
 def _regression(degree: int) -> Interpolator:
     def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-        known, asked = _controls(samples, queries)
+        sample_points, query_points = _controls(samples, queries)
         model = make_pipeline(PolynomialFeatures(degree), LinearRegression())
-        return model.fit(known, values).predict(asked)
+        return model.fit(sample_points, values).predict(query_points)
 
     return predict
 
 
 def _neighbours(count: int | None, weights: str | Callable[[Floats], Floats]) -> Interpolator:
     def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-        known, asked = _controls(samples, queries)
-        model = KNeighborsRegressor(min(count or len(known), len(known)), weights=weights)
-        return model.fit(known, values).predict(asked)
+        sample_points, query_points = _controls(samples, queries)
+        model = KNeighborsRegressor(
+            min(count or len(sample_points), len(sample_points)), weights=weights
+        )
+        return model.fit(sample_points, values).predict(query_points)
 
     return predict
 
@@ -90,25 +96,27 @@ def _inverse_square(distances: Floats) -> Floats:
 
 def nearest_of_performer(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return the nearest of the examples that share most labels, such as the performer."""
-    found = np.empty((len(queries), values.shape[1]))
+    result = np.empty((len(queries), values.shape[1]))
     for row, query in enumerate(queries):
         shared = samples.points[:, samples.controls :] @ query[samples.controls :]
         among = shared > shared.max() - 0.5
-        known = samples.half_ranges[among]
-        model = KNeighborsRegressor(1).fit(known, values[among])
-        found[row] = model.predict(query[None, : samples.controls])[0]
-    return found
+        sample_points = samples.half_ranges[among]
+        model = KNeighborsRegressor(1).fit(sample_points, values[among])
+        result[row] = model.predict(query[None, : samples.controls])[0]
+    return result
 
 
 def linear_coefficients(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Interpolate linearly over simplices of the samples; outside their hull, take the nearest."""
-    known, asked = _controls(samples, queries)
+    sample_points, query_points = _controls(samples, queries)
     if samples.controls == 1:
-        order = np.argsort(known[:, 0])
-        columns = [np.interp(asked[:, 0], known[order, 0], v[order]) for v in values.T]
+        order = np.argsort(sample_points[:, 0])
+        columns = [
+            np.interp(query_points[:, 0], sample_points[order, 0], v[order]) for v in values.T
+        ]
         return np.stack(columns, axis=1)
-    inside = LinearNDInterpolator(known, values)(asked)
-    outside = NearestNDInterpolator(known, values)(asked)
+    inside = LinearNDInterpolator(sample_points, values)(query_points)
+    outside = NearestNDInterpolator(sample_points, values)(query_points)
     return np.where(np.isnan(inside), outside, inside)
 
 

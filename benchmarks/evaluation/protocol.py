@@ -90,15 +90,15 @@ def run(
         return run_against_truth(recipe, examples, ground_truth.truth_points(), jobs, report)
     listed = protocol.folds_of(examples, name)
     run_jobs = jobs.run(run_fold, [(fold, name) for fold in listed], (recipe, examples))
-    parts = list(protocol.with_progress(run_jobs, len(listed), report))
-    errors = (part.errors for part in parts)
-    return _result(protocol.held_out_result(recipe, examples, name, errors), parts)
+    fold_results = list(protocol.with_progress(run_jobs, len(listed), report))
+    errors = (fold_result.errors for fold_result in fold_results)
+    return _result(protocol.held_out_result(recipe, examples, name, errors), fold_results)
 
 
 @single_threaded()
 def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str) -> Part:
     """Return the results for the clips of one fold."""
-    rest, held = fold.split(examples)
+    rest, held_out = fold.split(examples)
     methods.check_lines(rest, tuple(control.name for control in recipe.controls))
     trained = protocol.train_fold(recipe, examples, fold)
     file = onnx_export.export_finest(trained.trained)
@@ -108,8 +108,8 @@ def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str)
             recipe, trained.trained, rest, trained.queries
         )
     else:
-        more = new_performers.predict_adapted(recipe, trained.trained, held)
-    events = [predictions.captured_event(trained.trained, e.landmarks) for e in held]
+        more = new_performers.predict_adapted(recipe, trained.trained, held_out)
+    events = [predictions.captured_event(trained.trained, e.landmarks) for e in held_out]
     targets = [
         corrections.event_target(motion, event)
         for motion, event in zip(trained.captured, events, strict=True)
@@ -119,8 +119,10 @@ def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str)
     errors = protocol.compare_fold(trained, predicted)
     if name != "clip":
         return Part(errors, corrected)
-    feet = standing_feet.feet_answers(recipe.name, file, held)
-    return Part(errors, corrected, feet, takes.take_results(recipe.name, file, held, fold.held_out))
+    feet = standing_feet.feet_answers(recipe.name, file, held_out)
+    return Part(
+        errors, corrected, feet, takes.take_results(recipe.name, file, held_out, fold.held_out)
+    )
 
 
 def _predict(
@@ -156,11 +158,11 @@ def run_against_truth(
     file = onnx_export.export_finest(trained)
     batches = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
     run_jobs = jobs.run(_run_truth_batch, batches, (recipe, trained, file))
-    parts = list(protocol.with_progress(run_jobs, len(batches), report))
+    fold_results = list(protocol.with_progress(run_jobs, len(batches), report))
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
     joints, alone = trained.skeleton.names, range(len(points))
-    errors = (part.errors for part in parts)
-    return _result(protocol.merge(recipe, TRUTH, names, joints, alone, errors), parts)
+    errors = (fold_result.errors for fold_result in fold_results)
+    return _result(protocol.merge(recipe, TRUTH, names, joints, alone, errors), fold_results)
 
 
 @single_threaded()
@@ -178,21 +180,21 @@ def _run_truth_batch(
     return Part(PartialResult(clips, errors, predicted.sigma, predicted.joint_sigma), corrected)
 
 
-def _result(errors: EvaluationResult, parts: Sequence[Part]) -> Result:
+def _result(errors: EvaluationResult, fold_results: Sequence[Part]) -> Result:
     """Return the result of parts, in the order of the clips."""
-    listed = sorted(parts, key=lambda part: part.clips)
+    listed = sorted(fold_results, key=lambda fold_result: fold_result.clips)
     names = list(errors.errors)
     unnamed = [name for name in names if name.endswith(OPEN) and NO_PERFORMER in names]
-    varied = [part.takes for part in listed if part.takes]
-    with_takes = [part for part in listed if part.takes]
-    answers = protocol.in_order(with_takes, lambda part: part.takes.clips)
+    varied = [fold_result.takes for fold_result in listed if fold_result.takes]
+    with_takes = [fold_result for fold_result in listed if fold_result.takes]
+    answers = protocol.in_order(with_takes, lambda fold_result: fold_result.takes.clips)
     return Result(
         replace(
             errors,
             definitions={name: methods.definition(name) for name in names},
             references=dict.fromkeys(unnamed, NO_PERFORMER),
         ),
-        protocol.in_order(listed, lambda part: part.corrections),
-        protocol.in_order(listed, lambda part: part.feet),
-        takes.facts(answers, [part.fields for part in varied if part.fields]),
+        protocol.in_order(listed, lambda fold_result: fold_result.corrections),
+        protocol.in_order(listed, lambda fold_result: fold_result.feet),
+        takes.facts(answers, [fold_result.fields for fold_result in varied if fold_result.fields]),
     )

@@ -52,7 +52,7 @@ class FeetAnswer:
     lowered: float
 
 
-def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAnswer]:
+def feet_answers(name: str, file: bytes, held_out: Sequence[Example]) -> list[FeetAnswer]:
     """Return the answers of a model file for held-out clips, with their labels known.
 
     Empty for a model whose feet do not stand: in place, without feet, or without legs.
@@ -62,7 +62,7 @@ def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAn
     if joints is None:
         return []
     locked = _without_swing_rules(model)
-    return [_feet_answer(model, locked, example, joints) for example in held]
+    return [_feet_answer(model, locked, example, joints) for example in held_out]
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ def measured_joints(card: ModelCard) -> MeasuredJoints | None:
 
     Feet stand in motions that travel, at the ends of legs.
     """
-    own = card.skeleton
-    legs = footsteps.choose_limbs(own.parents, own.offsets, card.feet, ()).character.legs
+    skeleton = card.skeleton
+    legs = footsteps.choose_limbs(skeleton.parents, skeleton.offsets, card.feet, ()).character.legs
     if not legs or card.root != "travelling":
         return None
     return MeasuredJoints(tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs))
@@ -111,14 +111,16 @@ def _feet_answer(
 
 def _relative_distance(clip: Clip, captured: Clip) -> float:
     """Return the mean distance of a clip from a captured one after time warping, m."""
-    one, other = (motion_errors.motion_of_clip(moved, None) for moved in (clip, captured))
+    one, other = (motion_errors.motion_of_clip(motion, None) for motion in (clip, captured))
     return motion_errors.compare_motions(one, other, ()).relative.mean
 
 
 def _without_swing_rules(model: Synthesizer) -> Synthesizer:
     """Return the model without the captured swings' durations and clearance."""
     card = model.session.card
-    free = tuple(replace(own, longest_swing=NO_LIMIT, clearance=0.0) for own in card.contacts)
+    free = tuple(
+        replace(contact, longest_swing=NO_LIMIT, clearance=0.0) for contact in card.contacts
+    )
     return Synthesizer(model.name, replace(model.session, card=replace(card, contacts=free)))
 
 
@@ -127,9 +129,11 @@ def question(
 ) -> ClipQuestion:
     """Return the question for a held-out clip, at a frame rate and without targets."""
     card = model.session.card
-    known = {own.name: set(own.names) for own in card.labels}
+    label_names = {label_set.name: set(label_set.names) for label_set in card.labels}
     labels: dict[str, LabelValue] = {
-        name: value for name, value in example.row.labels.items() if value in known.get(name, ())
+        name: value
+        for name, value in example.row.labels.items()
+        if value in label_names.get(name, ())
     }
     controls = {
         control.name: float(value)

@@ -61,21 +61,21 @@ class TakeResults:
 
 
 def take_results(
-    name: str, file: bytes, held: Sequence[Example], places: Sequence[int]
+    name: str, file: bytes, held_out: Sequence[Example], indices: Sequence[int]
 ) -> TakeResults:
     """Return the takes of a model file for held-out clips, whose indices are `places`."""
     model = Synthesizer(name, session.open_bytes(file, name))
     card = model.session.card
-    seeds = [FIRST_SEED + place for place in places]
+    seeds = [FIRST_SEED + index for index in indices]
     fields = field_statistics.measure(model.session.kriging_weights, seeds[0])
     joints = standing_feet.measured_joints(card)
     if joints is None or not random_field.has_features(card.kriging):
         return TakeResults((), fields)
-    found = [
+    answers = [
         _take_answer(_Asked(model, example, seed), joints)
-        for example, seed in zip(held, seeds, strict=True)
+        for example, seed in zip(held_out, seeds, strict=True)
     ]
-    return TakeResults(found, fields)
+    return TakeResults(answers, fields)
 
 
 @dataclass(frozen=True)
@@ -97,9 +97,9 @@ class _Asked:
         return structs.replace(self.plain, take=self.seed)
 
 
-def _take_answer(asked: _Asked, joints: MeasuredJoints) -> TakeAnswer:
-    model, taken = asked.model, asked.taken
-    standing = structs.replace(taken, feet="stand")
+def _take_answer(task: _Asked, joints: MeasuredJoints) -> TakeAnswer:
+    model, timings = task.model, task.taken
+    standing = structs.replace(timings, feet="stand")
     has_detail = bool(model.session.card.making.detail)
 
     def measured(question: ClipQuestion) -> FootQuality:
@@ -110,29 +110,33 @@ def _take_answer(asked: _Asked, joints: MeasuredJoints) -> TakeAnswer:
 
     cyclic = model.session.card.cyclic
     return TakeAnswer(
-        joints.measure(asked.example.captured or asked.example.clip, RATE),
-        measured(asked.plain),
+        joints.measure(task.example.captured or task.example.clip, RATE),
+        measured(task.plain),
         measured(standing),
-        measured(taken),
-        None if cyclic else joints.measure(_unlimited(model, taken), RATE),
-        detailed(asked.plain),
+        measured(timings),
+        None if cyclic else joints.measure(_unlimited(model, timings), RATE),
+        detailed(task.plain),
         detailed(standing),
     )
 
 
-def _unlimited(model: Synthesizer, asked: ClipQuestion) -> Clip:
+def _unlimited(model: Synthesizer, clip_question: ClipQuestion) -> Clip:
     """Return a take that varies all time functions of a motion without cycle."""
-    question, solver = model.question(asked), model.solver
-    bench, card = solver.corrector(question.level), model.session.card
+    question, solver = model.question(clip_question), model.solver
+    corrector, card = solver.corrector(question.level), model.session.card
     state = model.session.state(question.point, np.zeros(1), question.labels, question.level)
-    variation = TakeVariation(model.session, len(bench.reduced.core))
-    settings = TakeSettings(asked.take, asked.variety, detail=False)
-    held = variation.vary(bench, bench.predict(state), question, settings)
-    times = np.arange(0.0, held.duration, 1.0 / asked.fps)
-    trust = structs.replace(model.constrained_trust(asked, question, held), targets=())
-    (found,) = solver.poses([(question, held, times, trust)])
+    variation = TakeVariation(model.session, len(corrector.reduced.core))
+    settings = TakeSettings(clip_question.take, clip_question.variety, detail=False)
+    corrected = variation.vary(corrector, corrector.predict(state), question, settings)
+    times = np.arange(0.0, corrected.duration, 1.0 / clip_question.fps)
+    trust = structs.replace(model.constrained_trust(clip_question, question, corrected), targets=())
+    (answer,) = solver.poses([(question, corrected, times, trust)])
     return assemble(
-        card.skeleton, found.rotations, found.root_position, found.bone_offsets, asked.fps
+        card.skeleton,
+        answer.rotations,
+        answer.root_position,
+        answer.bone_offsets,
+        clip_question.fps,
     )
 
 

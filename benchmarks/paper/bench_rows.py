@@ -31,29 +31,29 @@ def _against(one: Baseline, name: str, scale: float, unit: str) -> Row:
 def _compression(size: Size) -> Row:
     r1, r2, r3 = size.ranks
     return Row(
-        f"tensor within {size.asked} of full rank, summed over joints and frames",
+        f"tensor within {size.threshold} of full rank, summed over joints and frames",
         float(r1 * r2 * r3),
         "numbers in the core",
         f"the raw tensor; all stored, {size.stored:.0f} times",
         size.core,
-        CORE_GOAL if size.asked.startswith("500 ") else None,
+        CORE_GOAL if size.threshold.startswith("500 ") else None,
     )
 
 
-def library_rows(made: Family) -> list[Row]:
+def library_rows(trained_family: Family) -> list[Row]:
     """Return the row for precomputation against variograms fitted by GSTools."""
     runs: dict[str, Callable[[], object]] = {
-        "ours": partial(precomputation.ours, made, SHOWN),
-        "naive": partial(precomputation.naive, made, _fit_by_gstools),
+        "ours": partial(precomputation.ours, trained_family, SHOWN),
+        "naive": partial(precomputation.naive, trained_family, _fit_by_gstools),
     }
-    taken = in_turn(runs, rounds=3, repeats=1)
+    timings = in_turn(runs, rounds=3, repeats=1)
     return [
         Row(
             f"precompute at {SHOWN}: {precomputation.OURS}",
-            1e3 * taken["ours"],
+            1e3 * timings["ours"],
             "ms",
             precomputation.NAIVE.format("GSTools"),
-            taken["naive"] / taken["ours"],
+            timings["naive"] / timings["ours"],
             PRECOMPUTE_GOAL,
         )
     ]

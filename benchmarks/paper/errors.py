@@ -36,14 +36,14 @@ Poses = Callable[[Floats], tuple[Floats, Floats]]
 class Errors:
     """Errors of a family over control points (Q, d) in half-ranges."""
 
-    made: Family
+    trained_family: Family
     points: Floats
     hyper: Hyper
 
     @cached_property
     def whole(self) -> Floats:
         """Joint positions (Q, T, J, 3), m, of the model at full rank."""
-        return self.positions(self.of(self.made.trained.full))
+        return self.positions(self.of(self.trained_family.trained.full))
 
     def truncation(self, reduced: TuckerTensor) -> float:
         """Return the summed distance, m, of a truncation from full rank with the same weights."""
@@ -56,48 +56,50 @@ class Errors:
 
     def _some(self, poses: Poses, points: Floats) -> Floats:
         rotations, root = poses(points)
-        translations = skeleton.translations(self.made.offsets.mean(axis=0), root)
-        return skeleton.positions(self.made.parents, rotations, translations)
+        translations = skeleton.translations(self.trained_family.offsets.mean(axis=0), root)
+        return skeleton.positions(self.trained_family.parents, rotations, translations)
 
     def field(self, reduced: TuckerTensor) -> UniversalKriging:
         """Return the kriging model of a truncation's sample basis."""
-        return universal_kriging.solve(self.hyper, self.made.samples, reduced.bases[2])
+        return universal_kriging.solve(self.hyper, self.trained_family.samples, reduced.bases[2])
 
     def of(self, reduced: TuckerTensor) -> Poses:
         """Return the pose function of a truncation."""
-        own, field = self.made.trained.tensor, self.field(reduced)
-        decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart)
-        frames = np.arange(float(own.values.shape[1]))
+        tensor, field = self.trained_family.trained.tensor, self.field(reduced)
+        decoder = Decoder(reduced, tensor.mean, tensor.unwhiten, tensor.chart)
+        frames = np.arange(float(tensor.values.shape[1]))
         return lambda points: decoder.numpy(
             field.predict(points), np.tile(frames, (len(points), 1))
         )
 
     def of_naive(self, field: NaiveKriging) -> Poses:
         """Return the pose function of per-frame kriging of the degrees of freedom that vary."""
-        own = self.made.trained.tensor
+        tensor = self.trained_family.trained.tensor
 
         def poses(points: Floats) -> tuple[Floats, Floats]:
             varying = field.numpy(points)
-            numbers = np.tile(own.mean, (*varying.shape[:2], 1))
-            numbers[..., self.made.varies] = varying
-            return own.chart.poses(numbers)
+            numbers = np.tile(tensor.mean, (*varying.shape[:2], 1))
+            numbers[..., self.trained_family.varies] = varying
+            return tensor.chart.poses(numbers)
 
         return poses
 
 
-def uniform(made: Family, count: int) -> Errors:
+def uniform(trained_family: Family, count: int) -> Errors:
     """Return the errors over `count` control points, uniform in the sampled box and seeded."""
     rng = np.random.Generator(np.random.PCG64(SEED))
-    points = rng.uniform(-1.0, 1.0, (count, made.samples.shape[1]))
-    return Errors(made, points, precomputation.guess(made, made.trained.full))
+    points = rng.uniform(-1.0, 1.0, (count, trained_family.samples.shape[1]))
+    return Errors(
+        trained_family, points, precomputation.guess(trained_family, trained_family.trained.full)
+    )
 
 
-def between(found: Floats, expected: Floats) -> float:
+def between(values: Floats, expected: Floats) -> float:
     """Return the RMS over motions of the distances summed over joints and frames, m.
 
     found, expected (Q, T, J, 3): joint positions, m.
     """
-    sums = np.sum(np.linalg.norm(found - expected, axis=-1), axis=(1, 2))
+    sums = np.sum(np.linalg.norm(values - expected, axis=-1), axis=(1, 2))
     return float(np.sqrt(np.mean(np.square(sums))))
 
 
@@ -107,19 +109,19 @@ def smallest(errors: Errors, threshold: float) -> RankTriple:
     The search follows the Pareto front of size and error in the training metric, with SOME of the
     control points; all of them confirm the result.
     """
-    made, full = errors.made, errors.made.trained.full
+    trained_family, full = errors.trained_family, errors.trained_family.trained.full
     some = replace(errors, points=errors.points[:SOME])
-    places = made.trained.tensor.values[0].size * len(made.parents)
-    own = _front(errors)
-    found = truncation_cost.cheapest_within(
-        own,
+    count = trained_family.trained.tensor.values[0].size * len(trained_family.parents)
+    front = _front(errors)
+    cheapest = truncation_cost.cheapest_within(
+        front,
         lambda triple: some.truncation(full.truncated(triple)) / threshold,
-        (threshold / (made.vectors.shape[1] * len(made.parents))) ** 2 * places,
+        (threshold / (trained_family.vectors.shape[1] * len(trained_family.parents))) ** 2 * count,
     )
-    place = [own[place] for place in range(len(own.errors))].index(found)
-    while errors.truncation(full.truncated(own[place])) > threshold:
-        place += 1
-    return own[place]
+    index = [front[index] for index in range(len(front.errors))].index(cheapest)
+    while errors.truncation(full.truncated(front[index])) > threshold:
+        index += 1
+    return front[index]
 
 
 def _front(errors: Errors) -> ParetoFront:
@@ -128,7 +130,7 @@ def _front(errors: Errors) -> ParetoFront:
     Kriging smooths: it predicts smaller coefficients for the last sample directions than the clips
     have.
     """
-    full = errors.made.trained.full
+    full = errors.trained_family.trained.full
     predicted = errors.field(full).predict(errors.points)
-    used = np.mean(np.square(predicted), axis=0) * len(errors.made.samples)
+    used = np.mean(np.square(predicted), axis=0) * len(errors.trained_family.samples)
     return truncation_cost.pareto_front(full.core * np.sqrt(used), RankCost((0, 0, 0)))

@@ -67,7 +67,7 @@ def solve(columns: Floats, order: Floats, inverse: Floats, b: Floats, out: Float
 
 
 @compiled
-def ours(points, places, arrays, scratch, out):  # type: ignore[no-untyped-def]
+def ours(points, positions, arrays, scratch, out):  # type: ignore[no-untyped-def]
     """Write pose vectors (Q, D) of the model at points (Q, d) and canonical frames (Q,)."""
     samples, scales, dual, core, table, directions, mean = arrays
     near, coefficients, motion, time = scratch
@@ -79,8 +79,8 @@ def ours(points, places, arrays, scratch, out):  # type: ignore[no-untyped-def]
         add_product(near, dual, 1.0, coefficients)
         motion[:] = 0.0
         add_product(coefficients, core, 1.0, motion)
-        before = min(int(places[q]), last)
-        share = places[q] - before
+        before = min(int(positions[q]), last)
+        share = positions[q] - before
         time[:] = 0.0
         for k in range(r2):
             level = (1.0 - share) * table[before, k] + share * table[before + 1, k]
@@ -91,7 +91,7 @@ def ours(points, places, arrays, scratch, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def naive_solved(points, places, arrays, scratch, out):  # type: ignore[no-untyped-def]
+def naive_solved(points, positions, arrays, scratch, out):  # type: ignore[no-untyped-def]
     """Write pose vectors (Q, D) of naive kriging by the LU factors of each frame's system.
 
     A place between two frames evaluates both; a place on a frame evaluates one.
@@ -100,9 +100,9 @@ def naive_solved(points, places, arrays, scratch, out):  # type: ignore[no-untyp
     near, weights = scratch
     for q in range(len(points)):
         out[q] = 0.0
-        first = int(places[q])
+        first = int(positions[q])
         for frame in range(first, first + 2):
-            share = 1.0 - abs(places[q] - frame)
+            share = 1.0 - abs(positions[q] - frame)
             if share > 0.0:
                 basis(points[q], samples, scales[frame], near)
                 solve(columns[frame], order[frame], inverse[frame], near, weights)
@@ -110,15 +110,15 @@ def naive_solved(points, places, arrays, scratch, out):  # type: ignore[no-untyp
 
 
 @compiled
-def naive_inverted(points, places, arrays, scratch, out):  # type: ignore[no-untyped-def]
+def naive_inverted(points, positions, arrays, scratch, out):  # type: ignore[no-untyped-def]
     """Write the same with each frame's inverse (m, n) given: a product instead of a solve."""
     samples, scales, inverses, values = arrays
     near, weights = scratch
     for q in range(len(points)):
         out[q] = 0.0
-        first = int(places[q])
+        first = int(positions[q])
         for frame in range(first, first + 2):
-            share = 1.0 - abs(places[q] - frame)
+            share = 1.0 - abs(positions[q] - frame)
             if share > 0.0:
                 basis(points[q], samples, scales[frame], near)
                 weights[:] = 0.0
@@ -127,15 +127,15 @@ def naive_inverted(points, places, arrays, scratch, out):  # type: ignore[no-unt
 
 
 @compiled
-def naive_dual(points, places, arrays, scratch, out):  # type: ignore[no-untyped-def]
+def naive_dual(points, positions, arrays, scratch, out):  # type: ignore[no-untyped-def]
     """Write the same with inverse times samples (m, D) given: one product per frame."""
     samples, scales, duals = arrays
     (near,) = scratch
     for q in range(len(points)):
         out[q] = 0.0
-        first = int(places[q])
+        first = int(positions[q])
         for frame in range(first, first + 2):
-            share = 1.0 - abs(places[q] - frame)
+            share = 1.0 - abs(positions[q] - frame)
             if share > 0.0:
                 basis(points[q], samples, scales[frame], near)
                 add_product(near, duals[frame], share, out[q])

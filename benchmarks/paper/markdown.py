@@ -45,11 +45,11 @@ def text(table: Table1) -> str:
 def _paper_rows() -> list[str]:
     _, raw, slow, late = PAPER[0]
     rows = []
-    for asked, (r1, r2, r3), seconds, milliseconds in PAPER:
+    for threshold, (r1, r2, r3), seconds, milliseconds in PAPER:
         core = raw[0] * raw[1] * raw[2] / (r1 * r2 * r3)
         stored = raw[0] * raw[1] * raw[2] / RankCost(raw).evaluate(r1, r2, r3) if core > 1 else 1.0
         rows.append(
-            f"| {asked} | {r1} × {r2} × {r3} | {core:.0f} | {stored:.0f} | | | {seconds} s "
+            f"| {threshold} | {r1} × {r2} × {r3} | {core:.0f} | {stored:.0f} | | | {seconds} s "
             f"| {slow / seconds:.1f} | {milliseconds} ms | {late / milliseconds:.1f} |"
         )
     return rows
@@ -58,7 +58,7 @@ def _paper_rows() -> list[str]:
 def _row(size: Size, before: Baseline, single: Baseline) -> str:
     r1, r2, r3 = size.ranks
     return (
-        f"| {size.asked} | {r1} × {r2} × {r3} | {size.core:.0f} | {size.stored:.0f} "
+        f"| {size.threshold} | {r1} × {r2} × {r3} | {size.core:.0f} | {size.stored:.0f} "
         f"| {100 * size.error:.0f} | {100 * size.from_naive:.0f} "
         f"| {1e3 * size.precompute:.1f} ms | {before.seconds / size.precompute:.1f} "
         f"| {1e6 * size.pose:.2f} µs | {single.seconds / size.pose:.1f} |"
@@ -81,18 +81,18 @@ def _caption(table: Table1) -> str:
 
 
 def _goals(table: Table1) -> list[str]:
-    shown = " × ".join(map(str, SHOWN))
+    ranks = " × ".join(map(str, SHOWN))
     lines = [
-        f"| naive method | time | over posefield at {shown} | goal | met |",
+        f"| naive method | time | over posefield at {ranks} | goal | met |",
         "|---|---|---|---|---|",
     ]
     lines += [_baseline(one, 1e3, "ms") for one in table.precompute]
     lines += [_baseline(one, 1e6, "µs") for one in table.pose]
     core = [
-        f"core alone at {size.asked}: {size.core:.0f}, goal {CORE_GOAL:g}: "
+        f"core alone at {size.threshold}: {size.core:.0f}, goal {CORE_GOAL:g}: "
         f"{'met' if size.core >= CORE_GOAL else 'missed'}"
         for size in table.sizes
-        if size.asked.startswith("500 ")
+        if size.threshold.startswith("500 ")
     ]
     return [*lines, "", *core]
 

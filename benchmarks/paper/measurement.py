@@ -34,12 +34,12 @@ POINTS, POSES = 2_000, 2_000
 class Size:
     """Costs and errors of a core of given ranks.
 
-    asked: threshold or source of the ranks. error: summed distance, m, from full rank with the same
+    threshold: or source of the ranks. error: summed distance, m, from full rank with the same
     weights; from_naive: from naive kriging. core, stored: numbers of the raw tensor over those of
     the core, and over all numbers stored. precompute, pose: seconds.
     """
 
-    asked: str
+    threshold: str
     ranks: RankTriple
     error: float
     from_naive: float
@@ -85,33 +85,33 @@ def measure(points: int = POINTS) -> Table1:
         return of(family.make(Path(folder) / "reaching"), points, rounds=7)
 
 
-def of(made: Family, points: int, rounds: int) -> Table1:
+def of(trained_family: Family, points: int, rounds: int) -> Table1:
     """Measure the table on a family, with medians of `rounds` timings."""
-    over = errors.uniform(made, points)
-    asked = _asked(over)
-    field = precomputation.naive(made, precomputation.FITS[SEARCHED])
-    before = _precompute_times(made, asked, rounds)
-    single = _pose_times(made, asked, field, rounds)
+    over = errors.uniform(trained_family, points)
+    ranks_by_name = _asked(over)
+    field = precomputation.naive(trained_family, precomputation.FITS[SEARCHED])
+    before = _precompute_times(trained_family, ranks_by_name, rounds)
+    single = _pose_times(trained_family, ranks_by_name, field, rounds)
     from_naive = over.positions(over.of_naive(field))
     sizes = tuple(
         _size(over, from_naive, name, ranks, before[name], single[name])
-        for name, ranks in asked.items()
+        for name, ranks in ranks_by_name.items()
     )
-    shown = next(name for name, ranks in asked.items() if ranks == SHOWN)
+    chosen = next(name for name, ranks in ranks_by_name.items() if ranks == SHOWN)
     return Table1(
-        made.trained.tensor.values.shape,
-        len(made.parents),
+        trained_family.trained.tensor.values.shape,
+        len(trained_family.parents),
         points,
         errors.between(over.whole, from_naive),
         sizes,
         tuple(
             Baseline(
-                fit, precomputation.NAIVE.format(fit), before[fit], before[shown], PRECOMPUTE_GOAL
+                fit, precomputation.NAIVE.format(fit), before[fit], before[chosen], PRECOMPUTE_GOAL
             )
             for fit in precomputation.FITS
         ),
         tuple(
-            Baseline(form, words, single[form], single[shown], poses.GOALS.get(form))
+            Baseline(form, words, single[form], single[chosen], poses.GOALS.get(form))
             for form, words in poses.FORMS.items()
         ),
     )
@@ -119,42 +119,50 @@ def of(made: Family, points: int, rounds: int) -> Table1:
 
 def _asked(over: Errors) -> dict[str, RankTriple]:
     """Return the ranks for each threshold, and those in the paper."""
-    found = {name: errors.smallest(over, metres) for name, metres in THRESHOLDS.items()}
-    return found | {f"the paper's {_times(ranks)}": ranks for ranks in PAPER_RANKS}
+    ranks_by_name = {name: errors.smallest(over, metres) for name, metres in THRESHOLDS.items()}
+    return ranks_by_name | {f"the paper's {_times(ranks)}": ranks for ranks in PAPER_RANKS}
 
 
-def _precompute_times(made: Family, asked: dict[str, RankTriple], rounds: int) -> dict[str, float]:
-    runs = {name: partial(precomputation.ours, made, ranks) for name, ranks in asked.items()}
+def _precompute_times(
+    trained_family: Family, ranks_by_name: dict[str, RankTriple], rounds: int
+) -> dict[str, float]:
+    runs = {
+        name: partial(precomputation.ours, trained_family, ranks)
+        for name, ranks in ranks_by_name.items()
+    }
     naive = {
-        name: partial(precomputation.naive, made, fit) for name, fit in precomputation.FITS.items()
+        name: partial(precomputation.naive, trained_family, fit)
+        for name, fit in precomputation.FITS.items()
     }
     return in_turn({**runs, **naive}, rounds, repeats=1)
 
 
 def _pose_times(
-    made: Family, asked: dict[str, RankTriple], field: NaiveKriging, rounds: int
+    trained_family: Family, ranks_by_name: dict[str, RankTriple], field: NaiveKriging, rounds: int
 ) -> dict[str, float]:
     """Return seconds per pose of compiled code that computes poses one at a time."""
-    question = poses.questions(made, POSES)
+    question = poses.questions(trained_family, POSES)
     ours = {
-        name: poses.ours(made, *precomputation.ours(made, ranks), question)
-        for name, ranks in asked.items()
+        name: poses.ours(trained_family, *precomputation.ours(trained_family, ranks), question)
+        for name, ranks in ranks_by_name.items()
     }
-    taken = in_turn({**ours, **poses.naive(field, question)}, rounds, repeats=3)
-    return {name: seconds / POSES for name, seconds in taken.items()}
+    timings = in_turn({**ours, **poses.naive(field, question)}, rounds, repeats=3)
+    return {name: seconds / POSES for name, seconds in timings.items()}
 
 
 def _size(
     over: Errors, from_naive: Floats, name: str, ranks: RankTriple, before: float, single: float
 ) -> Size:
-    own = over.made.trained
-    found = over.positions(over.of(own.full.truncated(ranks)))
-    compression = truncation_cost.tensor_compression(own.tensor, ranks, over.made.samples.shape[1])
+    trained = over.trained_family.trained
+    positions = over.positions(over.of(trained.full.truncated(ranks)))
+    compression = truncation_cost.tensor_compression(
+        trained.tensor, ranks, over.trained_family.samples.shape[1]
+    )
     return Size(
         name,
         ranks,
-        errors.between(found, over.whole),
-        errors.between(found, from_naive),
+        errors.between(positions, over.whole),
+        errors.between(positions, from_naive),
         compression.core,
         compression.stored,
         before,

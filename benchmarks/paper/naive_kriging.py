@@ -92,23 +92,23 @@ def fit_naive(
     for frame in range(values.shape[1]):
         poses = positions[:, frame].reshape(len(points), -1)
         left = variogram.residuals(points, poses, 1)
-        found = fitter(variogram.experimental_variogram(points, left), covariance)
-        nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
-        scales = np.full(points.shape[1], 1.0 / found.range)
+        fitted = fitter(variogram.experimental_variogram(points, left), covariance)
+        nugget = np.clip(fitted.nugget / fitted.sill if fitted.sill > 0 else 10.0, 1e-4, 10.0)
+        scales = np.full(points.shape[1], 1.0 / fitted.range)
         hyper = Hyper(covariance, (1,), scales, float(nugget), 0.0)
         fields.append(universal_kriging.solve(hyper, points, values[:, frame]))
     return NaiveKriging(tuple(fields), values)
 
 
-def fit_by_search(found: ExperimentalVariogram, covariance: str) -> VariogramModel:
+def fit_by_search(experimental: ExperimentalVariogram, covariance: str) -> VariogramModel:
     """Fit nugget, sill and range together by a general least-squares solver, as is common."""
-    top, far = float(found.values.max()), float(found.distances.max())
-    roots = np.sqrt(found.pairs) / np.maximum(found.values, 1e-30)
+    top, far = float(experimental.values.max()), float(experimental.distances.max())
+    roots = np.sqrt(experimental.pairs) / np.maximum(experimental.values, 1e-30)
 
     def misfit(x: Floats) -> Floats:
-        squared = np.square(found.distances / x[2])
+        squared = np.square(experimental.distances / x[2])
         rising = 1.0 - COVARIANCES[covariance].numpy(squared)
-        return roots * (x[0] + x[1] * rising - found.values)
+        return roots * (x[0] + x[1] * rising - experimental.values)
 
     low, high = [0.0, 0.0, RANGES[0]], [2.0 * top, 10.0 * top, RANGES[-1]]
     start, sizes = [0.1 * top, 0.9 * top, 0.5 * far], [top, top, far]

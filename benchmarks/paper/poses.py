@@ -40,38 +40,38 @@ GOALS = {AIMED: 3.3}
 
 @dataclass(frozen=True)
 class Questions:
-    """Points (Q, d) in half-ranges, whole frames (Q,) and places between frames (Q,)."""
+    """Points (Q, d) in half-ranges, whole frames (Q,) and positions between frames (Q,)."""
 
     points: Floats
     frames: Floats
-    places: Floats
+    positions: Floats
 
 
-def questions(made: Family, count: int) -> Questions:
+def questions(trained_family: Family, count: int) -> Questions:
     """Return seeded random questions."""
     rng = np.random.Generator(np.random.PCG64(count))
-    samples, frames = made.samples, made.vectors.shape[1]
-    whole = rng.integers(0, frames - 1, count).astype(np.float64)
+    samples, frames = trained_family.samples, trained_family.vectors.shape[1]
+    whole_frames = rng.integers(0, frames - 1, count).astype(np.float64)
     points = rng.uniform(-1.0, 1.0, (count, samples.shape[1]))
-    return Questions(points, whole, whole + rng.uniform(0.01, 0.99, count))
+    return Questions(points, whole_frames, whole_frames + rng.uniform(0.01, 0.99, count))
 
 
 def ours(
-    made: Family, reduced: TuckerTensor, field: UniversalKriging, asked: Questions
+    trained_family: Family, reduced: TuckerTensor, field: UniversalKriging, questions: Questions
 ) -> Callable[[], Floats]:
     """Return a function of the model's pose vectors (Q, D) between frames."""
-    own = made.trained.tensor
-    directions = (reduced.bases[0].T @ own.unwhiten.T)[:, made.varies]
+    tensor = trained_family.trained.tensor
+    directions = (reduced.bases[0].T @ tensor.unwhiten.T)[:, trained_family.varies]
     r1, r2, r3 = reduced.core.shape
     core = reduced.core.transpose(2, 1, 0).reshape(r3, r2 * r1)
     arrays = (
         *(field.samples.T, field.hyper.scales, field.dual),
-        *(core, reduced.bases[1], directions, own.mean[made.varies]),
+        *(core, reduced.bases[1], directions, tensor.mean[trained_family.varies]),
     )
-    return _bound(kernels.ours, asked.points, asked.places, arrays, (r3, r2 * r1, r1))
+    return _bound(kernels.ours, questions.points, questions.positions, arrays, (r3, r2 * r1, r1))
 
 
-def naive(field: NaiveKriging, asked: Questions) -> dict[str, Callable[[], Floats]]:
+def naive(field: NaiveKriging, questions: Questions) -> dict[str, Callable[[], Floats]]:
     """Return functions of pose vectors (Q, D) for each form of the naive method."""
     samples, values = field.fields[0].samples.T, field.values.transpose(1, 0, 2)
     n = samples.shape[1]
@@ -82,12 +82,12 @@ def naive(field: NaiveKriging, asked: Questions) -> dict[str, Callable[[], Float
     duals = np.stack([one.dual for one in field.fields])
     size = inverses.shape[1]
     solved = partial(
-        _bound, kernels.naive_solved, asked.points, arrays=(samples, scales, *factors, values)
+        _bound, kernels.naive_solved, questions.points, arrays=(samples, scales, *factors, values)
     )
-    on_frames = partial(_bound, points=asked.points, places=asked.frames)
+    on_frames = partial(_bound, points=questions.points, positions=questions.frames)
     return {
-        "LU, on a frame": solved(places=asked.frames, sizes=(size,)),
-        "LU, between frames": solved(places=asked.places, sizes=(size,)),
+        "LU, on a frame": solved(positions=questions.frames, sizes=(size,)),
+        "LU, between frames": solved(positions=questions.positions, sizes=(size,)),
         "inverse, on a frame": on_frames(
             kernels.naive_inverted, arrays=(samples, scales, inverses, values), sizes=(n,)
         ),
@@ -100,18 +100,18 @@ def naive(field: NaiveKriging, asked: Questions) -> dict[str, Callable[[], Float
 def _bound(
     kernel: Callable[..., None],
     points: Floats,
-    places: Floats,
+    positions: Floats,
     arrays: tuple[npt.NDArray[Any], ...],
     sizes: tuple[int, ...],
 ) -> Callable[[], Floats]:
     """Return a kernel's call with its memory allocated; sizes: of its scratch arrays."""
-    held = tuple(np.ascontiguousarray(array) for array in arrays)
-    (controls, samples), width = held[0].shape, held[-1].shape[-1]
+    contiguous = tuple(np.ascontiguousarray(array) for array in arrays)
+    (controls, samples), width = contiguous[0].shape, contiguous[-1].shape[-1]
     scratch = tuple(np.zeros(size) for size in (samples + 1 + controls, *sizes))
     out = np.zeros((len(points), width))
 
     def answer() -> Floats:
-        kernel(points, places, held, scratch, out)
+        kernel(points, positions, contiguous, scratch, out)
         return out
 
     return answer

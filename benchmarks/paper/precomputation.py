@@ -29,18 +29,24 @@ FITS: dict[str, VariogramFitter] = {
 }
 
 
-def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[TuckerTensor, UniversalKriging]:
+def ours(
+    trained_family: Family, ranks: tuple[int, int, int]
+) -> tuple[TuckerTensor, UniversalKriging]:
     """Return the reduced tensor and the kriging model of its sample basis.
 
     The dissimilarity of two motions is the distance between their slices of the core (Mukai &
     Kuriyama 2006, section 2). Alignment is not included, as in the paper, nor the search for scales
     that posefield's training adds.
     """
-    weights = np.ones(len(made.parents))
-    chart = made.trained.tensor.chart
-    own = motion_tensor.build_tensor(made.vectors, chart, made.parents, made.offsets, weights)
-    reduced = decompose_truncated(own.values, ranks)
-    return reduced, universal_kriging.solve(guess(made, reduced), made.samples, reduced.bases[2])
+    weights = np.ones(len(trained_family.parents))
+    chart = trained_family.trained.tensor.chart
+    tensor = motion_tensor.build_tensor(
+        trained_family.vectors, chart, trained_family.parents, trained_family.offsets, weights
+    )
+    reduced = decompose_truncated(tensor.values, ranks)
+    return reduced, universal_kriging.solve(
+        guess(trained_family, reduced), trained_family.samples, reduced.bases[2]
+    )
 
 
 def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
@@ -54,17 +60,21 @@ def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
     return TuckerTensor(core, tuple(bases))
 
 
-def guess(made: Family, reduced: TuckerTensor) -> Hyper:
+def guess(trained_family: Family, reduced: TuckerTensor) -> Hyper:
     """Return kriging parameters from the variogram of the motions' slices of the core."""
-    left = variogram.residuals(made.samples, reduced.motions, 1)
-    experimental = variogram.experimental_variogram(made.samples, left)
+    left = variogram.residuals(trained_family.samples, reduced.motions, 1)
+    experimental = variogram.experimental_variogram(trained_family.samples, left)
     fitted = variogram.fit_by_grid(experimental, "matern52")
     nugget = fitted.nugget / fitted.sill if fitted.sill > 0.0 else NUGGETS[1]
-    scales = np.full(made.samples.shape[1], 1.0 / fitted.range)
+    scales = np.full(trained_family.samples.shape[1], 1.0 / fitted.range)
     return Hyper("matern52", (1,), scales, float(np.clip(nugget, *NUGGETS)), 0.0)
 
 
-def naive(made: Family, fitter: VariogramFitter) -> NaiveKriging:
+def naive(trained_family: Family, fitter: VariogramFitter) -> NaiveKriging:
     """Return the per-frame kriging model of the family's pose vectors."""
-    positions = time_alignment.joint_positions(made.trained.aligned, made.parents, made.offsets)
-    return per_frame.fit_naive(made.samples, positions, made.numbers, "matern52", fitter)
+    positions = time_alignment.joint_positions(
+        trained_family.trained.aligned, trained_family.parents, trained_family.offsets
+    )
+    return per_frame.fit_naive(
+        trained_family.samples, positions, trained_family.numbers, "matern52", fitter
+    )

@@ -96,19 +96,19 @@ def _squared_distances(
     return squared
 
 
-def fit_by_grid(found: ExperimentalVariogram, covariance: str) -> VariogramModel:
+def fit_by_grid(experimental: ExperimentalVariogram, covariance: str) -> VariogramModel:
     """Fit by weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
 
     Nugget and sill enter linearly and are solved for at each range. If no lag has enough pairs, as
     for a control of two values, the sill is zero.
     """
-    if not len(found.pairs):
+    if not len(experimental.pairs):
         return VariogramModel(0.0, 0.0, float(RANGES[-1]))
-    squared = np.square(found.distances[None] / RANGES[:, None])
+    squared = np.square(experimental.distances[None] / RANGES[:, None])
     rising = 1.0 - COVARIANCES[covariance].numpy(squared)
-    weights = found.pairs / np.maximum(found.values, 1e-30) ** 2
-    nuggets, sills = _nonnegative_lines(rising, found.values, weights)
-    misfit = (nuggets[:, None] + sills[:, None] * rising - found.values) ** 2 @ weights
+    weights = experimental.pairs / np.maximum(experimental.values, 1e-30) ** 2
+    nuggets, sills = _nonnegative_lines(rising, experimental.values, weights)
+    misfit = (nuggets[:, None] + sills[:, None] * rising - experimental.values) ** 2 @ weights
     best = int(np.argmin(misfit))
     return VariogramModel(float(nuggets[best]), float(sills[best]), float(RANGES[best]))
 

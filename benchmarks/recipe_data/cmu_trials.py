@@ -84,11 +84,11 @@ def convert(source: Path) -> Fetched:
     for row in CMU.rows("clips.csv"):
         if row["file"] not in strides:
             continue
-        made = _copied(row["file"], present, hashes) or _recognized(row, strides, trials)
-        if isinstance(made, str):
-            missing[row["file"]] = made
+        converted = _copied(row["file"], present, hashes) or _recognized(row, strides, trials)
+        if isinstance(converted, str):
+            missing[row["file"]] = converted
         else:
-            files.append(made)
+            files.append(converted)
     return Fetched(tuple(files), missing)
 
 
@@ -128,18 +128,18 @@ def _recognized(
 ) -> FetchedFile | str:
     """Return the walk of a row of clips.csv, or why there is none."""
     subject = row["performer"].removeprefix("cmu_")
-    own = [one for one in trials if not subject.isdecimal() or one.subject == int(subject)]
+    candidates = [one for one in trials if not subject.isdecimal() or one.subject == int(subject)]
     matches: dict[tuple[int, int], tuple[Trial, Clip]] = {}
-    for trial in own:
+    for trial in candidates:
         clip = _clip(trial, int(row["frames"]))
         if clip is not None and _fits(clip, strides[row["file"]]):
             matches.setdefault((trial.subject, trial.number), (trial, clip))
     if len(matches) != 1:
         names = ", ".join(trial.path.name for trial, _ in matches.values())
-        asked = f"a trial of subject {subject}" if subject.isdecimal() else "a trial"
+        description = f"a trial of subject {subject}" if subject.isdecimal() else "a trial"
         if matches:
             return f"found {names} with these strides, expected one trial"
-        return f"found no match, expected {asked} of {row['frames']} frames"
+        return f"found no match, expected {description} of {row['frames']} frames"
     ((trial, clip),) = matches.values()
     sources = (trial.path,) if trial.skeleton is None else (trial.skeleton, trial.path)
     content = bvh_writer.dumps(clip, metres_per_unit=METRES_PER_UNIT)
@@ -189,7 +189,7 @@ def _fits(clip: Clip, strides: Sequence[Stride]) -> bool:
     for stride in strides:
         if stride.last >= len(clip):
             return False
-        moved = (clip.root_path[stride.last] - clip.root_path[stride.first])[[0, 2]]
-        if abs(float(np.linalg.norm(moved)) - stride.length) > STRIDE_TOLERANCE:
+        travel = (clip.root_path[stride.last] - clip.root_path[stride.first])[[0, 2]]
+        if abs(float(np.linalg.norm(travel)) - stride.length) > STRIDE_TOLERANCE:
             return False
     return True

@@ -34,8 +34,8 @@ class DataSet:
 
     def rows(self, table: str) -> list[dict[str, str]]:
         """Return the rows of a shipped table of this data set."""
-        place = data_folder.RECIPES / self.folder / table
-        return [record for _, record in clip_table.open_table(place).records]
+        folder = data_folder.RECIPES / self.folder / table
+        return [record for _, record in clip_table.open_table(folder).records]
 
     def hashes(self) -> dict[str, str]:
         """Return the known SHA-256 of files, by their names."""
@@ -104,47 +104,47 @@ def motion_files(source: Path) -> dict[str, list[Path]]:
 
     Raises FileError if there are none.
     """
-    found: dict[str, list[Path]] = {}
+    files: dict[str, list[Path]] = {}
     for path in sorted(source.rglob("*")):
         if path.suffix.lower() in MOTION_SUFFIXES and path.is_file():
-            found.setdefault(path.name.lower(), []).append(path)
-    if not found:
+            files.setdefault(path.name.lower(), []).append(path)
+    if not files:
         raise FileError(source, f"found no {', '.join(MOTION_SUFFIXES)} file in this folder")
-    return found
+    return files
 
 
 def only(paths: Sequence[Path]) -> Path:
     """Return the first of several copies of a file; FileError if their contents differ."""
-    first, *others = paths
-    for other in others:
+    first, *rest = paths
+    for other in rest:
         if other.read_bytes() != first.read_bytes():
             raise FileError(other, f"differs from {first}, expected one file of this name")
     return first
 
 
-def write(own: DataSet, found: Fetched, folder: Path) -> dict[str, Any]:
+def write(data_set: DataSet, fetched: Fetched, folder: Path) -> dict[str, Any]:
     """Write the motions, the rows of the table that they serve, and a list with hashes.
 
     Returns the list, which is written as fetched.json: names and SHA-256 of all files and of what
     they were made of. Raises FileError if a file cannot be written.
     """
-    place = folder / own.folder
-    for one in found.files:
-        atomic_files.write(one.content, place / one.file)
-    names = {one.file for one in found.files}
-    rows = [row for row in own.rows(own.table) if row["file"] in names]
-    atomic_files.write(_csv(rows), place / own.table)
+    target = folder / data_set.folder
+    for one in fetched.files:
+        atomic_files.write(one.content, target / one.file)
+    names = {one.file for one in fetched.files}
+    rows = [row for row in data_set.rows(data_set.table) if row["file"] in names]
+    atomic_files.write(_csv(rows), target / data_set.table)
     facts = {
-        "data": own.name,
-        "page": own.page,
-        "terms": own.terms,
+        "data": data_set.name,
+        "page": data_set.page,
+        "terms": data_set.terms,
         "posefield": __version__,
-        "folder": str(place),
+        "folder": str(target),
         "rows": len(rows),
-        "files": [one.facts() for one in found.files],
-        "missing": found.missing,
+        "files": [one.facts() for one in fetched.files],
+        "missing": fetched.missing,
     }
-    atomic_files.write(orjson.dumps(facts, option=orjson.OPT_INDENT_2), place / "fetched.json")
+    atomic_files.write(orjson.dumps(facts, option=orjson.OPT_INDENT_2), target / "fetched.json")
     return facts
 
 

@@ -26,12 +26,12 @@ def convert(source: Path) -> Fetched:
     files, missing = [], {}
     for row in HDM05.rows(HDM05.table):
         name = PurePosixPath(row["file"]).stem
-        wanted = (f"HDM_{row['performer']}.asf", f"{name}.amc")
-        absent = [one for one in wanted if one.lower() not in present]
+        names = (f"HDM_{row['performer']}.asf", f"{name}.amc")
+        absent = [one for one in names if one.lower() not in present]
         if absent:
             missing[row["file"]] = f"{' and '.join(absent)}, not found below {source}"
             continue
-        skeleton, motion = (data_sets.only(present[one.lower()]) for one in wanted)
+        skeleton, motion = (data_sets.only(present[one.lower()]) for one in names)
         files.append(_converted(row, (skeleton, motion), hashes))
     return Fetched(tuple(files), missing)
 

@@ -24,7 +24,7 @@ class Pose:
         self, controls: list[float], time: list[float]
     ) -> Annotated[bytes, ContentType("application/json")]:
         """Outputs of the graph by name; async, for a thread would cost more than the graph."""
-        given = {"controls": controls, "time": time}
-        made = self.run({name: np.array([row], np.float32) for name, row in given.items()})
-        answer = {name: output[0] for name, output in zip(graph.OUTPUTS, made, strict=True)}
+        body = {"controls": controls, "time": time}
+        outputs = self.run({name: np.array([row], np.float32) for name, row in body.items()})
+        answer = {name: output[0] for name, output in zip(graph.OUTPUTS, outputs, strict=True)}
         return orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)

@@ -30,7 +30,7 @@ class Pose(litserve.LitAPI):
 
     def encode_response(self, outputs: list[Any]) -> Response:
         """Them by name."""
-        answer = {n: made[0] for n, made in zip(graph.OUTPUTS, outputs, strict=True)}
+        answer = {n: output[0] for n, output in zip(graph.OUTPUTS, outputs, strict=True)}
         content = orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)
         return Response(content, media_type="application/json")
 

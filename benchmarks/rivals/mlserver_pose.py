@@ -18,8 +18,8 @@ class Pose(MLModel):
 
     async def predict(self, payload: InferenceRequest) -> InferenceResponse:
         """Outputs of the graph, each a list of numbers."""
-        feed = {given.name: NumpyCodec.decode_input(given) for given in payload.inputs}
-        outputs = [_output(*made) for made in zip(graph.OUTPUTS, self.run(feed), strict=True)]
+        feed = {body.name: NumpyCodec.decode_input(body) for body in payload.inputs}
+        outputs = [_output(*output) for output in zip(graph.OUTPUTS, self.run(feed), strict=True)]
         return InferenceResponse(model_name=self.name, id=payload.id, outputs=outputs)
 
 
