@@ -17,7 +17,7 @@ from rows import Row, record, table
 
 from posefield.common import frame_groups
 from posefield.feet import body_plans, foot_placement, footsteps, stance_rows
-from posefield.feet.footsteps import Character, SampledMotion
+from posefield.feet.footsteps import Character, PlanRequest
 from posefield.motion import contact_detection
 from posefield.motion.clip import Clip
 from posefield.motion.contact_detection import FootContact
@@ -172,8 +172,9 @@ def join(take: Take, other: Take, cyclic: bool, kind: Blend, typical: float) -> 
 def _placed(take: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float, ...], float]:
     """Return a passage with placed feet, how far feet that stand at the join slide, and the mean
     lowering of the pelvis near it, m."""
-    motion = SampledMotion(passage.rotations, passage.roots, RATE)
-    plan = body_plans.plan_feet(take.character, motion, take.contacts, passage.contacts)
+    motion = passage.rotations, passage.roots, RATE
+    request = PlanRequest(take.character, *motion, take.contacts, passage.contacts)
+    (plan,) = body_plans.plan_motions([request])
     times = np.arange(len(passage)) / RATE
     rotations, roots = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
     placed = Passage(rotations, roots, passage.contacts, passage.sigmas)

@@ -4,16 +4,15 @@ The change over the floor is that of `smooth_change`: a thin-plate prior on the 
 on standing. Heights have the same change with given heights of stances, and swings are lifted.
 """
 
-from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from posefield.common.frame_groups import FrameGroups
-from posefield.common.units import UP, Floats, Frames, Indices, RootPath
+from posefield.common.units import UP, Floats, Frames, Indices
 from posefield.feet import stance_rows
 from posefield.feet.smooth_change import smooth_change
-from posefield.feet.stance_rows import UNEVEN, FootRows, Interval, Mask, PerRun, Runs
+from posefield.feet.stance_rows import UNEVEN, FootRows, Mask, PerRun, Runs
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 
@@ -28,19 +27,6 @@ RISE, LIFT_EXPONENT = 0.09, 0.2
 LEAST_LIFT = 0.025
 # Mean acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
 LIFT_ACCELERATION = 12.0
-
-
-@dataclass(frozen=True)
-class Footsteps:
-    """Planned path of one foot over the grid.
-
-    positions: (F, 3), m. stances: frames in which it stands. anchors: where, (S, 3), m, in the
-    coordinates of each stance's first frame.
-    """
-
-    positions: RootPath
-    stances: tuple[Interval, ...]
-    anchors: Annotated[Floats, "stances 3"]
 
 
 def plan_paths(

@@ -15,10 +15,9 @@ from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Booleans, Floats, Frames
 from posefield.feet import ball_path, footsteps, limbs, stance_rows, two_bone
-from posefield.feet.ball_path import Footsteps
-from posefield.feet.footsteps import Character, FeetPlan, Led, PlanRequest, SampledMotion
+from posefield.feet.footsteps import FeetPlan, Footsteps, PlanRequest
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import UNEVEN, Cycle, FootRows, Interval, Runs
+from posefield.feet.stance_rows import UNEVEN, FootRows, Interval, Runs
 from posefield.locomotion import floor_plane
 from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor, Floors
@@ -40,18 +39,6 @@ def plan_motions(requests: Sequence[PlanRequest]) -> list[FeetPlan]:
     return footsteps.evaluate_by_kind(requests, kinds, lambda alike: _Bodies.of(alike).plans())
 
 
-def plan_feet(
-    character: Character,
-    motion: SampledMotion,
-    contacts: Sequence[FootContact] = (),
-    likely: Annotated[Floats, "frames feet"] | None = None,
-    floor: Floor = LEVEL_FLOOR,
-    led: Led | None = None,
-) -> FeetPlan:
-    """Return the plan of the feet of one motion; arguments as of `PlanRequest`."""
-    return plan_motions([PlanRequest(character, motion, contacts, likely, floor, led)])[0]
-
-
 @dataclass(frozen=True)
 class _Bodies:
     """Motions (M,) of characters with the same limbs, whose frames (N,) lie one after another.
@@ -71,10 +58,10 @@ class _Bodies:
     @classmethod
     def of(cls, requests: Sequence[PlanRequest]) -> "_Bodies":
         """Return the bodies of requests of one kind."""
-        character, motions = requests[0].character, [request.motion for request in requests]
-        groups = frame_groups.of_lengths([motion.roots for motion in motions])
+        character = requests[0].character
+        groups = frame_groups.of_lengths([request.roots for request in requests])
         rotations, roots = (
-            np.concatenate([getattr(motion, name) for motion in motions])
+            np.concatenate([getattr(request, name) for request in requests])
             for name in ("rotations", "roots")
         )
         bones = np.stack([request.character.bones for request in requests])
@@ -83,8 +70,8 @@ class _Bodies:
         )
         rows = FrameRows(
             groups,
-            np.array([motion.rate for motion in motions], float),
-            np.array([motion.cycle is not None for motion in motions]),
+            np.array([request.rate for request in requests], float),
+            np.array([request.cycle is not None for request in requests]),
         )
         fixed, raised = (
             np.array([getattr(request.character, name) for request in requests])
@@ -144,10 +131,10 @@ class _Bodies:
             stances = after[motion :: len(groups)]
             yield FeetPlan(
                 request.character,
-                request.motion.rate,
-                request.motion.cycle,
+                request.rate,
+                request.cycle,
                 tuple(
-                    Footsteps(path, row, path[[stance.begin for stance in row]].reshape(-1, 3))
+                    Footsteps(row, path[[stance.begin for stance in row]].reshape(-1, 3))
                     for path, row in zip(by_leg[:, frames], stances, strict=True)
                 ),
                 changes[:, frames],
@@ -162,7 +149,7 @@ class _Bodies:
 
     def _feet(self) -> tuple[FootRows, Runs]:
         """Return the feet as predicted, and their contacts; rows are leg after leg."""
-        legs, motions = len(self.legs), [request.motion for request in self.requests]
+        legs = len(self.legs)
         groups = self.rows.groups.times(legs)
         rows = FrameRows(groups, np.tile(self.rows.rates, legs), np.tile(self.rows.cyclic, legs))
         paths = [self.poses.position(leg.tip) for leg in self.legs]
@@ -173,14 +160,10 @@ class _Bodies:
             for name in ("height", "swing", "longest_swing", "clearance")
         )
         walking = [
-            np.zeros(len(motion.roots), bool) if motion.walking is None else motion.walking
-            for motion in motions
+            np.zeros(len(request.roots), bool) if request.walking is None else request.walking
+            for request in self.requests
         ]
-        cycles = [motion.cycle or Cycle(0.0, 0.0) for motion in motions]
-        ways, factors = (
-            np.tile(np.array([getattr(cycle, name) for cycle in cycles], complex), legs)
-            for name in ("way", "factor")
-        )
+        ways, factors = stance_rows.cycle_motions([request.cycle for request in self.requests])
         feet = FootRows(
             rows,
             floor_plane.project(points),
@@ -189,8 +172,8 @@ class _Bodies:
             swing,
             longest_swing,
             clearance,
-            ways,
-            factors,
+            np.tile(ways, legs),
+            np.tile(factors, legs),
             np.tile(np.concatenate(walking), legs),
         )
         return feet, down
@@ -203,7 +186,7 @@ class _Bodies:
                 request.contacts[leg] for leg in range(len(self.legs)) for request in self.requests
             ]
             return stance_rows.from_probabilities(np.concatenate(likely).T.ravel(), rows), contacts
-        motions = [request.motion for _ in self.legs for request in self.requests]
+        motions = [request for _ in self.legs for request in self.requests]
         paths = rows.groups.split(points)
         down = [
             stance_rows.detect(path, motion.rate, motion.cycle)

@@ -12,10 +12,9 @@ import numpy as np
 from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import UP, Floats, Frames, RootPath, Rotations
-from posefield.feet import limbs, two_bone
+from posefield.feet import limbs, stance_rows, two_bone
 from posefield.feet.footsteps import FeetPlan, evaluate_by_kind
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import Cycle
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton
@@ -156,11 +155,7 @@ class _Placing:
             np.array([plan.rate for plan in plans]),
             np.array([plan.cycle is not None for plan in plans]),
         )
-        cycles = [plan.cycle or Cycle(0.0, 0.0) for plan in plans]
-        ways, factors = (
-            np.array([getattr(cycle, name) for cycle in cycles], complex)
-            for name in ("way", "factor")
-        )
+        ways, factors = stance_rows.cycle_motions([plan.cycle for plan in plans])
         floors = Floors([plan.floor for plan in plans], poses.groups)
         lowered = np.concatenate([plan.lowered for plan in plans])
         down = _interpolate(grids, lowered, poses.groups, at_frames)

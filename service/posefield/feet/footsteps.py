@@ -1,4 +1,4 @@
-"""Plans of feet, and what they are made of: characters, sampled motions, and requests.
+"""Plans of feet, and what they are made of: characters, and motions whose feet are planned.
 
 A plan lies on a grid of equal steps of time over the whole motion, so that it does not depend on
 the frames that a question asks for. `body_plans` makes it, and `foot_placement` applies it to
@@ -22,9 +22,8 @@ from posefield.common.units import (
     Rotations,
 )
 from posefield.feet import limbs, two_bone
-from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle
+from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle, Interval
 from posefield.motion import skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor
@@ -154,19 +153,14 @@ class Character:
 
 
 @dataclass(frozen=True)
-class SampledMotion:
-    """Poses of a whole motion at equal steps of time.
+class Footsteps:
+    """Where and when one foot stands.
 
-    rotations: (F, J, 4). roots: (F, 3), m. rate: frames a second. cycle: floor motion of a cycle,
-    whose last frame is missing, as it is the first one of the next; None for other motions.
-    walking: whether it walks in each frame (F,); None for a motion that is no walk.
+    stances: frames. anchors: places (S, 3), m, in the coordinates of each stance's first frame.
     """
 
-    rotations: Rotations
-    roots: RootPath
-    rate: float
-    cycle: Cycle | None = None
-    walking: Annotated[Booleans, "frames"] | None = None
+    stances: tuple[Interval, ...]
+    anchors: Annotated[Floats, "stances 3"]
 
 
 @dataclass(frozen=True)
@@ -197,19 +191,26 @@ class FeetPlan:
 
 @dataclass(frozen=True)
 class PlanRequest:
-    """A motion whose feet are planned; any motion may be, also one that is joined of several.
+    """A motion at equal steps of time, whose feet are planned.
 
-    contacts: statistics of each leg's foot, with the probabilities `likely` (F, K) of its contacts;
-    both are estimated from the motion if they are not given. floor: on which the feet stand. The
-    steps are those of a floor at height 0, moved to it. A cycle does not climb: its floor must be
-    level. led: what keeps its predicted path; the kept limbs all the time if not given. A foot is
-    led over a level floor only.
+    rotations: (F, J, 4). roots: (F, 3), m. rate: frames a second. contacts: statistics of each
+    leg's foot, with the probabilities `likely` (F, K) of its contacts; both are estimated from the
+    motion if they are not given. cycle: floor motion of a cycle, whose last frame is missing, as it
+    is the first one of the next; None for other motions. walking: whether it walks in each frame
+    (F,); None for a motion that is no walk. floor: on which the feet stand. The steps are those of
+    a floor at height 0, moved to it. A cycle does not climb: its floor must be level. led: what
+    keeps its predicted path; the kept limbs all the time if not given. A foot is led over a level
+    floor only.
     """
 
     character: Character
-    motion: SampledMotion
+    rotations: Rotations
+    roots: RootPath
+    rate: float
     contacts: Sequence[FootContact] = ()
     likely: Annotated[Floats, "frames feet"] | None = None
+    cycle: Cycle | None = None
+    walking: Annotated[Booleans, "frames"] | None = None
     floor: Floor = LEVEL_FLOOR
     led: Led | None = None
 
@@ -217,7 +218,7 @@ class PlanRequest:
     def leads(self) -> Led:
         """Return what keeps its predicted path."""
         body = self.character
-        return self.led or always(len(body.legs), len(body.kept), len(self.motion.roots))
+        return self.led or always(len(body.legs), len(body.kept), len(self.roots))
 
     @property
     def kind(self) -> tuple[object, ...]:

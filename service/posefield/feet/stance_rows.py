@@ -50,6 +50,15 @@ class Cycle:
         return complex(np.exp(1j * self.turn))
 
 
+def cycle_motions(
+    cycles: Sequence[Cycle | None],
+) -> tuple[Annotated[FloorVectors, "motions"], Annotated[FloorVectors, "motions"]]:
+    """Return displacements (M,), m, and factors of turns (M,) of cycles; 0 and 1 without one."""
+    ways = [0.0 if cycle is None else cycle.way for cycle in cycles]
+    factors = [1.0 if cycle is None else cycle.factor for cycle in cycles]
+    return np.array(ways, complex), np.array(factors, complex)
+
+
 @dataclass(frozen=True)
 class Interval:
     """Frames `begin` to `end`, exclusive, of a stance or a swing; `end` may lie after a cycle."""

@@ -13,7 +13,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Frames, RootPath, Rotations, round_micrometres
 from posefield.constraints.gauss_newton import MISS_TOLERANCE
 from posefield.feet import body_plans, foot_placement
-from posefield.feet.footsteps import FeetPlan, SampledMotion
+from posefield.feet.footsteps import FeetPlan, PlanRequest
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import joint_roles, quat
@@ -195,8 +195,17 @@ def plan_feet(script: Script, timeline: Timeline) -> FeetPlan:
     if timeline.targets:
         frames = range(timeline.begin, timeline.begin + len(passage))
         body, leads = limb_targets.find_leads(body, timeline.targets, frames)
-    motion = SampledMotion(passage.rotations, passage.roots, RATE, walking=timeline.walking)
-    return body_plans.plan_feet(body, motion, script.contacts, passage.contacts, led=leads)
+    request = PlanRequest(
+        body,
+        passage.rotations,
+        passage.roots,
+        RATE,
+        script.contacts,
+        passage.contacts,
+        walking=timeline.walking,
+        led=leads,
+    )
+    return body_plans.plan_motions([request])[0]
 
 
 def _at_times(

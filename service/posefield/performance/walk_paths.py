@@ -118,12 +118,8 @@ class Radii:
         return bool(curvatures.max() <= 1.0 / self.left and curvatures.min() >= -1.0 / self.right)
 
 
-@dataclass(frozen=True)
-class _Word:
-    """Signed radii, m, of the first and of the last arc, positive to the left; zero for no arc."""
-
-    first: float
-    last: float
+_Word = tuple[float, float]
+"""Signed radii, m, of the first and of the last arc, positive to the left; zero for no arc."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +134,7 @@ class _Curve:
     def lengths(self) -> tuple[float, float, float]:
         """Lengths of the three parts, m."""
         first, last = self.turns
-        return abs(first * self.word.first), self.line, abs(last * self.word.last)
+        return abs(first * self.word[0]), self.line, abs(last * self.word[1])
 
 
 def connect(start: FloorMotion, goal: complex, heading: float | None, radii: Radii) -> FloorPath:
@@ -174,7 +170,7 @@ def _curves(
 ) -> Iterator[_Curve]:
     for first in (radii.left, -radii.right):
         for last in (0.0,) if heading is None else (radii.left, -radii.right):
-            curve = _curve(start, goal, heading, _Word(first, last))
+            curve = _curve(start, goal, heading, (first, last))
             if curve is not None:
                 yield curve
 
@@ -182,15 +178,15 @@ def _curves(
 def _curve(start: FloorMotion, goal: complex, heading: float | None, word: _Word) -> _Curve | None:
     """Return the curve of a word, None if its circles have no common tangent of that kind."""
     # A circle's centre is to the left of the heading; its signed radius is negative to the right.
-    begin = start.shift + 1j * word.first * np.exp(1j * start.turn)
-    end = goal if heading is None else goal + 1j * word.last * np.exp(1j * heading)
-    line_of_centres, gap = end - begin, word.last - word.first
+    begin = start.shift + 1j * word[0] * np.exp(1j * start.turn)
+    end = goal if heading is None else goal + 1j * word[1] * np.exp(1j * heading)
+    line_of_centres, gap = end - begin, word[1] - word[0]
     if abs(line_of_centres) < abs(gap):
         return None
     line = float(np.sqrt(abs(line_of_centres) ** 2 - gap**2))
     along = float(np.angle(line_of_centres) - np.angle(line + 1j * gap))
-    first = _turn(along - start.turn, word.first)
-    last = 0.0 if heading is None else _turn(heading - along, word.last)
+    first = _turn(along - start.turn, word[0])
+    last = 0.0 if heading is None else _turn(heading - along, word[1])
     return _Curve((first, last), line, word)
 
 

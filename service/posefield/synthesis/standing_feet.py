@@ -10,7 +10,7 @@ from msgspec import structs
 from posefield.common.units import UP, Floats, round_micrometres
 from posefield.constraints.targets import ConstraintSet
 from posefield.feet import body_plans, foot_placement, footsteps, limbs
-from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest, SampledMotion
+from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest
 from posefield.feet.stance_rows import Cycle
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
@@ -93,11 +93,12 @@ def _plan_request(
     """Return the request for the plan of a motion. contacts: of the model's feet."""
     times, duration = draft.plan_times, draft.answer.trust.duration
     rate = (len(times) - (draft.cycle is None)) / duration
-    sampled = SampledMotion(*draft.plan_poses, rate, draft.cycle)
     chosen = [contacts[index] for index in choice.feet] if contacts else []
     likely = _probabilities(model, draft, chosen) if contacts else None
     character = replace(choice.character, raised=_may_rise(draft.constraints))
-    return PlanRequest(character, sampled, chosen, likely, draft.question.ground)
+    return PlanRequest(
+        character, *draft.plan_poses, rate, chosen, likely, draft.cycle, floor=draft.question.ground
+    )
 
 
 def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult]:

@@ -10,7 +10,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.constraints import take_variation
 from posefield.feet import body_plans, foot_placement, footsteps
-from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest, SampledMotion
+from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.session import Session
 from posefield.kriging import random_field
@@ -316,7 +316,9 @@ def _plan_feet(
         [
             PlanRequest(
                 replace(choice.character, bones=bones[walker]),
-                SampledMotion(rotations[walker], roots[walker], plan.rate),
+                rotations[walker],
+                roots[walker],
+                plan.rate,
                 contacts,
                 likely[walker],
             )

@@ -1,13 +1,14 @@
 """Rows of feet for tests, and the functions of many feet for one foot."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from posefield.common.frame_groups import FrameRows, of_lengths
 from posefield.common.units import UP
-from posefield.feet import ball_path, smooth_change, stance_rows
-from posefield.feet.ball_path import Footsteps
+from posefield.feet import ball_path, body_plans, smooth_change, stance_rows
+from posefield.feet.footsteps import PlanRequest
 from posefield.feet.stance_rows import Cycle, FootRows, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion import contact_detection
@@ -24,6 +25,28 @@ class FootPath:
 
     def __len__(self):
         return len(self.positions)
+
+
+class Motion(NamedTuple):
+    """Rotations and roots at a rate."""
+
+    rotations: np.ndarray
+    roots: np.ndarray
+    rate: float
+
+
+class PlannedPath(NamedTuple):
+    """Path of one foot (F, 3), m, its stances, and where it stands."""
+
+    positions: np.ndarray
+    stances: tuple[Interval, ...]
+    anchors: np.ndarray
+
+
+def plan_feet(character, motion, *contacts, **options):
+    """Return the plan of the feet of one motion."""
+    (plan,) = body_plans.plan_motions([PlanRequest(character, *motion, *contacts, **options)])
+    return plan
 
 
 def frame_rows(lengths, rate, cyclic=False):
@@ -66,7 +89,7 @@ def plan_path(path, found, foot, goal=None):
     runs = stance_rows.from_intervals([found])
     positions = ball_path.plan_paths(foot_rows([path], foot), runs, goal)
     anchors = positions[[own.begin for own in found]].reshape(-1, 3)
-    return Footsteps(positions, tuple(found), anchors)
+    return PlannedPath(positions, tuple(found), anchors)
 
 
 def change_smoothly(path, held, rate, foot, cycle=None):

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from few_feet import frame_rows
+from few_feet import Motion, frame_rows, plan_feet
 
-from posefield.feet import body_plans, foot_placement, footsteps, limbs, stance_rows, two_bone
-from posefield.feet.footsteps import Led, SampledMotion
+from posefield.feet import foot_placement, footsteps, limbs, stance_rows, two_bone
+from posefield.feet.footsteps import Led
 from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
@@ -44,7 +44,7 @@ def sliding(height=0.78, speed=0.3):
         rotations[:, 3 * leg + 2] = quat.exp(np.array([0.6, 0.0, 0.0]))
     roots = np.zeros((FRAMES, 3))
     roots[:, 1], roots[:, 2] = height, speed * np.arange(FRAMES) / RATE
-    return SampledMotion(rotations, roots, RATE)
+    return Motion(rotations, roots, RATE)
 
 
 def contact(motion, foot, lift=0.05):
@@ -65,16 +65,12 @@ def alternating():
 
 def placed(motion, plan):
     times = np.arange(FRAMES) / RATE
-    return SampledMotion(
-        *foot_placement.place_feet(plan, times, motion.rotations, motion.roots), RATE
-    )
+    return Motion(*foot_placement.place_feet(plan, times, motion.rotations, motion.roots), RATE)
 
 
 def test_four_feet_stand_and_step():
     motion = sliding()
-    plan = body_plans.plan_feet(
-        body(), motion, [contact(motion, foot) for foot in FEET], alternating()
-    )
+    plan = plan_feet(body(), motion, [contact(motion, foot) for foot in FEET], alternating())
     feet = feet_of(placed(motion, plan))
     for foot, steps in enumerate(plan.steps):
         assert len(steps.stances) == 2
@@ -88,10 +84,10 @@ def test_four_feet_stand_and_step():
 
 def test_only_limbs_above_the_wanted_joints_are_turned():
     motion, times = sliding(), np.arange(FRAMES) / RATE
-    plan = body_plans.plan_feet(body(), motion, [contact(motion, foot) for foot in FEET])
+    plan = plan_feet(body(), motion, [contact(motion, foot) for foot in FEET])
     whole = placed(motion, plan)
     wanted = {FEET[1], len(PARENTS) - 1}
-    some = SampledMotion(
+    some = Motion(
         *foot_placement.place_feet(plan, times, motion.rotations, motion.roots, wanted), RATE
     )
     assert np.array_equal(some.roots, whole.roots)
@@ -106,8 +102,8 @@ def test_only_limbs_above_the_wanted_joints_are_turned():
 def test_a_character_that_floats_is_moved_to_the_floor(floats):
     motion = sliding()
     known = [contact(motion, foot) for foot in FEET]
-    lifted = SampledMotion(motion.rotations, np.add(motion.roots, [0.0, floats, 0.0]), RATE)
-    plan = body_plans.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
+    lifted = Motion(motion.rotations, np.add(motion.roots, [0.0, floats, 0.0]), RATE)
+    plan = plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
     assert plan.grounded == pytest.approx(floats - np.sign(floats) * stance_rows.UNEVEN)
     heights = feet_of(placed(lifted, plan))[..., 1]
     assert np.abs(heights - known[0].height).max() <= stance_rows.UNEVEN + 1e-9
@@ -120,8 +116,8 @@ FLOORS = [at_height(0.5), at_height(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2
 def test_feet_stand_and_swing_on_a_given_floor(floor):
     motion = sliding()
     known, likely = [contact(motion, foot) for foot in FEET], alternating()
-    usual = body_plans.plan_feet(body(), motion, known, likely)
-    plan = body_plans.plan_feet(body(), motion, known, likely, floor)
+    usual = plan_feet(body(), motion, known, likely)
+    plan = plan_feet(body(), motion, known, likely, floor=floor)
     feet, level = feet_of(placed(motion, plan)), feet_of(placed(motion, usual))
     # Places over the floor, and heights above it, are those of a floor at height 0.
     above = feet[..., 1] - floor.heights(feet)
@@ -145,12 +141,12 @@ def test_feet_are_tilted_as_the_floor_is():
     balls, motion, floor = (14, 15, 16, 17), sliding(), Floor(0.0, 0.0, 0.2)
     rotations = np.zeros((FRAMES, 18, 4))
     rotations[..., 0], rotations[:, :14] = 1.0, motion.rotations
-    whole = SampledMotion(rotations, motion.roots, RATE)
+    whole = Motion(rotations, motion.roots, RATE)
     character = footsteps.choose_limbs(parents, bones, balls, ()).character
     assert [leg.lower for leg in character.legs] == list(FEET)
     height = skeleton.positions(parents, rotations, skeleton.translations(bones, motion.roots))
     known = [FootContact(ball, float(height[0, ball, 1]), 0.3, 0.5, 0.05) for ball in balls]
-    plan = body_plans.plan_feet(character, whole, known, alternating(), floor)
+    plan = plan_feet(character, whole, known, alternating(), floor=floor)
     times = np.arange(FRAMES) / RATE
     turned, roots = foot_placement.place_feet(plan, times, whole.rotations, whole.roots)
     after = skeleton.positions(parents, turned, skeleton.translations(bones, roots))
@@ -166,19 +162,17 @@ def test_feet_are_tilted_as_the_floor_is():
 def test_a_floor_out_of_reach_of_a_fixed_body_is_told():
     motion = sliding()
     known, likely = [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
-    plan = body_plans.plan_feet(body(held={0}), motion, known, likely, at_height(-0.3))
+    plan = plan_feet(body(held={0}), motion, known, likely, floor=at_height(-0.3))
     assert not plan.lowered.any() and plan.unreached == (0, 1, 2, 3)
-    assert body_plans.plan_feet(body(held={0}), motion, known, likely).unreached == ()
+    assert plan_feet(body(held={0}), motion, known, likely).unreached == ()
     free = replace(body(held={0}), raised=True)
-    risen = body_plans.plan_feet(free, motion, known, likely, at_height(-0.3))
+    risen = plan_feet(free, motion, known, likely, floor=at_height(-0.3))
     assert risen.lowered == pytest.approx(0.3) and risen.unreached == ()
 
 
 def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more():
     motion = sliding(speed=1.2)
-    plan = body_plans.plan_feet(
-        body(), motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
-    )
+    plan = plan_feet(body(), motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4)))
     assert 0.0 < (plan.lowered - plan.grounded).max() <= two_bone.MOST + 1e-12
     assert all(len(stance) < FRAMES for steps in plan.steps for stance in steps.stances)
 
@@ -215,7 +209,7 @@ def kicking():
 
 def planned(motion, led=None):
     known = [contact(sliding(), foot) for foot in FEET]
-    return body_plans.plan_feet(body(), motion, known, alternating(), led=led)
+    return plan_feet(body(), motion, known, alternating(), led=led)
 
 
 def test_a_led_foot_is_where_the_motion_has_it_and_stands_before_and_after():
@@ -266,7 +260,7 @@ def test_limbs_keep_their_ends_as_far_as_they_are_led():
     (kept,) = character.kept
     share = np.clip(np.abs(np.arange(FRAMES) - 45.0) / 20.0, 0.0, 1.0)[None]
     likely = alternating()[:, 1:]
-    plan = body_plans.plan_feet(
+    plan = plan_feet(
         character,
         motion,
         known,
@@ -276,6 +270,6 @@ def test_limbs_keep_their_ends_as_far_as_they_are_led():
     assert plan.lowered.max() > 0.001
     moved = feet_of(placed(motion, plan))[:, FEET.index(kept.tip)] - feet_of(motion)[:, 0]
     assert -moved[:, 1] == pytest.approx((1.0 - share[0]) * plan.lowered, abs=1e-3)
-    always = body_plans.plan_feet(character, motion, known, likely)
+    always = plan_feet(character, motion, known, likely)
     own = feet_of(placed(motion, always))[:, 0] - feet_of(motion)[:, 0]
     assert np.abs(own).max() < 1e-6

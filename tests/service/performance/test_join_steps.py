@@ -7,7 +7,7 @@ import pytest
 from passages import FEET, PARENTS, character
 
 from posefield.feet import body_plans, foot_placement
-from posefield.feet.footsteps import SampledMotion
+from posefield.feet.footsteps import PlanRequest
 from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.performance import join_quality, joins
@@ -38,12 +38,9 @@ def joined(before, after, cut=CUT):
 
 def slides(passage):
     """Largest way over the floor of each foot while it stands, after the plan."""
-    plan = body_plans.plan_feet(
-        character(),
-        SampledMotion(passage.rotations, passage.roots, RATE),
-        CONTACTS,
-        passage.contacts,
-    )
+    motion = passage.rotations, passage.roots, RATE
+    request = PlanRequest(character(), *motion, CONTACTS, passage.contacts)
+    (plan,) = body_plans.plan_motions([request])
     times = np.arange(len(passage)) / RATE
     turned, roots = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
     moved = skeleton.translations(character().bones, roots)
