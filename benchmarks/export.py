@@ -168,7 +168,7 @@ def _stages(benchmark: Bench, form: str) -> dict[str, float]:
     opened = model_registry.open_model(name, name, benchmark.work.model)
     encoder = CLIP_ENCODERS[form]
     answers = [synthesize_clip(opened, query.question) for query in queries]
-    files = encoder.write(answers, encoder.usual)
+    files = encoder.write(answers, encoder.default_convention)
     entries = partial(_entries, queries, answers, files)
     with tempfile.TemporaryDirectory() as folder:
         target = open_target(folder)
@@ -176,7 +176,7 @@ def _stages(benchmark: Bench, form: str) -> dict[str, float]:
         named_files = [(f"{index}.{form}", content) for index, content in enumerate(files)]
         stages: dict[str, Callable[[], object]] = {
             "synthesis": lambda: [synthesize_clip(opened, query.question) for query in queries],
-            "encoding": lambda: encoder.write(answers, encoder.usual),
+            "encoding": lambda: encoder.write(answers, encoder.default_convention),
             "checksum and line of the manifest": entries,
             "file system": lambda: target.write(named_files),
         }

@@ -51,7 +51,9 @@ def _synthesised(model: Synthesizer, question: ClipQuestion) -> list[ClipAnswer]
 
 
 def _writers(answers: list[ClipAnswer]) -> dict[str, Callable[[], list[bytes]]]:
-    return {name: partial(e.write, answers, e.usual) for name, e in CLIP_ENCODERS.items()}
+    return {
+        name: partial(e.write, answers, e.default_convention) for name, e in CLIP_ENCODERS.items()
+    }
 
 
 def _row(name: str, seconds: float, joints: int, answer: ClipAnswer) -> Row:

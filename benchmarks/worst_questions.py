@@ -121,7 +121,7 @@ def _archives(one: _Asked) -> Iterator[Question]:
 
 def _crowds(one: _Asked) -> Iterator[Question]:
     for ending, encoder in CROWD_ENCODERS.items():
-        count = int(min(SETTINGS.crowd_limit, encoder.most))
+        count = int(min(SETTINGS.crowd_limit, encoder.max_characters))
         query = {"controls": one.controls, "time": [0.1] * count}
         yield one.post("crowd of poses", f"{count} characters, {ending}", f"crowd.{ending}", query)
         note = f"{count} characters, all columns, blended, {ending}"

@@ -10,7 +10,7 @@ from posefield.common.units import Floats, Positions, Rotations
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 from posefield.rigs import gltf_rig, rest_joints
-from posefield.rigs.gltf_rig import Beside, GltfDocument, GltfJoints
+from posefield.rigs.gltf_rig import GltfDocument, GltfJoints, ReadNeighbour
 from posefield.rigs.rest_joints import SCALE_TOLERANCE, Transform
 from posefield.roles import joint_recognition
 from posefield_train.source import motion_file
@@ -80,7 +80,7 @@ def _read_tracks(document: GltfDocument, animation: Any) -> Tracks:
         document.expect_plain("an animation", channel.target)
         if node is None or path not in KINDS:
             continue
-        if (node, path) in tracks or not 0 <= node < len(document.parts.nodes):
+        if (node, path) in tracks or not 0 <= node < len(document.gltf.nodes):
             raise document.error(f"found the {path} of node {node} twice, expected one curve each")
         if not 0 <= channel.sampler < len(animation.samplers):
             raise document.error(f"names sampler {channel.sampler}, expected one of its own")
@@ -121,7 +121,9 @@ MAX_POSES = 10_000_000
 """Limit of frames times joints, as for BVH."""
 
 
-def read(content: bytes, source: str, read_neighbour: Beside, options: ReadOptions) -> MotionFile:
+def read(
+    content: bytes, source: str, read_neighbour: ReadNeighbour, options: ReadOptions
+) -> MotionFile:
     """Return the motion of a .glb or .gltf file, in metres with Y up, as the format says.
 
     Raises MotionFileError for a file that is none, that has no skeleton, no animation or several
@@ -133,7 +135,9 @@ def read(content: bytes, source: str, read_neighbour: Beside, options: ReadOptio
         return _read(content, source, read_neighbour, options)
 
 
-def _read(content: bytes, source: str, read_neighbour: Beside, options: ReadOptions) -> MotionFile:
+def _read(
+    content: bytes, source: str, read_neighbour: ReadNeighbour, options: ReadOptions
+) -> MotionFile:
     document = gltf_rig.load(content, source, read_neighbour)
     name, animation, notes = _chosen(document, options.animation)
     curves = _read_tracks(document, animation)
@@ -174,7 +178,7 @@ def _read(content: bytes, source: str, read_neighbour: Beside, options: ReadOpti
 
 def _chosen(document: GltfDocument, requested: str | None) -> tuple[str, Any, list[str]]:
     """Return name and animation of the one that is wanted, or moves the skeleton; and notes."""
-    animations = document.parts.animations
+    animations = document.gltf.animations
     if not animations:
         raise document.error("found no animation, a skeleton or mesh without motion, expected one")
     names = [candidate.name or f"animation_{index}" for index, candidate in enumerate(animations)]
@@ -205,8 +209,8 @@ def _of_skeletons(document: GltfDocument) -> list[int]:
     Of these only those that change over time, and that move a person, where some do. All if there
     is none: Blender exports those of cameras and helpers alike.
     """
-    joints = {node for skin in document.parts.skins for node in skin.joints}
-    animations = document.parts.animations
+    joints = {node for skin in document.gltf.skins for node in skin.joints}
+    animations = document.gltf.animations
     indices = []
     for index, animation in enumerate(animations):
         nodes = {channel.target.node for channel in animation.channels}
@@ -256,12 +260,12 @@ def _animated_tree(document: GltfDocument, animated: set[int]) -> GltfJoints:
         raise document.error("found no skin and no tree of animated nodes, expected a skeleton")
     members: list[int] = []
     for node in document.below(root):
-        drawn, above = document.parts.nodes[node], document.above.get(node)
+        drawn, above = document.gltf.nodes[node], document.above.get(node)
         if (node == root or above in members) and drawn.mesh is None and drawn.camera is None:
             members.append(node)
     if len(members) < 2:
         raise document.error(
-            f"found an animation of node {document.parts.nodes[root].name!r} without a skeleton, "
+            f"found an animation of node {document.gltf.nodes[root].name!r} without a skeleton, "
             "expected a skin or a tree of nodes"
         )
     joints = gltf_rig.joints_of(document, members)
@@ -282,10 +286,10 @@ def _weights(document: GltfDocument, curves: Tracks, times: Floats) -> Mapping[s
     """Return the weights (F,) of morph targets by name; those of one name and values once."""
     weights: dict[str, Floats] = {}
     for (node, path), track in curves.items():
-        mesh = document.parts.nodes[node].mesh
+        mesh = document.gltf.nodes[node].mesh
         if path != "weights" or mesh is None:
             continue
-        stated = (document.parts.meshes[mesh].extras or {}).get("targetNames") or []
+        stated = (document.gltf.meshes[mesh].extras or {}).get("targetNames") or []
         for index, values in enumerate(track.at(times).T):
             name = str(stated[index]) if index < len(stated) else f"weight_{index}"
             if name in weights and not np.array_equal(weights[name], values):

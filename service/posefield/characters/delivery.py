@@ -52,13 +52,13 @@ class Delivery:
         roles: joint of the model by role. Raises InvalidField for a model without legs.
         """
         trust = answer.trust
-        hands, left_out = _hand_goals(answer.clip, question.targets, self._hands(roles))
+        hands, unmet_targets = _hand_goals(answer.clip, question.targets, self._hands(roles))
         travel: Travel = "kept" if question.targets else "scaled"
         stances = _stances(trust.feet, question)
         clip, facts, warnings = self._retargeted(answer.clip, roles, stances, hands, travel)
         if question.loop:
-            left_out += _loop_note(clip)
-        notes = (*warnings, *left_out, *self.character.notes(self.form, clip))
+            unmet_targets += _loop_note(clip)
+        notes = (*warnings, *unmet_targets, *self.character.notes(self.form, clip))
         told_trust = structs.replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
         return ClipAnswer(clip, told_trust)
 
@@ -70,9 +70,9 @@ class Delivery:
         """
         report = answer.trust
         stances = None if report.feet is None else report.feet.stances
-        hands, left_out = _held_hands(answer.held, self._hands(roles))
+        hands, unmet_targets = _held_hands(answer.held, self._hands(roles))
         clip, facts, new_warnings = self._retargeted(answer.clip, roles, stances, hands, "kept")
-        notes = (*new_warnings, *left_out, *self.character.notes(self.form, clip))
+        notes = (*new_warnings, *unmet_targets, *self.character.notes(self.form, clip))
         warnings = tuple(ScriptWarning(POINTER, sentence) for sentence in notes)
         delivered = structs.replace(
             report, script_warnings=(*report.script_warnings, *warnings), retargeting=facts
@@ -167,10 +167,10 @@ def _held_hands(
         for held_joint in held_joints
         if held_joint.joint in hand_roles
     ]
-    left_out = dict.fromkeys(
+    unmet_joints = dict.fromkeys(
         held_joint.joint for held_joint in held_joints if held_joint.joint not in hand_roles
     )
-    return goals, [NO_GOAL.format(joint) for joint in left_out]
+    return goals, [NO_GOAL.format(joint) for joint in unmet_joints]
 
 
 def _hand_goals(

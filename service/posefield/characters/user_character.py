@@ -254,7 +254,7 @@ def read_roles(path: Path) -> dict[str, str]:
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as fault:
         raise FileError(path, f"no TOML: {fault}") from fault
     roles = content_roles.get("roles")
-    if not isinstance(roles, dict) or not all(isinstance(one, str) for one in roles.values()):
+    if not isinstance(roles, dict) or not all(isinstance(joint, str) for joint in roles.values()):
         raise FileError(path, "no table [roles] of joints by role")
     return roles
 
@@ -289,8 +289,8 @@ class CharacterFolder:
             )
         hint = did_you_mean(name, self.characters)
         names = ", ".join(list(self.characters)[:10])
-        more = ", ..." if len(self.characters) > 10 else ""
-        raise InvalidField(FIELD, f"no character {name!r}{hint}, expected one of {names}{more}")
+        ellipsis = ", ..." if len(self.characters) > 10 else ""
+        raise InvalidField(FIELD, f"no character {name!r}{hint}, expected one of {names}{ellipsis}")
 
     def document(self) -> dict[str, Any]:
         """Return the CharacterList (schema of the contract)."""

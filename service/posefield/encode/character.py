@@ -141,7 +141,7 @@ def rest_pose(rig: CharacterRig, offsets: Floats | Singles) -> RestPose:
         none = np.zeros((len(rest), len(rig.tree.order)))
         return RestPose(rig, rest, np.empty((len(rest), 0, 3), np.float32), none)
     displacements = rig.bounds.displacements(rest)
-    along = rig.body.places.displacements(displacements)
+    along = rig.body.bone_places.displacements(displacements)
     return RestPose(rig, rest, rig.body.points_at(along), rig.bounds.radii(displacements, along))
 
 

@@ -43,8 +43,8 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
     mesh = rig.body
     if mesh is None:
         return None
-    used = max(1, int(np.flatnonzero(mesh.weights.any(axis=0)).max(initial=0)) + 1)
-    weights = mesh.weights[:, :used].astype(np.float32) / np.float32(FULL_WEIGHT)
+    influences = max(1, int(np.flatnonzero(mesh.weights.any(axis=0)).max(initial=0)) + 1)
+    weights = mesh.weights[:, :influences].astype(np.float32) / np.float32(FULL_WEIGHT)
     colours = skinned_mesh.colours(mesh)
     return _MeshArrays(
         Vt.IntArray.FromNumpy(mesh.counts),
@@ -52,9 +52,9 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
         Vt.Vec3fArray.FromNumpy(
             np.ascontiguousarray(conventions.convert_directions(convention, mesh.normals))
         ),
-        Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.joints[:, :used]).reshape(-1)),
+        Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.joints[:, :influences]).reshape(-1)),
         Vt.FloatArray.FromNumpy(weights.reshape(-1)),
-        used,
+        influences,
         Vt.Vec3fArray.FromNumpy(colours),
         Vt.IntArray.FromNumpy(mesh.tints) if len(colours) > 1 else None,
     )
@@ -203,8 +203,8 @@ def _material(parent: Any, *, tinted: bool) -> Any:
     if tinted:
         reader = _shader(material, "Colour", PRIMVAR_READER)
         layers.varying_attribute(reader, "inputs:varname", ValueTypes.String, "displayColor")
-        result = layers.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
-        _connect(colour, result)
+        colour_output = layers.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
+        _connect(colour, colour_output)
     else:
         colour.default = Gf.Vec3f(*skinned_mesh.SKIN)
     for name, value in (("roughness", skinned_mesh.ROUGHNESS), ("metallic", 0.0)):
@@ -220,5 +220,5 @@ def _shader(parent: Any, name: str, kind: str) -> Any:
     return shader
 
 
-def _connect(taker: Any, giver: Any) -> None:
-    taker.connectionPathList.explicitItems = [giver.path]
+def _connect(input_spec: Any, output_spec: Any) -> None:
+    input_spec.connectionPathList.explicitItems = [output_spec.path]

@@ -55,19 +55,19 @@ CrateSection = tuple[bytes, bytes]
 def split_crate(data: bytes) -> tuple[bytes, tuple[CrateSection, ...]] | None:
     """Return head and values of a binary layer, and its sections; None for another layout."""
     try:
-        listed = _table_of_contents(data)
+        entries = _table_of_contents(data)
     except struct.error:
         return None
     sections = tuple(
-        (name.rstrip(b"\0"), data[start : start + size]) for name, start, size in listed
+        (name.rstrip(b"\0"), data[start : start + size]) for name, start, size in entries
     )
     if (
         not sections
         or sections[0][0] != TOKEN_SECTION
-        or listed[0][1] < TABLE_OFFSET_POSITION + TABLE_OFFSET.size
+        or entries[0][1] < TABLE_OFFSET_POSITION + TABLE_OFFSET.size
     ):
         return None
-    values = data[: listed[0][1]]
+    values = data[: entries[0][1]]
     return (values, sections) if join_crate(bytearray(values), sections) == data else None
 
 
@@ -131,8 +131,8 @@ def find_samples(values: bytes, row: Singles) -> SamplesPlace | None:
     if array < 0:
         return None
     # The descriptions: of the times, an offset to the next byte, a count of one, of the sample.
-    listed = JUMP.pack(JUMP.size) + COUNT.pack(1) + array.to_bytes(OFFSET_BITS // 8, "little")
-    after = values.find(listed)
+    descriptions = JUMP.pack(JUMP.size) + COUNT.pack(1) + array.to_bytes(OFFSET_BITS // 8, "little")
+    after = values.find(descriptions)
     if after < 0:
         return None
     (times,) = COUNT.unpack_from(values, after - COUNT.size)
@@ -181,11 +181,11 @@ def repeated_rows(rows: Singles) -> Indices | None:
     if _all_distinct(probes):
         return None
     first = dict[Any, int]()
-    alike = [first.setdefault(probe, index) for index, probe in enumerate(probes.tolist())]
-    if not np.array_equal(rows, rows[alike]):
+    first_equal = [first.setdefault(probe, index) for index, probe in enumerate(probes.tolist())]
+    if not np.array_equal(rows, rows[first_equal]):
         first = {}
-        alike = [first.setdefault(row.tobytes(), index) for index, row in enumerate(rows)]
-    return np.array(alike) if len(first) < len(rows) else None
+        first_equal = [first.setdefault(row.tobytes(), index) for index, row in enumerate(rows)]
+    return np.array(first_equal) if len(first) < len(rows) else None
 
 
 def _all_distinct(numbers: Singles) -> bool:
@@ -282,10 +282,10 @@ class FactPlace:
     def _tables(self, texts: list[str]) -> tuple[CrateSection, ...]:
         if any("\0" in text for text in texts):
             raise ValueError("a fact with the character NUL, expected text without it")
-        more = "".join(f"{text}\0" for text in texts).encode()
-        literals = self.literals + more
+        text_bytes = "".join(f"{text}\0" for text in texts).encode()
+        literals = self.literals + text_bytes
         packed = self.sequences + _literal_run(len(literals)) + literals
-        head = self.tokens + len(texts), self.text_bytes + len(more), len(packed)
+        head = self.tokens + len(texts), self.text_bytes + len(text_bytes), len(packed)
         indices = range(self.tokens, self.tokens + len(texts))
         strings = self.strings + struct.pack(f"<{len(texts)}I", *indices)
         return (

@@ -166,7 +166,7 @@ def template(builder: LayerBuilder, pattern: LayerPattern) -> CrateTemplate | No
 def _is_verified(candidate: CrateTemplate, builder: LayerBuilder, pattern: LayerPattern) -> bool:
     """Return whether usd-core reads filled layers as those that it builds itself."""
     facts = TRIAL_FACTS if pattern.facts else {}
-    one = random_content(pattern, facts, seed=2)
+    single_frame = random_content(pattern, facts, seed=2)
     rows = [0, *range(TRIAL_FRAMES), 0]
     random_rows = {
         name: np.random.default_rng(3).standard_normal((TRIAL_FRAMES, *shape[1:]), np.float32)[rows]
@@ -175,7 +175,7 @@ def _is_verified(candidate: CrateTemplate, builder: LayerBuilder, pattern: Layer
     return all(
         layers.crate_text(candidate.write(builder.rate, content))
         == builder.layer(content).ExportToString()
-        for content in (one, replace(one, samples=random_rows))
+        for content in (single_frame, replace(single_frame, samples=random_rows))
     )
 
 

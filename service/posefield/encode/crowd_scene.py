@@ -96,8 +96,8 @@ def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[tuple[Samples, 
 
 def motion_layer(crowd: CrowdClip, rig: CharacterRig, samples: Samples) -> bytes:
     """Return the binary layer of one motion of a crowd."""
-    author = AnimationLayerBuilder(crowd.rate, METRES, rig.paths, crowd.curves)
-    return crate_template.usdc(author, LayerContent(samples, {}, {}))
+    builder = AnimationLayerBuilder(crowd.rate, METRES, rig.paths, crowd.curves)
+    return crate_template.usdc(builder, LayerContent(samples, {}, {}))
 
 
 def _batch_motions(
@@ -179,9 +179,9 @@ def characters_prim(layer: Any) -> Any:
     return characters
 
 
-def set_payload(owner: Any, path: str) -> None:
+def set_payload(prim: Any, path: str) -> None:
     """Set another layer's default prim as the payload of a prim; readers may leave it out."""
-    owner.SetInfo("payload", Sdf.PayloadListOp.Create(prependedItems=[Sdf.Payload(path)]))
+    prim.SetInfo("payload", Sdf.PayloadListOp.Create(prependedItems=[Sdf.Payload(path)]))
 
 
 def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
@@ -192,17 +192,17 @@ def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
     with Sdf.ChangeBlock():
         characters = characters_prim(layer)
     prototype = Sdf.ReferenceListOp.Create(prependedItems=[Sdf.Reference("", PROTOTYPE)])
-    for some in character_blocks(crowd):
+    for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
-            prims = [layers.prim(characters, character_name(i), "SkelRoot") for i in some]
-            for prim, played in zip(prims, crowd.motion[some], strict=True):
+            prims = [layers.prim(characters, character_name(i), "SkelRoot") for i in indices]
+            for prim, motion in zip(prims, crowd.motion[indices], strict=True):
                 prim.SetInfo("references", prototype)
                 if instanced:
                     prim.SetInfo("instanceable", True)
                 layers.add_relationship(
-                    prim, "skel:animationSource", MOTIONS.AppendChild(motion_name(played))
+                    prim, "skel:animationSource", MOTIONS.AppendChild(motion_name(motion))
                 )
-            set_transforms(prims, crowd.placement.select(some))
+            set_transforms(prims, crowd.placement.select(indices))
 
 
 def character_blocks(crowd: CrowdClip) -> Iterator[Indices]:
@@ -250,19 +250,19 @@ def add_to_references(layer: Any, crowd: CrowdClip, summaries: Sequence[MotionSu
 def add_to_flat(layer: Any, crowd: CrowdClip, summaries: Sequence[MotionSummary]) -> None:
     """Add extents and levels to a crowd in which each character has its own body and motion."""
     _placed_boxes(layer, crowd, summaries)
-    for some in character_blocks(crowd):
+    for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
-            for index, played in zip(some, crowd.motion[some], strict=True):
+            for index, motion in zip(indices, crowd.motion[indices], strict=True):
                 path = character_path(index)
-                _set_extent(layer, path.AppendChild("Body"), summaries[played].box)
-                _set_levels(layer, path.AppendChild(character_name(index)), summaries[played])
+                _set_extent(layer, path.AppendChild("Body"), summaries[motion].box)
+                _set_levels(layer, path.AppendChild(character_name(index)), summaries[motion])
 
 
 def _placed_boxes(layer: Any, crowd: CrowdClip, summaries: Sequence[MotionSummary]) -> None:
     boxes = np.array([summaries[played].box for played in crowd.motion])
-    for some in character_blocks(crowd):
+    for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
-            for index in some:
+            for index in indices:
                 _set_extent(layer, character_path(index), boxes[index])
     crowd_box = layers.float3_array(placed_box(crowd.placement, boxes))
     for path in (ROOT, CHARACTERS):
@@ -328,13 +328,13 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
         characters_prim(layer),
         character_prims.values(character.rest_pose_arrays(rig)),
     )
-    for some in character_blocks(crowd):
+    for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
-            prims = [character_prims.root(group, character_name(i), rig) for i in some]
+            prims = [character_prims.root(group, character_name(i), rig) for i in indices]
             for prim in prims:
                 character_prims.add_blend_shapes(prim, rig, crowd.curves)
                 character_prims.set_values(prim, values)
-            set_transforms(prims, crowd.placement.select(some))
+            set_transforms(prims, crowd.placement.select(indices))
 
 
 def _copy_motion(

@@ -178,9 +178,9 @@ def tree(skeleton: Skeleton) -> PointTree:
     depths = np.zeros(len(above), int)
     for point, parent in enumerate(above[1:], start=1):
         depths[point] = depths[parent] + 1
-    bare = ~np.isin(np.arange(len(above)), above)
-    order = np.lexsort((bare, depths))
-    turning = order[~bare[order]]
+    is_leaf = ~np.isin(np.arange(len(above)), above)
+    order = np.lexsort((is_leaf, depths))
+    turning = order[~is_leaf[order]]
     return PointTree(
         skeleton.tip_offsets, order, turning, tuple(_point_levels(above, depths, order, turning))
     )
@@ -208,12 +208,12 @@ def pose_independent_box(skeleton: Skeleton, offsets: Floats, path: Floats) -> F
     lengths = np.linalg.norm(np.concatenate([skeleton.offsets, skeleton.tip_offsets]), axis=-1)
     arms = lengths.copy()
     arms[: len(offsets)] = np.maximum(lengths[: len(offsets)], np.linalg.norm(offsets, axis=-1))
-    far = [0.0]
+    reaches = [0.0]
     for arm, parent in zip(arms[1:], (*skeleton.parents[1:], *skeleton.tip_joints), strict=True):
-        far.append(far[parent] + arm)
+        reaches.append(reaches[parent] + arm)
     # The body of a skeleton of zero size is drawn as if its size were a metre.
-    reached = max(far) + THICKEST_BODY * (2.0 * max(far) or 1.0)
-    return enlarged_box(path.min(axis=0) - reached, path.max(axis=0) + reached)
+    reach = max(reaches) + THICKEST_BODY * (2.0 * max(reaches) or 1.0)
+    return enlarged_box(path.min(axis=0) - reach, path.max(axis=0) + reach)
 
 
 def enlarged_box(low: Floats, high: Floats) -> Floats:
@@ -262,9 +262,9 @@ def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     positions[:, 0] = moves.path.T
     for level in tree.generations:
         parent_turns = _select_rows(turns, level.turning_parents)
-        here = positions[:, level.points]
-        _rotate(parent_turns, arms[:, level.points], here)
-        here += _select_rows(positions, level.parents)
+        level_positions = positions[:, level.points]
+        _rotate(parent_turns, arms[:, level.points], level_positions)
+        level_positions += _select_rows(positions, level.parents)
         # In place: a joint's local rotation is not read after its orientation is computed.
         level_turns = turns[:, level.turns]
         if level_turns.size:
@@ -272,8 +272,8 @@ def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     return positions
 
 
-def _select_rows(components: Singles, chosen: PointIndices | slice) -> Singles:
-    return components[:, chosen] if isinstance(chosen, slice) else components.take(chosen, 1)
+def _select_rows(components: Singles, rows: PointIndices | slice) -> Singles:
+    return components[:, rows] if isinstance(rows, slice) else components.take(rows, 1)
 
 
 def _joint_rotations(tree: PointTree, moves: AnimationSamples) -> Singles:

@@ -58,17 +58,17 @@ class ClipEncoder(Format):
 
     write: returns the files of several results, in their order; those of one model and length are
     computed together. bytes_per_joint: largest number of bytes of a joint in a frame, without the
-    parts that all frames share. working: the same of memory, measured for long performances. usual:
-    the format's default convention, which its readers expect. convention_fixed: whether the format
-    allows no other convention. inline_limit: number of frames up to which a file is written in a
-    millisecond or two, so that other requests may wait for it. has_body, has_curves: whether the
-    format carries a body and curves.
+    parts that all frames share. working: the same of memory, measured for long performances.
+    default_convention: the convention, which its readers expect. convention_fixed: whether the
+    format allows no other convention. inline_limit: number of frames up to which a file is written
+    in a millisecond or two, so that other requests may wait for it. has_body, has_curves: whether
+    the format carries a body and curves.
     """
 
     write: Callable[[Sequence[SampledClip], Convention], list[bytes]]
     bytes_per_joint: int
     working: int = WORKING
-    usual: Convention = METRES
+    default_convention: Convention = METRES
     convention_fixed: bool = False
     inline_limit: int = 200
     has_body: bool = False
@@ -88,14 +88,18 @@ class ClipEncoder(Format):
                 f"{body!r}, expected none given: {self.extension} files carry no body, "
                 "usda, usdc, usdz and glb do",
             )
-        length = self.usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
-        convention = Convention(length, up or self.usual.up, body or self.usual.body)
+        length = self.default_convention.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
+        convention = Convention(
+            length, up or self.default_convention.up, body or self.default_convention.body
+        )
         law = f"the law of {self.extension}"
-        if self.convention_fixed and length != self.usual.metres_per_unit:
-            expected = f"expected {self.usual.metres_per_unit:g} m"
+        if self.convention_fixed and length != self.default_convention.metres_per_unit:
+            expected = f"expected {self.default_convention.metres_per_unit:g} m"
             raise InvalidField("unit", f"{length:g} m, {expected}: {law}")
-        if self.convention_fixed and convention.up != self.usual.up:
-            raise InvalidField("up", f"{convention.up!r}, expected {self.usual.up!r}: {law}")
+        if self.convention_fixed and convention.up != self.default_convention.up:
+            raise InvalidField(
+                "up", f"{convention.up!r}, expected {self.default_convention.up!r}: {law}"
+            )
         return convention
 
     def noted(self, answer: ClipAnswer) -> ClipAnswer:
@@ -112,7 +116,7 @@ class ClipEncoder(Format):
 
     def encode(self, answer: SampledClip, convention: Convention | None = None) -> bytes:
         """Return the file of one result, in the format's default convention unless one is given."""
-        return self.write([answer], convention or self.usual)[0]
+        return self.write([answer], convention or self.default_convention)[0]
 
 
 CURVES_PER_JOINT = 4
@@ -228,7 +232,7 @@ class TableEncoder(Format, Generic[A]):
     table: returns the table of a result. write: returns its bytes. inline_limit: number of poses or
     grid points up to which a result is computed and written in about a millisecond, so that other
     requests may wait for it. bytes_per_joint: largest number of bytes of a joint of a character.
-    working: the same of memory. most: largest number of characters.
+    working: the same of memory. max_characters: largest number of characters.
     """
 
     table: Callable[[A], Table]
@@ -236,7 +240,7 @@ class TableEncoder(Format, Generic[A]):
     inline_limit: int = 0
     bytes_per_joint: int = 40
     working: int = WORKING
-    most: float = math.inf
+    max_characters: float = math.inf
 
     def encode(self, answer: A) -> bytes:
         """Return the bytes of a result."""
@@ -264,7 +268,7 @@ CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
         motion_tables.crowd_table,
         tables.json_table,
         bytes_per_joint=150,
-        most=motion_tables.MAX_JSON_CHARACTERS,
+        max_characters=motion_tables.MAX_JSON_CHARACTERS,
     ),
 )
 

@@ -45,7 +45,7 @@ class GlbBuffer:
 
     views: list[dict[str, Any]] = field(default_factory=list)
     accessors: list[dict[str, Any]] = field(default_factory=list)
-    parts: list[bytes] = field(default_factory=list)
+    chunks: list[bytes] = field(default_factory=list)
 
     def view(self, content: bytes, **properties: Any) -> int:
         """Return the index of a new view of bytes, padded to a multiple of four.
@@ -56,7 +56,7 @@ class GlbBuffer:
         start = last["byteOffset"] + _padded_length(last["byteLength"])
         length = len(content)
         self.views.append({"buffer": 0, "byteOffset": start, "byteLength": length, **properties})
-        self.parts.append(content.ljust(_padded_length(length), b"\0"))
+        self.chunks.append(content.ljust(_padded_length(length), b"\0"))
         return len(self.views) - 1
 
     def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **properties: Any) -> int:
@@ -108,7 +108,7 @@ def asset(facts: dict[str, Any]) -> dict[str, Any]:
 
 def container(document: dict[str, Any], store: GlbBuffer) -> bytes:
     """Return the file of a document and its buffer."""
-    binary = b"".join(store.parts)
+    binary = b"".join(store.chunks)
     content = {
         "bufferViews": store.views,
         "accessors": store.accessors,
@@ -303,7 +303,7 @@ def animation(store: GlbBuffer, answer: SampledClip, clip: Clip, rest: Floats) -
 
     It has channels of all rotations, of translations other than at rest (J, 3), and of curves.
     """
-    when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
+    times = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
     # Readers interpolate between neighbours, which must lie in one hemisphere.
     turns = _as_float32(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
     travel = np.abs(clip.translations - rest).max(axis=(0, 2))
@@ -320,7 +320,7 @@ def animation(store: GlbBuffer, answer: SampledClip, clip: Clip, rest: Floats) -
     facts = answer.trust.facts()
     document = {
         "name": _animation_name(facts, store),
-        "samplers": [{"input": when, "output": output} for _, _, output in outputs],
+        "samplers": [{"input": times, "output": output} for _, _, output in outputs],
         "channels": [
             {"sampler": index, "target": {"node": joint, "path": path}}
             for index, (joint, path, _) in enumerate(outputs)
@@ -335,7 +335,7 @@ def _animation_name(facts: Mapping[str, Any], store: GlbBuffer) -> str:
     words = [model.partition("@")[0] for model in models]
     words += [f"{name}{value:.4g}" for name, value in facts.get("controls", {}).items()]
     name = re.sub(r"[^\w.-]+", "_", "_".join(words))[:MOST_NAME]
-    return f"{name}_{zlib.crc32(b''.join(store.parts)):08x}"
+    return f"{name}_{zlib.crc32(b''.join(store.chunks)):08x}"
 
 
 def _tracks(store: GlbBuffer, tracks: Singles, kind: str) -> list[int]:
@@ -374,8 +374,10 @@ def _character_glb(rig: CharacterRig, identity: str) -> bytes:
 def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[str, int]:
     """Return the attributes by which points follow joints at rest; tips move with their joints."""
     moving = np.array([*range(len(skeleton)), *skeleton.tip_joints])
-    anchors: npt.NDArray[Any] = moving[mesh.places.anchors][mesh.place].astype(np.uint16)
-    shares = mesh.places.shares[mesh.place].astype(np.float32)
+    anchors: npt.NDArray[Any] = moving[mesh.bone_places.anchors][mesh.place_of_point].astype(
+        np.uint16
+    )
+    shares = mesh.bone_places.shares[mesh.place_of_point].astype(np.float32)
     return {
         "_ANCHORS": store.add(anchors, "VEC2", target=VERTICES),
         "_SHARE": store.add(shares, "SCALAR", target=VERTICES),

@@ -59,15 +59,15 @@ class _Fit(NamedTuple):
     """Joints and ends of the parts of a rig.
 
     joints (19,): the joint that moves each part; the hips for the trunk. anchors (19, 2): ends of
-    each part, as joints or, after all joints, tips. ends (19, 2, 3): m, to the left, up and ahead
-    of the middle of the hips. scale: size beside the stored rig, by the length of the legs. spine:
-    joints from the hips to the head. arms: index in the spine of the joint that holds the arms.
-    crown: height of the end of the head, m.
+    each part, as joints or, after all joints, tips. bone_ends (19, 2, 3): m, to the left, up and
+    ahead of the middle of the hips. scale: size beside the stored rig, by the length of the legs.
+    spine: joints from the hips to the head. arms: index in the spine of the joint that holds the
+    arms. crown: height of the end of the head, m.
     """
 
     joints: Indices
     anchors: Indices
-    ends: Floats
+    bone_ends: Floats
     scale: float
     spine: list[int]
     arms: int
@@ -95,19 +95,19 @@ def mannequin(skeleton: Skeleton) -> SkinnedMesh | None:
     axes = np.stack([side, [0.0, 1.0, 0.0], np.cross(side, [0.0, 1.0, 0.0])])
     middle = hips.mean(axis=0)
     fit = _fit(skeleton, joints, (positions - middle) @ axes.T)
-    if not _upright(fit.ends):
+    if not _upright(fit.bone_ends):
         return None
     stored = stored_mesh()
     fitted = _fitted_points(stored, fit)
     points = fitted @ axes + middle
     marks = np.array([(positions[joint] - middle) @ axes[1] for joint in fit.spine])
-    chosen, weights = _weights(stored, fit, len(skeleton), fitted[:, 1], marks)
+    movers, weights = _weights(stored, fit, len(skeleton), fitted[:, 1], marks)
     counts, corners = stored["counts"].astype(np.int32), stored["corners"].astype(np.int32)
     return SkinnedMesh(
         points.astype(np.float32),
         skinned_mesh.vertex_normals(points, skinned_mesh.triangles(counts, corners)),
         *skinned_mesh.distinct_places(*_places(stored, fit, marks)),
-        chosen,
+        movers,
         weights,
         counts,
         corners,
@@ -189,16 +189,16 @@ def _landmarks(bone_ends: Floats) -> tuple[Floats, Floats]:
 
 def _upright(bone_ends: Floats) -> bool:
     """Return whether a rig stands as people do: head above arms above hips above ankles."""
-    long = _leg_length(bone_ends)
+    leg_length = _leg_length(bone_ends)
     (_, shoulders), widths = _landmarks(bone_ends)
     ankles = np.mean([_limb(bone_ends, side, "Foot")[0, 0] for side in SIDES], axis=0)
     arms = [np.ptp(_limb(bone_ends, side, "UpperArm", "LowerArm"), axis=1) for side in SIDES]
     return bool(
-        -ankles[1] > 0.7 * long
-        and shoulders[1] > 0.3 * long
-        and bone_ends[0, 1, 1] - shoulders[1] > -0.1 * long
-        and widths.min() > 0.02 * long
-        and min(float(np.linalg.norm(arm, axis=-1).sum()) for arm in arms) > 0.3 * long
+        -ankles[1] > 0.7 * leg_length
+        and shoulders[1] > 0.3 * leg_length
+        and bone_ends[0, 1, 1] - shoulders[1] > -0.1 * leg_length
+        and widths.min() > 0.02 * leg_length
+        and min(float(np.linalg.norm(arm, axis=-1).sum()) for arm in arms) > 0.3 * leg_length
     )
 
 
@@ -212,11 +212,13 @@ def _fitted_points(stored: Mapping[str, Any], fit: _Fit) -> Floats:
         elif name.endswith(("Foot", "Toes")):
             foot = PARTS.index(f"{name[:-4]}Foot")
             carried[part] = _on_foot(
-                points, stored_ends[foot : foot + 2], fit.ends[foot : foot + 2], fit
+                points, stored_ends[foot : foot + 2], fit.bone_ends[foot : foot + 2], fit
             )
         else:
             is_hand = name.endswith(("Hand", "Fingers"))
-            carried[part] = _on_bone(points, stored_ends[part], fit.ends[part], fit.scale, is_hand)
+            carried[part] = _on_bone(
+                points, stored_ends[part], fit.bone_ends[part], fit.scale, is_hand
+            )
     rows = np.arange(len(points))
     shares = stored["weights"].astype(float)[..., None] / FULL_WEIGHT
     points_of_rows: Floats = np.sum(shares * carried[stored["parts"], rows[:, None]], axis=1)
@@ -229,39 +231,55 @@ def _fitted_points(stored: Mapping[str, Any], fit: _Fit) -> Floats:
 
 def _on_bone(points: Floats, stored: Floats, bone: Floats, scale: float, is_hand: bool) -> Floats:
     """Return points turned and stretched with a bone, and scaled across it."""
-    old, new = stored[1] - stored[0], bone[1] - bone[0]
-    length, long = float(np.linalg.norm(old)), float(np.linalg.norm(new))
-    old /= length
-    new = new / long if long > 0.0 else old
+    stored_direction, direction = stored[1] - stored[0], bone[1] - bone[0]
+    stored_length, length = (
+        float(np.linalg.norm(stored_direction)),
+        float(np.linalg.norm(direction)),
+    )
+    stored_direction /= stored_length
+    direction = direction / length if length > 0.0 else stored_direction
     if is_hand:
-        length, long = length + FINGERTIP, max(HAND * scale, long + FINGERTIP * scale)
-    off = points - stored[0]
-    along = off @ old
-    across = scale * (off - along[:, None] * old)
+        stored_length, length = (
+            stored_length + FINGERTIP,
+            max(HAND * scale, length + FINGERTIP * scale),
+        )
+    offsets = points - stored[0]
+    along = offsets @ stored_direction
+    across = scale * (offsets - along[:, None] * stored_direction)
     # The shortest turn from one direction to the other.
-    turn = np.cross(old, new)
+    turn = np.cross(stored_direction, direction)
     once = np.cross(turn, across)
-    turned = across + once + np.cross(turn, once) / max(1.0 + float(old @ new), 1e-9)
-    fitted: Floats = bone[0] + (long / length) * along[:, None] * new + turned
+    turned = (
+        across + once + np.cross(turn, once) / max(1.0 + float(stored_direction @ direction), 1e-9)
+    )
+    fitted: Floats = bone[0] + (length / stored_length) * along[:, None] * direction + turned
     return fitted
 
 
 def _on_trunk(points: Floats, stored: Floats, fit: _Fit) -> Floats:
     """Return points stretched between hips, shoulders and head, and widened with them."""
-    (old, old_widths), (new, new_widths) = _landmarks(stored), _landmarks(fit.ends)
-    head, scale = fit.ends[0, 1].copy(), fit.scale
-    head[1] = max(head[1], new[1, 1] + scale * CHIN)
-    before, after = (np.vstack([some, top]) for some, top in ((old, stored[0, 1]), (new, head)))
+    (stored_middles, stored_widths), (middles, widths) = (
+        _landmarks(stored),
+        _landmarks(fit.bone_ends),
+    )
+    head, scale = fit.bone_ends[0, 1].copy(), fit.scale
+    head[1] = max(head[1], middles[1, 1] + scale * CHIN)
+    before, after = (
+        np.vstack([some, top]) for some, top in ((stored_middles, stored[0, 1]), (middles, head))
+    )
     x, y, z = points.T
     low, high = before[0, 1], before[2, 1]
     height = np.interp(y, before[:, 1], after[:, 1])
     height += scale * (np.minimum(y - low, 0.0) + np.maximum(y - high, 0.0))
-    off = [np.interp(y, before[:, 1], some[:, axis]) for axis in (0, 2) for some in (before, after)]
+    centres = [
+        np.interp(y, before[:, 1], some[:, axis]) for axis in (0, 2) for some in (before, after)
+    ]
     waist = 0.5 * (before[0, 1] + before[1, 1])
-    rates = new_widths / old_widths
-    wide = np.interp(y, [low, waist, before[1, 1], high], [rates[0], scale, rates[1], scale])
+    rates = widths / stored_widths
+    widening = np.interp(y, [low, waist, before[1, 1], high], [rates[0], scale, rates[1], scale])
     fitted: Floats = np.stack(
-        [off[1] + wide * (x - off[0]), height, off[3] + scale * (z - off[2])], axis=-1
+        [centres[1] + widening * (x - centres[0]), height, centres[3] + scale * (z - centres[2])],
+        axis=-1,
     )
     return fitted
 
@@ -270,22 +288,26 @@ def _on_foot(points: Floats, stored: Floats, bone_ends: Floats, fit: _Fit) -> Fl
     """Return points of a flat foot; stored, bone_ends (2, 2, 3): of foot and toes, m."""
     scale = fit.scale
     (ankle, ball), (_, tip) = bone_ends
-    old_ankle, old_ball = stored[0]
+    stored_ankle, stored_ball = stored[0]
     toe_heights = [ball[1] - scale * SOLE, tip[1] - scale * TIP] if np.any(ball != ankle) else []
     sole = min(toe_heights, default=ankle[1] - scale * ANKLE)
-    old_sole = min(old_ball[1] - SOLE, stored[1, 1, 1] - TIP)
+    stored_sole = min(stored_ball[1] - SOLE, stored[1, 1, 1] - TIP)
     x, y, z = points.T
-    length, old_ahead = ball[2] - ankle[2], old_ball[2] - old_ankle[2]
-    far = np.clip((z - old_ankle[2]) / old_ahead, 0.0, 1.0)
-    forth = length / old_ahead if length > 0.3 * scale * old_ahead else scale
-    sideways = far * (ball[0] - ankle[0] if toe_heights else scale * (old_ball[0] - old_ankle[0]))
+    length, stored_length = ball[2] - ankle[2], stored_ball[2] - stored_ankle[2]
+    share = np.clip((z - stored_ankle[2]) / stored_length, 0.0, 1.0)
+    stretch = length / stored_length if length > 0.3 * scale * stored_length else scale
+    sideways = share * (
+        ball[0] - ankle[0] if toe_heights else scale * (stored_ball[0] - stored_ankle[0])
+    )
     fitted: Floats = np.stack(
         [
-            ankle[0] + sideways + scale * (x - old_ankle[0] - far * (old_ball[0] - old_ankle[0])),
-            sole + (y - old_sole) * (ankle[1] - sole) / (old_ankle[1] - old_sole),
+            ankle[0]
+            + sideways
+            + scale * (x - stored_ankle[0] - share * (stored_ball[0] - stored_ankle[0])),
+            sole + (y - stored_sole) * (ankle[1] - sole) / (stored_ankle[1] - stored_sole),
             ankle[2]
-            + np.where(far < 1.0, forth, scale) * (z - old_ankle[2])
-            + np.where(far < 1.0, 0.0, (forth - scale) * old_ahead),
+            + np.where(share < 1.0, stretch, scale) * (z - stored_ankle[2])
+            + np.where(share < 1.0, 0.0, (stretch - scale) * stored_length),
         ],
         axis=-1,
     )
@@ -297,7 +319,7 @@ def _spine_marks(fit: _Fit, marks: Floats) -> Floats:
 
     The joint that holds the arms moves the shoulders, although the neck may begin below them.
     """
-    shoulders = _landmarks(fit.ends)[0][1, 1]
+    shoulders = _landmarks(fit.bone_ends)[0][1, 1]
     raised = marks.copy()
     raised[fit.arms + 1 :] = np.maximum(raised[fit.arms + 1 :], shoulders + fit.scale * NECK)
     return np.maximum.accumulate(raised)
@@ -328,13 +350,13 @@ def _weights(
         (rows[:, None], np.array(fit.spine)),
         part_weights[:, :1] * -np.diff(passed, axis=1),
     )
-    chosen = np.argsort(-joint_weights, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
-    heavy = np.take_along_axis(joint_weights, chosen, axis=1)
-    heavy /= heavy.sum(axis=1, keepdims=True)
-    rounded = np.floor(FULL_WEIGHT * heavy + 1e-9).astype(np.int64)
+    movers = np.argsort(-joint_weights, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
+    shares_of_movers = np.take_along_axis(joint_weights, movers, axis=1)
+    shares_of_movers /= shares_of_movers.sum(axis=1, keepdims=True)
+    rounded = np.floor(FULL_WEIGHT * shares_of_movers + 1e-9).astype(np.int64)
     rounded[:, 0] += FULL_WEIGHT - rounded.sum(axis=1)
-    chosen[rounded == 0] = 0
-    return chosen, rounded.astype(np.uint8)
+    movers[rounded == 0] = 0
+    return movers, rounded.astype(np.uint8)
 
 
 def _places(stored: Mapping[str, Any], fit: _Fit, marks: Floats) -> tuple[Integers, Floats]:
@@ -348,6 +370,6 @@ def _places(stored: Mapping[str, Any], fit: _Fit, marks: Floats) -> tuple[Intege
     spine_and_crown = np.append(_spine_marks(fit, marks), fit.crown)
     first = np.clip(np.searchsorted(spine_and_crown, heights, "right") - 1, 0, len(path) - 2)
     anchors[trunk] = np.stack([path[first], path[first + 1]], axis=-1)
-    long = np.maximum(spine_and_crown[first + 1] - spine_and_crown[first], 1e-6)
-    shares[trunk] = np.clip((heights - spine_and_crown[first]) / long, 0.0, 1.0)
+    lengths = np.maximum(spine_and_crown[first + 1] - spine_and_crown[first], 1e-6)
+    shares[trunk] = np.clip((heights - spine_and_crown[first]) / lengths, 0.0, 1.0)
     return anchors.astype(np.int32), shares

@@ -87,9 +87,9 @@ def explanation(reasons: Explanation) -> dict[str, Any]:
 
 def _clip_facts(clip: CapturedClip) -> dict[str, Any]:
     rounded = ("distance", "weight", "share")
-    plain = {name: value for name, value in vars(clip).items() if name != "labels"}
+    values = {name: value for name, value in vars(clip).items() if name != "labels"}
     numbers = {name: round(getattr(clip, name), DECIMALS) for name in rounded}
-    return {**plain, **numbers, **_labels(clip.labels)}
+    return {**values, **numbers, **_labels(clip.labels)}
 
 
 def _labels(labels: Mapping[str, Any]) -> dict[str, Any]:
@@ -99,17 +99,17 @@ def _labels(labels: Mapping[str, Any]) -> dict[str, Any]:
 
 def explanation_text(reasons: Explanation) -> str:
     """Return one line for each clip, the nearest first, one for all others, and the support."""
-    wide = max(len("clip"), *(len(clip.source) for clip in reasons.nearest))
-    lines = [f"{'clip':{wide}}  distance    share     weight  "]
+    width = max(len("clip"), *(len(clip.source) for clip in reasons.nearest))
+    lines = [f"{'clip':{width}}  distance    share     weight  "]
     lines += [
-        f"{clip.source:{wide}}  {clip.distance:8.3f}  {_percent(clip.share)}   "
+        f"{clip.source:{width}}  {clip.distance:8.3f}  {_percent(clip.share)}   "
         f"{_percent(clip.weight)}  "
         f"{_clip_line(clip)}"
         for clip in reasons.nearest
     ]
-    remainder = f"{reasons.others} others"
+    others = f"{reasons.others} others"
     shares = f"{_percent(reasons.others_share)}   {_percent(reasons.others_weight)}"
-    lines.append(f"{remainder:{wide}}  {'':8}  {shares}")
+    lines.append(f"{others:{width}}  {'':8}  {shares}")
     lines.append(_support_line(reasons.backing))
     return "\n".join(line.rstrip() for line in lines)
 

@@ -48,18 +48,18 @@ class BonePlaces:
 class SkinnedMesh:
     """P points, with normals, faces and weights, about a skeleton of J joints and E tips at rest.
 
-    points (P, 3): m. normals (P, 3): unit, outward. places: along bones; place (P,): the one that
-    each point moves with where bones are longer or shorter. joints, weights (P, I): the joints that
-    move each point, and their weights out of FULL_WEIGHT; points with fewer of them have zeros.
-    counts: corners of each face; corners: their points, counterclockwise from outside. tints (P,):
-    index of the point's colour. coarse (T, 3): fewer triangles
-    on the same points, for characters seen from afar.
+    points (P, 3): m. normals (P, 3): unit, outward. bone_places: along bones; place_of_point (P,):
+    the one that each point moves with where bones are longer or shorter. joints, weights (P, I):
+    the joints that move each point, and their weights out of FULL_WEIGHT; points with fewer of them
+    have zeros. counts: corners of each face; corners: their points, counterclockwise from outside.
+    tints (P,): index of the point's colour. coarse (T, 3): fewer triangles on the same points, for
+    characters seen from afar.
     """
 
     points: Singles
     normals: Singles
-    places: BonePlaces
-    place: Integers
+    bone_places: BonePlaces
+    place_of_point: Integers
     joints: Integers
     weights: Bytes
     counts: Integers
@@ -69,15 +69,15 @@ class SkinnedMesh:
 
     def points_at(self, displaced: Floats) -> Singles:
         """Return the points (M, P, 3), m, for places that move by (M, R, 3), m."""
-        points = displaced.astype(np.float32).take(self.place, axis=1)
+        points = displaced.astype(np.float32).take(self.place_of_point, axis=1)
         points += self.points
         return points
 
 
 def below_root(mesh: SkinnedMesh) -> SkinnedMesh:
     """Return the mesh for a skeleton with another joint before all others."""
-    bone_places = replace(mesh.places, anchors=mesh.places.anchors + 1)
-    return replace(mesh, places=bone_places, joints=mesh.joints + 1)
+    bone_places = replace(mesh.bone_places, anchors=mesh.bone_places.anchors + 1)
+    return replace(mesh, bone_places=bone_places, joints=mesh.joints + 1)
 
 
 def colours(mesh: SkinnedMesh) -> Singles:
@@ -97,9 +97,9 @@ def distinct_places(anchors: Integers, shares: Floats) -> tuple[BonePlaces, Inte
 def triangles(counts: Integers, corners: Integers) -> Integers:
     """Return the corners (T, 3) of faces cut into triangle fans."""
     cut = counts - 2
-    owner = np.repeat(np.arange(len(cut)), cut)
-    first = (np.cumsum(counts) - counts)[owner]
-    turn = np.arange(len(owner)) - (np.cumsum(cut) - cut)[owner]
+    face = np.repeat(np.arange(len(cut)), cut)
+    first = (np.cumsum(counts) - counts)[face]
+    turn = np.arange(len(face)) - (np.cumsum(cut) - cut)[face]
     return corners[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)]
 
 
@@ -107,12 +107,12 @@ def vertex_normals(points: Floats, faces: Integers) -> Singles:
     """Return unit normals (P, 3): the mean of the triangles (T, 3) at a point, by their areas."""
     a, b, c = (points[faces[:, corner]] for corner in range(3))
     areas = np.cross(b - a, c - a)
-    summed = np.zeros_like(points)
+    normals = np.zeros_like(points)
     for corner in range(3):
-        np.add.at(summed, faces[:, corner], areas)
-    lengths = np.linalg.norm(summed, axis=-1, keepdims=True)
+        np.add.at(normals, faces[:, corner], areas)
+    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
     up = np.array([0.0, 1.0, 0.0])
-    return np.where(lengths > 0, summed / np.where(lengths > 0, lengths, 1.0), up).astype(
+    return np.where(lengths > 0, normals / np.where(lengths > 0, lengths, 1.0), up).astype(
         np.float32
     )
 
@@ -128,16 +128,16 @@ class BodyBounds:
     spheres about the ends of bones, whose radius is the largest such mean of the points near to
     each.
 
-    joints, ends (K,): the joint, and where the bone that is near leads; the joint itself where none
-    is nearer. places (K,): the place among those of the body that the points of a group follow.
-    lowest, highest (K,): shares of the way along the bone between which the points lie. rest (K,):
-    largest mean distance of the points from their bones at rest, m.
+    joints, bone_ends (K,): the joint, and where the bone that is near leads; the joint itself where
+    none is nearer. place_of_group (K,): the place among those of the body that the points of a
+    group follow. lowest, highest (K,): shares of the way along the bone between which the points
+    lie. rest (K,): largest mean distance of the points from their bones at rest, m.
     """
 
     skeleton: Skeleton
     joints: Indices
-    ends: Indices
-    places: Indices
+    bone_ends: Indices
+    place_of_group: Indices
     lowest: Floats
     highest: Floats
     rest: Floats
@@ -155,9 +155,9 @@ class BodyBounds:
         (M, R, 3), m. A point and the place on the bone next to it move by different displacements,
         which are linear in the share along the bone; so the largest difference is at one end.
         """
-        start, end = displaced.take(self.joints, axis=1), displaced.take(self.ends, axis=1)
+        start, end = displaced.take(self.joints, axis=1), displaced.take(self.bone_ends, axis=1)
         end -= start
-        start -= along.take(self.places, axis=1)
+        start -= along.take(self.place_of_group, axis=1)
         low, high = (start + share[:, None] * end for share in (self.lowest, self.highest))
         return self._spheres(np.maximum(_lengths(low), _lengths(high)))
 
@@ -165,8 +165,8 @@ class BodyBounds:
         """Return the radii (M, J + E), m, where bone offsets (M, J, 3) move a body made at rest."""
         tips = np.zeros((len(offsets), len(self.skeleton.tip_joints), 3))
         longer = np.concatenate([offsets - self.skeleton.offsets, tips], axis=1)
-        arms = longer.take(self.ends, axis=1)
-        arms[:, self.ends == self.joints] = 0.0
+        arms = longer.take(self.bone_ends, axis=1)
+        arms[:, self.bone_ends == self.joints] = 0.0
         return self._spheres(self.highest * _lengths(arms))
 
     @cached_property
@@ -176,7 +176,7 @@ class BodyBounds:
         With the points (P,), and the place in that order of each one's first group (P,).
         """
         groups = []
-        for indices in (self.joints, self.ends):
+        for indices in (self.joints, self.bone_ends):
             order = np.argsort(indices, kind="stable")
             groups.append((order, *np.unique(indices[order], return_index=True)))
         return groups
@@ -207,15 +207,15 @@ def body_bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
         return BodyBounds(skeleton, none, none, none, share, share, share)
     points, influences = np.nonzero(body.weights)
     joints = body.joints[points, influences].astype(np.intp)
-    tips, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
+    tips, shares, distances = _nearest_bones(skeleton, body.points[points].astype(float), joints)
     means = np.zeros(len(body.points))
-    np.add.at(means, points, far * body.weights[points, influences] / FULL_WEIGHT)
-    far = means[points]
-    keys = np.stack([joints, tips, body.place[points]])
+    np.add.at(means, points, distances * body.weights[points, influences] / FULL_WEIGHT)
+    distances = means[points]
+    keys = np.stack([joints, tips, body.place_of_point[points]])
     order = np.lexsort(keys)
-    keys, shares, far = keys[:, order], shares[order], far[order]
-    new = np.concatenate([[True], np.any(np.diff(keys) != 0, axis=0)])
-    firsts = np.flatnonzero(new)
+    keys, shares, distances = keys[:, order], shares[order], distances[order]
+    is_first = np.concatenate([[True], np.any(np.diff(keys) != 0, axis=0)])
+    firsts = np.flatnonzero(is_first)
     joints, tips, groups = keys[:, firsts]
     return BodyBounds(
         skeleton,
@@ -224,7 +224,7 @@ def body_bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
         groups,
         np.minimum.reduceat(shares, firsts),
         np.maximum.reduceat(shares, firsts),
-        np.maximum.reduceat(far, firsts),
+        np.maximum.reduceat(distances, firsts),
     )
 
 
@@ -237,7 +237,7 @@ def _nearest_bones(
     """
     local = points - skeleton.at_rest(skeleton.offsets)[joints]
     tips, shares = joints.copy(), np.zeros(len(joints))
-    far = np.linalg.norm(local, axis=-1)
+    distances = np.linalg.norm(local, axis=-1)
     arms = np.concatenate([skeleton.offsets, skeleton.tip_offsets])
     above = (*skeleton.parents, *skeleton.tip_joints)
     for end, (arm, joint) in enumerate(zip(arms, above, strict=True)):
@@ -246,11 +246,11 @@ def _nearest_bones(
             continue
         of_joint = np.flatnonzero(joints == joint)
         share = np.clip(local[of_joint] @ arm / square, 0.0, 1.0)
-        off = np.linalg.norm(local[of_joint] - share[:, None] * arm, axis=-1)
-        nearer = off < far[of_joint]
+        to_bone = np.linalg.norm(local[of_joint] - share[:, None] * arm, axis=-1)
+        nearer = to_bone < distances[of_joint]
         tips[of_joint[nearer]], shares[of_joint[nearer]] = end, share[nearer]
-        far[of_joint[nearer]] = off[nearer]
-    return tips, shares, far
+        distances[of_joint[nearer]] = to_bone[nearer]
+    return tips, shares, distances
 
 
 # A box has an apex near the joint it turns with, two square rings, and an apex near the other

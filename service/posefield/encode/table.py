@@ -101,8 +101,12 @@ _MSGPACK = msgspec.msgpack.Encoder()
 
 def _msgpack_array(values: Column) -> dict[str, Any]:
     contiguous = np.ascontiguousarray(values)
-    plain = contiguous.astype(contiguous.dtype.newbyteorder("<"), copy=False)
-    return {"dtype": plain.dtype.str, "shape": list(contiguous.shape), "data": plain.tobytes()}
+    little_endian = contiguous.astype(contiguous.dtype.newbyteorder("<"), copy=False)
+    return {
+        "dtype": little_endian.dtype.str,
+        "shape": list(contiguous.shape),
+        "data": little_endian.tobytes(),
+    }
 
 
 # The earliest time of the zip format, so that the bytes depend on the arrays alone.

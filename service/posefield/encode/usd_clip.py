@@ -47,12 +47,12 @@ def _grouped_by_rig(
 ) -> Iterator[tuple[CharacterRig, list[SampledClip]]]:
     """Yield consecutive results of one skeleton, at most FRAMES_AT_ONCE frames at a time."""
     _keep_freed_memory()
-    for _, some in groupby(
+    for _, clips_of_skeleton in groupby(
         answers, lambda clip_answer: (id(clip_answer.clip.skeleton), clip_answer.clip.root_bone)
     ):
         group: list[SampledClip] = []
         frames = 0
-        for answer in some:
+        for answer in clips_of_skeleton:
             frames += len(answer.clip)
             if group and frames > FRAMES_AT_ONCE:
                 yield _rig(group[0].clip, convention), group

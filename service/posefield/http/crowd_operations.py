@@ -274,7 +274,7 @@ async def answer_crowd(request: ServiceRequest) -> Response:
     encoder, card = CROWD_ENCODERS[request.format], request.model.session.card
     body = await read_body(request, settings.crowd_body_limit, service.bodies)
     fitting = max_poses(settings.output_limit, len(card.skeleton), encoder, len(card.curves))
-    largest = min(settings.crowd_limit, encoder.most, fitting)
+    largest = min(settings.crowd_limit, encoder.max_characters, fitting)
 
     def work() -> bytes:
         question = of_body(body, largest)

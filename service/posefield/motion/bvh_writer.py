@@ -184,9 +184,9 @@ def unwrap_euler(
     same, other = (_squared_wrapped(both[1:] - angles[:-1]) for both in (angles, mirrored))
     crossed = np.zeros(angles.shape[:-1], bool)
     crossed[1:] = other < same
-    chosen = np.where(np.cumsum(crossed, axis=0)[..., None] % 2, mirrored, angles)
-    turns = np.round(np.diff(chosen, axis=0, prepend=chosen[:1]) / (2.0 * np.pi))
-    return chosen - 2.0 * np.pi * np.cumsum(turns, axis=0)
+    unwrapped = np.where(np.cumsum(crossed, axis=0)[..., None] % 2, mirrored, angles)
+    turns = np.round(np.diff(unwrapped, axis=0, prepend=unwrapped[:1]) / (2.0 * np.pi))
+    return unwrapped - 2.0 * np.pi * np.cumsum(turns, axis=0)
 
 
 def _squared_wrapped(differences: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:

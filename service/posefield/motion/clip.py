@@ -104,9 +104,9 @@ class Placement:
     def __len__(self) -> int:
         return len(self.headings)
 
-    def select(self, some: Annotated[Indices, "chosen"]) -> "Placement":
+    def select(self, indices: Annotated[Indices, "chosen"]) -> "Placement":
         """Return the placement of the characters of some indices (M,)."""
-        return Placement(self.positions[some], self.headings[some])
+        return Placement(self.positions[indices], self.headings[indices])
 
     @property
     def turns(self) -> Annotated[Floats, "characters 4"]:

@@ -163,8 +163,8 @@ def describe(measure: Measure, names: Sequence[str]) -> str:
     joints = " and ".join(names[joint] for joint in measure.joints)
     of = f" of {joints}" if joints else ""
     at = f" at {measure.at}" if measure.at else ""
-    when = "" if measure.share is None else f" ({measure.share:.0%})"
-    return f"{measure.quantity.replace('_', ' ')}{of}{at}{when}"
+    share = "" if measure.share is None else f" ({measure.share:.0%})"
+    return f"{measure.quantity.replace('_', ' ')}{of}{at}{share}"
 
 
 def to_dict(measure: Measure) -> dict[str, Any]:

@@ -293,21 +293,21 @@ def descendant_matrix(parents: tuple[int, ...]) -> Annotated[Floats, "joints joi
 def add_travel(
     rotations: Annotated[Floats, "*poses joints 4"],
     roots: Annotated[Floats, "*poses 3"],
-    gone: Annotated[Floats, "*poses 3"],
+    travel: Annotated[Floats, "*poses 3"],
 ) -> tuple[Annotated[Floats, "*poses joints 4"], Annotated[Floats, "*poses 3"]]:
     """Return rotations (..., J, 4) and root positions (..., 3), m, moved by a travel (..., 3).
 
-    gone: travel to the left and ahead, m, and change of heading, rad.
+    travel: to the left and ahead, m, and change of heading, rad.
     """
     turned = rotations.copy()
-    turned[..., 0, :] = quat.mul(quat.from_axis_angle(UP, gone[..., 2]), rotations[..., 0, :])
-    return turned, moved_roots(roots, gone)
+    turned[..., 0, :] = quat.mul(quat.from_axis_angle(UP, travel[..., 2]), rotations[..., 0, :])
+    return turned, moved_roots(roots, travel)
 
 
 def moved_roots(
-    roots: Annotated[Floats, "*poses 3"], gone: Annotated[Floats, "*poses 3"]
+    roots: Annotated[Floats, "*poses 3"], travel: Annotated[Floats, "*poses 3"]
 ) -> Annotated[Floats, "*poses 3"]:
-    """Return root positions (..., 3), m, moved by the travel over the floor in (..., 3)."""
+    """Return root positions (..., 3), m, moved by a travel over the floor in (..., 3)."""
     paths = roots.copy()
-    paths[..., [0, 2]] += gone[..., :2]
+    paths[..., [0, 2]] += travel[..., :2]
     return paths

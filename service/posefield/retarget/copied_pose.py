@@ -133,27 +133,29 @@ def align_rests(source: Body, rig: Body, soles: Soles) -> dict[str, Floats]:
     """
     heading = quat.from_axis_angle(UP, np.array(source.facing - rig.facing))
     turns = {role: heading for role in rig.joints if role in source.joints}
-    for side, (theirs, ours) in zip(SIDES, soles, strict=True):
+    for side, (source_sole, rig_sole) in zip(SIDES, soles, strict=True):
         for upper, lower in BONES:
             bone = (side + upper, side + lower)
             if {*bone} <= turns.keys():
-                old = quat.rotate(heading, rig.direction(*bone))
-                turns[bone[0]] = quat.mul(shortest_turn(old, source.direction(*bone)), heading)
-        turns[side + "Foot"] = _foot_turn(theirs, ours, heading)
+                rig_direction = quat.rotate(heading, rig.direction(*bone))
+                turns[bone[0]] = quat.mul(
+                    shortest_turn(rig_direction, source.direction(*bone)), heading
+                )
+        turns[side + "Foot"] = _foot_turn(source_sole, rig_sole, heading)
         for end, before in FOLLOWERS.items():
             if {side + end, side + before} <= turns.keys():
                 turns[side + end] = turns[side + before]
     return turns
 
 
-def _foot_turn(theirs: Sole, ours: Sole, heading: Floats) -> Floats:
+def _foot_turn(source_sole: Sole, rig_sole: Sole, heading: Floats) -> Floats:
     """Return the rotation (4,) of a foot that is flat where the motion's is, and points alike."""
-    old, new = quat.rotate(heading, ours.toes), theirs.flat_toes
-    if min(np.hypot(old[0], old[2]), np.hypot(new[0], new[2])) < SHORTEST:
+    rig_toes, source_toes = quat.rotate(heading, rig_sole.toes), source_sole.flat_toes
+    if min(np.hypot(rig_toes[0], rig_toes[2]), np.hypot(source_toes[0], source_toes[2])) < SHORTEST:
         return heading
-    angle = np.arctan2(new[0], new[2]) - np.arctan2(old[0], old[2])
+    angle = np.arctan2(source_toes[0], source_toes[2]) - np.arctan2(rig_toes[0], rig_toes[2])
     turned = quat.mul(quat.from_axis_angle(UP, np.array(angle)), heading)
-    return quat.mul(quat.conj(theirs.flattening), turned)
+    return quat.mul(quat.conj(source_sole.flattening), turned)
 
 
 def copy_orientations(
@@ -173,10 +175,10 @@ def copy_orientations(
     }
     aligned_joints = {rig.joints[role]: turn for role, turn in aligned.items()}
     heading = aligned["hips"]
-    for mine, theirs in ((rig.spine, source.spine), (rig.neck, source.neck)):
-        if mine.joints and theirs.joints:
-            for joint, share in zip(mine.joints, mine.places.tolist(), strict=True):
-                world[joint] = quat.mul(_along(theirs, turns, share), heading)
+    for rig_chain, source_chain in ((rig.spine, source.spine), (rig.neck, source.neck)):
+        if rig_chain.joints and source_chain.joints:
+            for joint, share in zip(rig_chain.joints, rig_chain.shares.tolist(), strict=True):
+                world[joint] = quat.mul(_along(source_chain, turns, share), heading)
     for joint, namesake in _namesakes(source, rig, set(world)).items():
         chain = joint_chain(rig.parents, joint)[-2::-1]
         above = next((turn for turn in chain if turn in aligned_joints), None)
@@ -198,9 +200,9 @@ def _namesakes(source: Body, rig: Body, mapped: set[int]) -> dict[int, int]:
 
 def _along(chain: Chain, turns: Annotated[Floats, "frames _ 4"], share_of_chain: float) -> Floats:
     """Return the orientation (F, 4) at a place, 0 to 1, of a chain."""
-    after = min(int(np.searchsorted(chain.places, share_of_chain - 1e-9)), len(chain.joints) - 1)
+    after = min(int(np.searchsorted(chain.shares, share_of_chain - 1e-9)), len(chain.joints) - 1)
     before = max(after - 1, 0)
-    first, last = chain.places[before], chain.places[after]
+    first, last = chain.shares[before], chain.shares[after]
     if last - share_of_chain < 1e-9 or last <= first:
         return turns[:, chain.joints[after]]
     share = np.array((share_of_chain - first) / (last - first))

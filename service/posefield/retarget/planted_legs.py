@@ -298,9 +298,11 @@ def _pelvis_height(
         np.convolve(np.pad(values, half), kernel, mode="valid")
         for values in ((offsets * standing).sum(axis=1), weights)
     )
-    near = np.flatnonzero(totals > 0.0)
+    near_stances = np.flatnonzero(totals > 0.0)
     # Far from all stances those before and after count.
-    return np.asarray(np.interp(np.arange(len(offsets)), near, sums[near] / totals[near]))
+    return np.asarray(
+        np.interp(np.arange(len(offsets)), near_stances, sums[near_stances] / totals[near_stances])
+    )
 
 
 def sole_depths(

@@ -145,9 +145,9 @@ def meet_goals(rig: PosedBody, goals: Sequence[HandGoal], rate: float) -> PosedB
             continue
         hand, shift = rig.of_role(role), np.zeros(rig.roots.shape)
         for goal in goals_of_role:
-            there = np.clip(times, goal.time, goal.end)
-            offset = np.asarray(goal.position) - _at(hand + shift, there * rate)
-            shift += _shares(times - there, goal, goals_of_role)[:, None] * offset
+            goal_times = np.clip(times, goal.time, goal.end)
+            offset = np.asarray(goal.position) - _at(hand + shift, goal_times * rate)
+            shift += _shares(times - goal_times, goal, goals_of_role)[:, None] * offset
         limb, poses = rig.limb(roles)
         planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + shift)
     return role_map.posed(rig.body, rotations, rig.roots)
@@ -297,17 +297,18 @@ def _ground(
     from its ankles to the soles below, m. scale: length of the rig's legs over the motion's.
     """
     heights, standing = planted_legs.standing_heights(feet, body), feet.standing
-    ours = [copied_pose.sole_at_rest(body, side) for side in SIDES]
-    theirs = [
-        copied_pose.sole_of_motion(motion, side, standing[:, foot], ours[foot])
+    rig_soles = [copied_pose.sole_at_rest(body, side) for side in SIDES]
+    source_soles = [
+        copied_pose.sole_of_motion(motion, side, standing[:, foot], rig_soles[foot])
         for foot, side in enumerate(SIDES)
     ]
-    left, right = zip(theirs, ours, strict=True)
+    left, right = zip(source_soles, rig_soles, strict=True)
     drops = [(scale * before.flat_toes - after.toes) @ UP for before, after in (left, right)]
     on_toes = feet.roles[0].endswith("Toes")
     higher = float(np.mean(heights - feet.heights) + on_toes * np.mean(drops))
     heels = [
-        (on_toes * sole.toes @ UP - height) * UP for sole, height in zip(ours, heights, strict=True)
+        (on_toes * sole.toes @ UP - height) * UP
+        for sole, height in zip(rig_soles, heights, strict=True)
     ]
     return (left, right), higher, (heights, np.stack(heels))
 

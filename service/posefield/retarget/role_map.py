@@ -105,20 +105,20 @@ class Body:
 
 @dataclass(frozen=True)
 class Chain:
-    """Joints one below the other. places (n,): of each along the chain, 0 to 1."""
+    """Joints one below the other. shares (n,): of the chain at each, 0 to 1."""
 
     joints: tuple[int, ...]
-    places: Annotated[Floats, "chain"]
+    shares: Annotated[Floats, "chain"]
 
 
 def _places(bones: Bones, joints: tuple[int, ...]) -> Annotated[Floats, "chain"]:
     """Return the places (n,) of joints along their chain by length; 1 for a single one."""
     if len(joints) < 2:
         return np.ones(len(joints))
-    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(bones[list(joints[1:])], axis=-1))])
-    if gone[-1] < 1e-6:
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(bones[list(joints[1:])], axis=-1))])
+    if lengths[-1] < 1e-6:
         return np.linspace(0.0, 1.0, len(joints))
-    return gone / gone[-1]
+    return lengths / lengths[-1]
 
 
 def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -> Body:

@@ -34,7 +34,7 @@ IGNORED_EXTENSIONS = (
 MAX_DEPTH = 2000
 """Limit of nodes in one another, of which bones are at most half."""
 
-Beside = Callable[[str], bytes]
+ReadNeighbour = Callable[[str], bytes]
 """Function that returns the content of a file beside the document; MotionError if there is none."""
 
 
@@ -42,13 +42,13 @@ Beside = Callable[[str], bytes]
 class GltfDocument:
     """A document.
 
-    source: the file's name. beside: other files. unread: required extensions that may change the
-    parts of the document that have them.
+    source: the file's name. gltf: as pygltflib has it. read_neighbour: reads other files. unread:
+    required extensions that may change the parts of the document that have them.
     """
 
     source: str
-    parts: Any
-    beside: Beside
+    gltf: Any
+    read_neighbour: ReadNeighbour
     unread: frozenset[str]
 
     def error(self, message: str) -> MotionFileError:
@@ -57,8 +57,8 @@ class GltfDocument:
 
     def expect_plain(self, name: str, *objects: Any) -> None:
         """Raise MotionFileError if a required extension may change parts that are needed."""
-        for item in objects:
-            for extension in sorted(self.unread & (item.extensions or {}).keys()):
+        for element in objects:
+            for extension in sorted(self.unread & (element.extensions or {}).keys()):
                 raise self.error(
                     f"{name} requires the extension {extension}, which may change the skeleton or "
                     "its animation: export without it"
@@ -68,8 +68,8 @@ class GltfDocument:
     def above(self) -> dict[int, int]:
         """Return the parent of each node that has one; MotionFileError unless they are trees."""
         parents: dict[int, int] = {}
-        count = len(self.parts.nodes)
-        for parent, node in enumerate(self.parts.nodes):
+        count = len(self.gltf.nodes)
+        for parent, node in enumerate(self.gltf.nodes):
             for child in node.children or ():
                 if child in parents or not 0 <= child < count:
                     raise self.error(f"node {child} is no child of one node, expected a tree")
@@ -100,27 +100,27 @@ class GltfDocument:
         while pending:
             node = pending.pop()
             nodes.append(node)
-            pending += reversed(self.parts.nodes[node].children or [])
+            pending += reversed(self.gltf.nodes[node].children or [])
         return nodes
 
     def common_ancestor(self, nodes: Iterable[int]) -> int | None:
         """Return the last node that is each of the nodes or an ancestor of it, if there is one."""
         shared: list[int] | None = None
         for path in map(self.ancestors, nodes):
-            among = set(path)
-            shared = path if shared is None else [node for node in shared if node in among]
+            ancestors = set(path)
+            shared = path if shared is None else [node for node in shared if node in ancestors]
         return shared[0] if shared else None
 
     def node_name(self, node: int) -> str:
         """Return the name of a node for messages."""
-        return str(self.parts.nodes[node].name or node)
+        return str(self.gltf.nodes[node].name or node)
 
     def buffer(self, index: int) -> bytes:
         """Return the bytes of a buffer; MotionFileError if they are missing or too few."""
-        buffer = self.parts.buffers[index]
+        buffer = self.gltf.buffers[index]
         if buffer.uri is None and index > 0:
             raise self.error(f"buffer {index} has no content, expected a URI: export uncompressed")
-        content = self.parts.binary_blob() if buffer.uri is None else self._resource(buffer.uri)
+        content = self.gltf.binary_blob() if buffer.uri is None else self._resource(buffer.uri)
         content = content or b""
         if len(content) < buffer.byteLength:
             raise self.error(
@@ -131,13 +131,13 @@ class GltfDocument:
 
     def _resource(self, uri: str) -> bytes:
         if not uri.startswith("data:"):
-            return self.beside(urllib.parse.unquote(uri))
-        with urllib.request.urlopen(uri) as data:
-            content: bytes = data.read()
+            return self.read_neighbour(urllib.parse.unquote(uri))
+        with urllib.request.urlopen(uri) as response:
+            content: bytes = response.read()
             return content
 
 
-def load(content: bytes, source: str, neighbour: Beside) -> GltfDocument:
+def load(content: bytes, source: str, read_neighbour: ReadNeighbour) -> GltfDocument:
     """Return the document of a .glb or .gltf file.
 
     Raises MotionFileError for a broken container, and for JSON that is no glTF 2.0.
@@ -157,7 +157,7 @@ def load(content: bytes, source: str, neighbour: Beside) -> GltfDocument:
         raise MotionFileError(source, f"found version {version!r} of glTF, expected 2.0")
     required = map(str, document.extensionsRequired or ())
     unread = frozenset(name for name in required if not name.startswith(IGNORED_EXTENSIONS))
-    return GltfDocument(source, document, neighbour, unread)
+    return GltfDocument(source, document, read_neighbour, unread)
 
 
 COMPONENTS: dict[int, npt.DTypeLike] = {
@@ -180,7 +180,7 @@ def numbers(document: GltfDocument, index: int, kind: str) -> Floats:
     kind: its type, such as "VEC3". Raises MotionFileError for another type, for values outside
     their buffer, and for numbers that are not finite.
     """
-    accessor = _item(document, document.parts.accessors, index, "accessor")
+    accessor = _item(document, document.gltf.accessors, index, "accessor")
     document.expect_plain(f"accessor {index}", accessor)
     if accessor.type != kind or accessor.componentType not in COMPONENTS:
         raise document.error(
@@ -205,20 +205,20 @@ def numbers(document: GltfDocument, index: int, kind: str) -> Floats:
     return values
 
 
-def _item(document: GltfDocument, items: Any, index: int, what: str) -> Any:
+def _item(document: GltfDocument, elements: Any, index: int, name: str) -> Any:
     """Return an item of a list; MotionFileError if the list is shorter."""
-    if not isinstance(index, int) or not 0 <= index < len(items):
-        raise document.error(f"names {what} {index}, but has {len(items)}")
-    return items[index]
+    if not isinstance(index, int) or not 0 <= index < len(elements):
+        raise document.error(f"names {name} {index}, but has {len(elements)}")
+    return elements[index]
 
 
 def _view(
     document: GltfDocument, index: int, offset: int, dtype: np.dtype[Any], shape: tuple[int, int]
 ) -> npt.NDArray[Any]:
     """Return (count, width) numbers from a place in a buffer view."""
-    view = _item(document, document.parts.bufferViews, index, "buffer view")
-    _item(document, document.parts.buffers, view.buffer, "buffer")
-    document.expect_plain(f"buffer view {index}", view, document.parts.buffers[view.buffer])
+    view = _item(document, document.gltf.bufferViews, index, "buffer view")
+    _item(document, document.gltf.buffers, view.buffer, "buffer")
+    document.expect_plain(f"buffer view {index}", view, document.gltf.buffers[view.buffer])
     content = document.buffer(view.buffer)
     count, width = shape
     size = width * dtype.itemsize
@@ -240,8 +240,10 @@ def _with_sparse(
     if sparse.indices.componentType not in (5121, 5123, 5125):
         raise document.error(f"accessor {index} has indices of {sparse.indices.componentType}")
     kind = np.dtype(COMPONENTS[sparse.indices.componentType]).newbyteorder("<")
-    where = sparse.indices
-    rows = _view(document, where.bufferView, where.byteOffset or 0, kind, (sparse.count, 1))[:, 0]
+    indices = sparse.indices
+    rows = _view(document, indices.bufferView, indices.byteOffset or 0, kind, (sparse.count, 1))[
+        :, 0
+    ]
     shape = (sparse.count, raw.shape[1])
     sparse_values = sparse.values
     values = _view(
@@ -279,9 +281,9 @@ class GltfJoints:
 
 def node_transform(document: GltfDocument, index: int) -> Transform:
     """Return the transform of a node; MotionFileError for a matrix that skews or mirrors."""
-    node = document.parts.nodes[index]
-    stated = (node.matrix, node.rotation, node.translation, node.scale)
-    if not np.all(np.isfinite([number for numbers in stated for number in numbers or ()])):
+    node = document.gltf.nodes[index]
+    fields = (node.matrix, node.rotation, node.translation, node.scale)
+    if not np.all(np.isfinite([number for numbers in fields for number in numbers or ()])):
         raise document.error(f"node {index} has numbers that are not finite")
     if node.matrix is not None and list(node.matrix) != np.eye(4).ravel().tolist():
         return rest_joints.of_matrix(np.array(node.matrix, float).reshape(4, 4), f"node {index}")
@@ -297,22 +299,22 @@ def node_transform(document: GltfDocument, index: int) -> Transform:
 def joints_of(
     document: GltfDocument, order: Sequence[int], alternatives: Sequence[Sequence[int]] = ()
 ) -> GltfJoints:
-    """Return nodes, parents first, as joints. others: skeletons that are left out."""
+    """Return nodes, parents first, as joints. alternatives: skeletons that are left out."""
     if len(order) > MAX_JOINTS:
         raise document.error(f"found {len(order)} joints, expected at most {MAX_JOINTS}")
     tree, notes = joint_tree(document, order), list[str]()
     if alternatives:
-        listed = ", ".join(document.node_name(other[0]) for other in alternatives)
-        notes.append(f"skeleton {tree.label} was read: {listed} left out")
-    unnamed = len({*tree.names} - {document.parts.nodes[node].name for node in order})
+        names = ", ".join(document.node_name(other[0]) for other in alternatives)
+        notes.append(f"skeleton {tree.label} was read: {names} left out")
+    unnamed = len({*tree.names} - {document.gltf.nodes[node].name for node in order})
     if unnamed:
         notes.append(f"{unnamed} joints without a name of their own were named after their nodes")
     outer = tuple(document.ancestors(order[0])[:0:-1])
     for node in (*outer, *order):
-        document.expect_plain(f"node {document.node_name(node)}", document.parts.nodes[node])
+        document.expect_plain(f"node {document.node_name(node)}", document.gltf.nodes[node])
     if document.unread:
-        listed = ", ".join(sorted(document.unread))
-        notes.append(f"the required {listed} was not read: no joint and no animation has it")
+        names = ", ".join(sorted(document.unread))
+        notes.append(f"the required {names} was not read: no joint and no animation has it")
     local = rest_joints.stacked([node_transform(document, node) for node in order])
     bind = _bind_pose(document, {node: joint for joint, node in enumerate(order)})
     rest = rest_joints.bound_rest(local, tree.parents, outer_transform(document, outer), bind)
@@ -330,17 +332,17 @@ def outer_transform(document: GltfDocument, outer: Sequence[int]) -> Transform:
 def skeletons(document: GltfDocument) -> list[list[int]]:
     """Return the joints, parents first, of the skeletons of skins, with the nodes between them."""
     groups: list[set[int]] = []
-    if len(document.parts.skins) > MAX_JOINTS:
-        raise document.error(f"found {len(document.parts.skins)} skins, expected {MAX_JOINTS}")
-    for skin in document.parts.skins:
+    if len(document.gltf.skins) > MAX_JOINTS:
+        raise document.error(f"found {len(document.gltf.skins)} skins, expected {MAX_JOINTS}")
+    for skin in document.gltf.skins:
         joints = set(skin.joints or ())
-        if not 0 < len(joints) <= MAX_JOINTS or not joints <= set(range(len(document.parts.nodes))):
+        if not 0 < len(joints) <= MAX_JOINTS or not joints <= set(range(len(document.gltf.nodes))):
             raise document.error(
                 f"found a skin of {len(joints)} joints, expected 1 to {MAX_JOINTS} of its nodes"
             )
         tree = _between(document, joints)
-        joined = [group for group in groups if group & tree]
-        groups = [group for group in groups if not group & tree] + [tree.union(*joined)]
+        overlapping = [group for group in groups if group & tree]
+        groups = [group for group in groups if not group & tree] + [tree.union(*overlapping)]
     trees = [_between(document, group) for group in groups]
     roots = [[node for node in tree if document.above.get(node) not in tree] for tree in trees]
     if any(len(root_nodes) > 1 for root_nodes in roots):
@@ -356,7 +358,7 @@ def joint_tree(document: GltfDocument, order: Sequence[int]) -> JointTree:
     joint_of_node = {node: joint for joint, node in enumerate(order)}
     names: dict[str, int] = {}
     for node in order:
-        name = document.parts.nodes[node].name
+        name = document.gltf.nodes[node].name
         names.setdefault(f"{name or 'joint'}_{node}" if not name or name in names else name, node)
     if len(names) < len(order):
         raise document.error("found joints of one name, expected a name for each")
@@ -381,7 +383,7 @@ def _bind_pose(document: GltfDocument, joints: Mapping[int, int]) -> dict[int, T
     joints: by node.
     """
     binds: dict[int, Transform] = {}
-    for skin in document.parts.skins:
+    for skin in document.gltf.skins:
         if skin.inverseBindMatrices is None or not joints.keys() & skin.joints:
             continue
         document.expect_plain("the skin", skin)
@@ -400,11 +402,11 @@ def read(
 ) -> tuple[RestJoints, tuple[str, ...], tuple[str, ...]]:
     """Return the joints of the skin of a .glb or .gltf file, their nodes, and notes.
 
-    source: name of the file in messages. named: joints of the skeleton that is meant. Raises
+    source: name of the file in messages. joint_names: of the skeleton that is meant. Raises
     MotionFileError for a file without a skin, and with several skeletons.
     """
 
-    def beside(name: str) -> bytes:
+    def read_neighbour(name: str) -> bytes:
         # A backslash or a drive leads out of the folder on Windows.
         inner = PureWindowsPath(name)
         if not inner.parts or inner.anchor or ".." in inner.parts:
@@ -414,8 +416,8 @@ def read(
         except OSError as fault:
             raise MotionFileError(source, f"no buffer {name!r}: {fault.strerror}") from fault
 
-    document = load(path.read_bytes(), source, beside)
-    if not document.parts.skins:
+    document = load(path.read_bytes(), source, read_neighbour)
+    if not document.gltf.skins:
         raise document.error("found no skin, expected a character whose mesh is bound to joints")
     groups = skeletons(document)
     trees = [joint_tree(document, group) for group in groups]

@@ -208,8 +208,8 @@ def _constant_scales(
             f"joint {joints.names[joint]!r} has scales from {low:.4g} to {high:.4g}, expected one "
             "positive scale along all axes in all frames: bake the scale into the bones",
         )
-    listed = ", ".join(joints.names[joint] for joint in np.flatnonzero(odd)[:10])
-    notes = (f"the scale of {listed} left out: no joint follows it",) if listed else ()
+    names = ", ".join(joints.names[joint] for joint in np.flatnonzero(odd)[:10])
+    notes = (f"the scale of {names} left out: no joint follows it",) if names else ()
     # Scales of 1 in half precision, or of rounded matrices, are 1.
     return np.where(odd | (np.abs(uniform - 1.0) <= SCALE_TOLERANCE), 1.0, uniform), notes
 

@@ -108,11 +108,11 @@ def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequenc
     """Raise MotionFileError for needed roles that are missing, and roles of limbs not sure."""
     missing = [role for role in NEEDED if role not in guesses]
     if missing:
-        listed = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
+        shown_names = ", ".join(names[:SHOWN]) + (", ..." if len(names) > SHOWN else "")
         raise MotionFileError(
             source,
-            f"found no joint for {', '.join(missing)} among {listed}; expected hips and two legs: "
-            f"{HOW}",
+            f"found no joint for {', '.join(missing)} among {shown_names}; "
+            f"expected hips and two legs: {HOW}",
         )
     limbs = {role for chain in CHAINS for role in chain[:3]} | {"hips"}
     unsure = {role: guess for role, guess in guesses.items() if role in limbs and not guess.is_sure}
@@ -120,12 +120,12 @@ def _refuse_unsure(source: str, guesses: Mapping[str, RoleGuess], names: Sequenc
         # The least sure first: the others often follow from them.
         ranked = sorted(unsure, key=lambda role: unsure[role].confidence)
         doubts = [f"{role} (perhaps {unsure[role].joint!r})" for role in ranked]
-        more = f" and {len(doubts) - 4} more" if len(doubts) > 4 else ""
+        remainder = f" and {len(doubts) - 4} more" if len(doubts) > 4 else ""
         reasons = dict.fromkeys(reason for guess in unsure.values() for reason in guess.reasons)
         raise MotionFileError(
             source,
-            f"found no sure joint for {', '.join(doubts[:4])}{more}: {'; '.join([*reasons][:3])}; "
-            f"expected a confidence of {LOWEST_CONFIDENCE}: {HOW}",
+            f"found no sure joint for {', '.join(doubts[:4])}{remainder}: "
+            f"{'; '.join([*reasons][:3])}; expected a confidence of {LOWEST_CONFIDENCE}: {HOW}",
         )
 
 

@@ -57,11 +57,13 @@ class SkelStage:
     def skeleton(self, prims: Sequence[Any], joint_names: Set[str]) -> tuple[Any, list[str]]:
         """Return the one of some skeletons that has named joints or roles, and a note on others."""
         trees = list(map(joint_tree, prims))
-        chosen = prims[rest_joints.one_skeleton(self.source, trees, joint_names)]
+        skeleton = prims[rest_joints.one_skeleton(self.source, trees, joint_names)]
         skeletons = self.prims(UsdSkel.Skeleton)
-        left_out = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN] if prim != chosen)
-        note = f"skeleton {chosen.GetPath()} was read: {left_out} left out"
-        return chosen, [note] if left_out else []
+        other_paths = ", ".join(
+            str(prim.GetPath()) for prim in skeletons[:SHOWN] if prim != skeleton
+        )
+        note = f"skeleton {skeleton.GetPath()} was read: {other_paths} left out"
+        return skeleton, [note] if other_paths else []
 
     def query(self, skeleton: Any) -> Any:
         """Return the query of UsdSkel for a skeleton; MotionFileError if it is not valid."""
@@ -104,15 +106,15 @@ def expect_inside(path: Path, source: str) -> None:
         except Tf.ErrorException:
             continue  # It has no part in the stage.
         for name in sorted(names):
-            further = layer.ComputeAbsolutePath(name)
-            file = Ar.SplitPackageRelativePathOuter(Sdf.Layer.SplitIdentifier(further)[0])[0]
+            reference = layer.ComputeAbsolutePath(name)
+            file = Ar.SplitPackageRelativePathOuter(Sdf.Layer.SplitIdentifier(reference)[0])[0]
             if not Sdf.FileFormat.FindByExtension(Path(file).suffix[1:]):
                 continue  # Textures and other files are not read.
             if not Path(file).resolve().is_relative_to(resolved.parent):
                 raise MotionFileError(
                     source, f"refers to {name!r}, expected a path below its folder"
                 )
-            layers += [further] if further not in layers else []
+            layers += [reference] if reference not in layers else []
 
 
 def open_stage(path: Path, source: str) -> SkelStage:
@@ -147,10 +149,10 @@ class SkelJoints:
         label, names, parents = joint_tree(self.prim)
         roots = [path for path, parent in zip(paths, parents, strict=True) if parent < 0]
         if len(roots) != 1 or any(parent >= joint for joint, parent in enumerate(parents)):
-            listed = ", ".join(roots[:5]) or "no joints"
+            root_names = ", ".join(roots[:5]) or "no joints"
             raise self.opened.error(
-                f"skeleton {self.prim.GetPath()} has the root joints {listed}, expected one before "
-                "all others"
+                f"skeleton {self.prim.GetPath()} has the root joints {root_names}, "
+                "expected one before all others"
             )
         stated = tuple(self.query.GetSkeleton().GetJointNamesAttr().Get() or ())
         labels = next(

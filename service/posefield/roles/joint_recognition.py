@@ -74,11 +74,11 @@ def trunk_roles(tree: Tree, upper_legs: Sequence[int], arms: Sequence[int]) -> d
     """
     chest = tree.common(arms) if len(arms) == 2 else None
     head = tree.first(frozenset({"head"}))
-    neck, sure = _named_neck(tree, head), NAMED
+    neck, confidence = _named_neck(tree, head), NAMED
     if head is None and neck is None and chest is not None:
-        (neck, head), sure = _unnamed_neck(tree, chest), ONE_OF_MANY
-    roles = {"neck": LimbJoint(neck, sure)} if neck is not None else {}
-    roles |= {"head": LimbJoint(head, sure)} if head is not None else {}
+        (neck, head), confidence = _unnamed_neck(tree, chest), ONE_OF_MANY
+    roles = {"neck": LimbJoint(neck, confidence)} if neck is not None else {}
+    roles |= {"head": LimbJoint(head, confidence)} if head is not None else {}
     top = next((joint for joint in (neck, head, chest) if joint is not None), None)
     hips = _hips(tree, upper_legs, top)
     if hips is None:
@@ -152,20 +152,20 @@ def _spine(tree: Tree, hips: LimbJoint, top: int | None, last: int | None) -> di
         for joint in path[path.index(hips.joint) + 1 :]
         if (joint != top or joint == last) and not tree.words[joint].is_helper
     ]
-    sure = min(hips.confidence, NAMED)
+    confidence = min(hips.confidence, NAMED)
     if len(chain) == 1:
         role = "chest" if tree.words[chain[0]].key in CHESTS else "spine"
-        return {role: LimbJoint(chain[0], sure)}
+        return {role: LimbJoint(chain[0], confidence)}
     if len(chain) < 3:
         return {
-            role: LimbJoint(joint, sure)
+            role: LimbJoint(joint, confidence)
             for role, joint in zip(("spine", "chest"), chain, strict=False)
         }
-    middle = sure if len(chain) == 3 else min(sure, ONE_OF_MANY)
+    middle = confidence if len(chain) == 3 else min(confidence, ONE_OF_MANY)
     return {
-        "spine": LimbJoint(chain[0], sure),
+        "spine": LimbJoint(chain[0], confidence),
         "chest": LimbJoint(chain[len(chain) // 2], middle),
-        "upperChest": LimbJoint(chain[-1], sure),
+        "upperChest": LimbJoint(chain[-1], confidence),
     }
 
 
@@ -219,7 +219,11 @@ def recognise(names: Sequence[str], parents: Sequence[int]) -> dict[str, RoleGue
     words and order, those of the trunk by the place of the limbs.
     """
     tree = Tree(tuple(parents), joint_words(names))
-    limbs = {f"{side}{role}": one for side in SIDES for role, one in _limbs(tree, side).items()}
+    limbs = {
+        f"{side}{role}": limb_joint
+        for side in SIDES
+        for role, limb_joint in _limbs(tree, side).items()
+    }
     legs = [limbs[f"{side}UpperLeg"].joint for side in SIDES if f"{side}UpperLeg" in limbs]
     arms = [
         next(limbs[side + role].joint for role in ARM[:2] if side + role in limbs)
@@ -227,7 +231,7 @@ def recognise(names: Sequence[str], parents: Sequence[int]) -> dict[str, RoleGue
         if {f"{side}Shoulder", f"{side}UpperArm"} & limbs.keys()
     ]
     trunk = trunk_roles(tree, legs, arms)
-    guesses = {role: _guess(names, one) for role, one in (trunk | limbs).items()}
+    guesses = {role: _guess(names, limb_joint) for role, limb_joint in (trunk | limbs).items()}
     return {role: _compared(role, guesses[role], limbs, tree) for role in ROLES if role in guesses}
 
 
@@ -246,11 +250,11 @@ def _limbs(tree: Tree, side: str) -> dict[str, LimbJoint]:
     return align_limb(paths, tree.words, ARM) | align_limb(paths, tree.words, LEG)
 
 
-def _guess(names: Sequence[str], one: LimbJoint) -> RoleGuess:
+def _guess(names: Sequence[str], limb_joint: LimbJoint) -> RoleGuess:
     reasons: tuple[str, ...] = ()
-    if one.confidence < LOWEST_CONFIDENCE:
+    if limb_joint.confidence < LOWEST_CONFIDENCE:
         reasons = ("other joints fit as well, or the tree contradicts the name",)
-    return RoleGuess(names[one.joint], one.confidence, reasons)
+    return RoleGuess(names[limb_joint.joint], limb_joint.confidence, reasons)
 
 
 def _compared(role: str, guess: RoleGuess, limbs: Mapping[str, LimbJoint], tree: Tree) -> RoleGuess:

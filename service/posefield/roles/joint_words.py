@@ -253,7 +253,7 @@ def _align(
         following = [(totals[0][0] - lack, totals[0][1])]
         for at, joint_scores in enumerate(scores):
             skipped = (totals[at + 1][0] - lack, totals[at + 1][1])
-            choice = max(following[-1], skipped, key=lambda one: one[0])
+            choice = max(following[-1], skipped, key=lambda total_and_choice: total_and_choice[0])
             if role in joint_scores and not (role == avoided and at in forbidden):
                 total = totals[at][0] + joint_scores[role]
                 if total > choice[0] + 1e-9:

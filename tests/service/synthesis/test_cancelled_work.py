@@ -112,7 +112,7 @@ def stood(model, walk):
 def several(model, walk):
     """Several clips, written together."""
     answers = [clips.synthesize_clip(model, ClipQuestion(controls=controls(model)))] * 8
-    return CLIP_ENCODERS["usda"].write(answers, CLIP_ENCODERS["usda"].usual)
+    return CLIP_ENCODERS["usda"].write(answers, CLIP_ENCODERS["usda"].default_convention)
 
 
 WORK = [solved, mapped, suggested, archived, crowded, planned, walked, stood, several]
