@@ -43,7 +43,7 @@ def test_the_digest_covers_every_file_that_training_imports(tmp_path):
     own = {"PYTHONPATH": str(fixture_cache.ROOT / "tests"), "PATH": ""}
     said = subprocess.run(words, env=own, capture_output=True, text=True, check=True).stdout
     imported = {Path(line) for line in said.split()}
-    assert Path("model_export/posefield_train/train.py") in imported
+    assert Path("model_export/posefield_train/training.py") in imported
     assert imported <= set(fixture_cache.sources(fixture_cache.ROOT))
 
 
