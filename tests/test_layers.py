@@ -83,7 +83,11 @@ def copy(tmp_path):
         ("service/posefield/motion/clip.py", "import orjson", "the floor needs numpy only"),
         ("service/posefield/motion/clip.py", "import posefield.encode", LAYERS),
         ("service/posefield/inference/session.py", "import onnx", "what ships never imports"),
-        ("model_export/posefield_train/training.py", "import posefield.synthesis", "the training job"),
+        (
+            "model_export/posefield_train/training.py",
+            "import posefield.synthesis",
+            "the training job",
+        ),
     ],
 )
 def test_a_planted_breach_is_caught_and_named(copy, module, line, broken):
