@@ -9,8 +9,8 @@ from family import Family
 from rows import Row
 from timing import in_turn
 
-from posefield.constraints import constrained_motion
-from posefield.constraints.constrained_motion import LevelCorrector
+from posefield.constraints import gauss_newton
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.constraints.constraint import PositionConstraint
 from posefield.inference import session
 from posefield.inference.onnx_runtime import OUTPUTS
@@ -75,7 +75,7 @@ def rows(trained_family: Family) -> list[Row]:
 def _asked(trained_family: Family) -> Asked:
     opened = session.open_bytes(trained_family.exported.content, "reaching.onnx")
     corrector, point = (
-        constrained_motion.build_corrector(opened, 0),
+        gauss_newton.build_corrector(opened, 0),
         trained_family.examples[4].controls[None],
     )
     times = np.linspace(0.0, float(opened.run(point, None, "duration")[0][0]), FRAMES)

@@ -12,8 +12,9 @@ import numpy as np
 
 from evaluation.methods import EXACT
 from posefield.common.units import Floats
-from posefield.constraints import constrained_motion
-from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints import gauss_newton
+from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.constraints.constraint import PositionConstraint
 from posefield.inference import session
 from posefield.inference.onnx_runtime import OUTPUTS
@@ -135,7 +136,7 @@ def correct_motions(
     event = truncation_error.event_frame(recipe, trained.examples)
     assert event is not None
     opened = session.open_bytes(file, recipe.name)
-    desk = _MotionCorrector(opened, constrained_motion.build_corrector(opened, 0), event)
+    desk = _MotionCorrector(opened, gauss_newton.build_corrector(opened, 0), event)
     label_names = {label_set.name: label_set.names for label_set in opened.card.labels}
     labels = sample_points.label_weights(queries.labels, label_names)
     clips = zip(queries.controls[:, None], labels[:, None], target, strict=True)

@@ -7,7 +7,7 @@ import pytest
 from families import face_motion
 
 from posefield.common.errors import ModelError
-from posefield.constraints import constrained_motion
+from posefield.constraints import gauss_newton
 from posefield.inference import onnx_runtime, session
 from posefield.model_file import model_card
 from posefield.motion import quat
@@ -73,7 +73,7 @@ def test_the_solver_predicts_the_curves_of_the_graph(opened):
     own, times = opened.session, np.linspace(0.0, 0.9, 7)
     for level in range(len(own.card.levels)):
         state = own.state(np.array([[0.7, 0.5]]), times, level=level)
-        predicted = constrained_motion.build_corrector(own, level).predict(state)
+        predicted = gauss_newton.build_corrector(own, level).predict(state)
         (expected,) = own.run(np.array([[0.7, 0.5]]), times[None], onnx_runtime.CURVES, level=level)
         assert np.abs(predicted.curve_values(state.frames) - expected[0]).max() < SINGLE
 

@@ -261,19 +261,3 @@ def _moment_frame(scene: MotionVariables, numbers: Variables, own: Measure, give
         return float(np.argmax(np.sum(np.square(away), axis=-1)))
     seen = Measure(own.quantity, tuple(range(len(joints))), own.at)
     return measures.moment_frame(seen, positions, 0.0)
-
-
-@dataclass(frozen=True)
-class CorrectionTask:
-    """A motion to correct. begun: numbers of the prediction. sigma: its standard deviation, m."""
-
-    scene: MotionVariables
-    sigma: float
-    begun: Variables
-    aims: Sequence[Constraint]
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Return what tasks have in common that are solved at once."""
-        kinds = tuple((aim.kind, len(aim.target)) for aim in self.aims)
-        return kinds, len(self.begun), self.scene.predicted is None

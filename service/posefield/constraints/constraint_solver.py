@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Annotated
 
@@ -12,9 +12,10 @@ from posefield.common import cancellation
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import Floats, Frames
 from posefield.common.value_cache import ValueCache
-from posefield.constraints import constrained_motion, constraint
-from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints import constrained_motion, constraint, gauss_newton
+from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import Constraint, PositionConstraint
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.constraints.take_variation import TakeVariation
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTarget, bring_back
 from posefield.inference.session import PredictionState, Session
@@ -35,24 +36,8 @@ MAX_ROUNDS, DURATION_TOLERANCE = 8, 1e-6
 FRAME_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True)
-class _CacheKey:
-    """Cache key: a question and its goals, compared by the goals and the graph's inputs."""
-
-    question: ValidatedQuestion = field(compare=False)
-    constraints: ConstraintSet
-    point: bytes
-    labels: bytes
-    level: int
-
-
-@dataclass(frozen=True)
-class _OpenMotion:
-    """A motion that is corrected. begun: predicted. held: by the last round."""
-
-    key: _CacheKey
-    begun: ConstrainedMotion
-    held: ConstrainedMotion
+_CacheKey = tuple[ConstraintSet, bytes, bytes, int]
+"""Constraints, and the controls, labels and level of the graph's input."""
 
 
 class ConstraintSolver:
@@ -106,7 +91,7 @@ class ConstraintSolver:
             own = replace(question, controls=found, point=np.array([list(found.values())]))
             begun = self.solve(own, NO_CONSTRAINTS)
             aims = self._target_constraints(own, targets, begun)
-            tried.append((self._corrector(question.level).distance(begun, aims), found))
+            tried.append((self.corrector(question.level).distance(begun, aims), found))
             if tried[-1][0] <= math.sqrt(len(wanted)):
                 break
             if len(tried) > 1:
@@ -126,25 +111,32 @@ class ConstraintSolver:
         return held
 
     def solve_all(
-        self, every: Sequence[tuple[ValidatedQuestion, ConstraintSet]]
+        self, questions: Sequence[tuple[ValidatedQuestion, ConstraintSet]]
     ) -> list[ConstrainedMotion | QueryError]:
         """Return the motions of questions as `solve` does, or the errors that it raises.
 
         Each has the bytes that it has alone.
         """
         keys = [
-            _CacheKey(own, found, own.point.tobytes(), own.labels.tobytes(), own.level)
-            for own, found in every
+            (constraints, question.point.tobytes(), question.labels.tobytes(), question.level)
+            for question, constraints in questions
         ]
-        return self._solved.find_all(keys, self._solve)
+        by_key = dict(zip(keys, questions, strict=True))
+
+        def solve(missing: list[_CacheKey]) -> list[ConstrainedMotion | QueryError]:
+            return self._solve([by_key[key] for key in missing])
+
+        return self._solved.find_all(keys, solve)
 
     def corrector(self, level: int) -> LevelCorrector:
         """Return the data for corrections at a level, computed once."""
-        return self._corrector(level)
+        if level not in self._correctors:
+            self._correctors[level] = gauss_newton.build_corrector(self._session, level)
+        return self._correctors[level]
 
     def measured(self, question: ValidatedQuestion, held: ConstrainedMotion) -> dict[str, float]:
         """Return the measured controls of a motion."""
-        return self._corrector(question.level).measured(held)
+        return self.corrector(question.level).measured(held)
 
     def poses(
         self, requests: Sequence[tuple[ValidatedQuestion, ConstrainedMotion, Frames, Trust]]
@@ -178,7 +170,7 @@ class ConstraintSolver:
         found = []
         for state in self._captured if time is None else self._predicted(time):
             cancellation.check()
-            begun = self._corrector(0).predict(state)
+            begun = self.corrector(0).predict(state)
             aim = self._position_constraint(goal, begun, state.frames[0])
             motions = begun.scene.motion(begun.numbers).reshape(1, -1)
             # `evaluate_motions` computes the value without its gradient, which is not needed here.
@@ -196,96 +188,87 @@ class ConstraintSolver:
         pairs = zip(card.examples, card.clip_labels, strict=True)
         return [self._session.state(np.array([own]), when, labels[None]) for own, labels in pairs]
 
-    def _corrector(self, level: int) -> LevelCorrector:
-        if level not in self._correctors:
-            self._correctors[level] = constrained_motion.build_corrector(self._session, level)
-        return self._correctors[level]
-
     def _frames(self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames) -> Frames:
         """Return the canonical frames (S,) of times (S,), s, scaled by a corrected duration."""
         shares = when * (held.state.duration / held.duration)
         own = self._session.state(question.point, shares, question.labels, question.level)
         return own.frames
 
-    def _solve(self, keys: Sequence[_CacheKey]) -> list[ConstrainedMotion | QueryError]:
+    def _solve(
+        self, questions: Sequence[tuple[ValidatedQuestion, ConstraintSet]]
+    ) -> list[ConstrainedMotion | QueryError]:
         """Return the motions of questions, or their errors."""
-        found = [self._begun(key) for key in keys]
-        open_ = [_OpenMotion(key, held, held) for key, held in zip(keys, found, strict=True)]
-        open_ = [own for own in open_ if own.key.constraints.corrects]
-        held = {id(own.key): own.held for own in self._corrected(open_)}
+        first = [self._uncorrected(*question) for question in questions]
+        motions = first.copy()
+        moving = [row for row, (_, constraints) in enumerate(questions) if constraints.corrects]
+        for _ in range(MAX_ROUNDS):
+            # Targets at times move with the duration.
+            durations = [motion.duration for motion in motions]
+            for level in dict.fromkeys(questions[row][0].level for row in moving):
+                rows = [row for row in moving if questions[row][0].level == level]
+                tasks = [(first[row], self._aims(*questions[row], motions[row])) for row in rows]
+                for row, motion in zip(rows, self.corrector(level).solve_all(tasks), strict=True):
+                    motions[row] = motion
+            moving = [
+                row
+                for row in moving
+                if not abs(motions[row].duration / durations[row] - 1.0) < DURATION_TOLERANCE
+            ]
+            if not moving:
+                break
         return [
-            self._checked(key, held[id(key)]) if id(key) in held else begun
-            for key, begun in zip(keys, found, strict=True)
+            self._checked(*question, motion) if question[1].corrects else motion
+            for question, motion in zip(questions, motions, strict=True)
         ]
 
-    def _begun(self, key: _CacheKey) -> ConstrainedMotion:
+    def _uncorrected(
+        self, question: ValidatedQuestion, constraints: ConstraintSet
+    ) -> ConstrainedMotion:
         """Return the predicted motion of a question, or its take."""
-        question, bench = key.question, self._corrector(key.level)
-        state = self._session.state(question.point, np.zeros(1), question.labels, key.level)
-        begun = bench.predict(state)
-        take = key.constraints.take
-        return self.variation.vary(bench, begun, question, take) if take else begun
+        corrector = self.corrector(question.level)
+        state = self._session.state(question.point, np.zeros(1), question.labels, question.level)
+        motion, take = corrector.predict(state), constraints.take
+        return self.variation.vary(corrector, motion, question, take) if take else motion
 
-    def _corrected(self, every: Sequence[_OpenMotion]) -> list[_OpenMotion]:
-        """Return the motions, corrected: in rounds, as targets at times move with the duration."""
-        done: list[_OpenMotion] = []
-        for _ in range(MAX_ROUNDS):
-            if not every:
-                break
-            moved = self._next_round(every)
-            settled = [
-                abs(new.held.duration / old.held.duration - 1.0) < DURATION_TOLERANCE
-                for old, new in zip(every, moved, strict=True)
-            ]
-            done += [own for own, ends in zip(moved, settled, strict=True) if ends]
-            every = [own for own, ends in zip(moved, settled, strict=True) if not ends]
-        return [*done, *every]
-
-    def _next_round(self, every: Sequence[_OpenMotion]) -> list[_OpenMotion]:
-        """Return the motions, corrected with their targets where the last round places them."""
-        found: dict[int, ConstrainedMotion] = {}
-        levels = [own.key.level for own in every]
-        for level in dict.fromkeys(levels):
-            places = [place for place, own in enumerate(levels) if own == level]
-            tasks = [(every[place].begun, self._aims(every[place])) for place in places]
-            found |= zip(places, self._corrector(level).solve_all(tasks), strict=True)
-        return [replace(own, held=found[place]) for place, own in enumerate(every)]
-
-    def _aims(self, own: _OpenMotion) -> list[Constraint]:
-        goals, frames = own.key.constraints, own.begun.scene.reduced.frames
-        aims = constraint.from_controls(goals.controls, frames)
-        aimed = self._target_constraints(own.key.question, goals.targets, own.held)
-        return [*self._without_targeted(aims, aimed, frames - 1.0), *aimed]
-
-    def _checked(self, key: _CacheKey, held: ConstrainedMotion) -> ConstrainedMotion | QueryError:
-        """Return a corrected motion within the bounds, or the error of one of its targets."""
-        question, goals = key.question, key.constraints
-        bench, bounds = self._corrector(key.level), self._session.bounds
-        if not bounds.is_inside(question.point):
-            held = bring_back(bench, held, goals, question.controls, bounds)
-        try:
-            self._check_times(goals.targets, held)
-            aimed = self._target_constraints(question, goals.targets, held)
-            _check_duplicates(aimed, bench.reduced.frames - 1.0)
-        except QueryError as fault:
-            return fault
-        return held
-
-    def _without_targeted(
-        self, aims: Sequence[Constraint], targets: Sequence[PositionConstraint], last: float
+    def _aims(
+        self, question: ValidatedQuestion, constraints: ConstraintSet, motion: ConstrainedMotion
     ) -> list[Constraint]:
-        """Return the constraints without those of a joint that a target places at the same frame.
+        """Return the constraints, with targets where a motion of the last round has them.
 
-        The target is more specific than the control.
+        Controls lack those of a joint that a target places at the same frame, which is more
+        specific.
         """
-        return [
+        frames = motion.scene.reduced.frames
+        targets = self._target_constraints(question, constraints.targets, motion)
+        controls = [
             aim
-            for aim in aims
+            for aim in constraint.from_controls(constraints.controls, frames)
             if not (
                 isinstance(aim, PositionConstraint)
-                and any(_same_joints_and_frame(aim, own, last) for own in targets)
+                and any(_same_joints_and_frame(aim, target, frames - 1.0) for target in targets)
             )
         ]
+        return [*controls, *targets]
+
+    def _checked(
+        self, question: ValidatedQuestion, constraints: ConstraintSet, motion: ConstrainedMotion
+    ) -> ConstrainedMotion | QueryError:
+        """Return a corrected motion within the bounds, or the error of one of its targets."""
+        corrector, bounds = self.corrector(question.level), self._session.bounds
+        if not bounds.is_inside(question.point):
+            motion = bring_back(corrector, motion, constraints, question.controls, bounds)
+        try:
+            for index, target in enumerate(constraints.targets):
+                if target.time is not None:
+                    field = f"targets/{index}/time"
+                    motion_question.check_rounded_range(
+                        field, target.time, 0.0, motion.duration, "s"
+                    )
+            aims = self._target_constraints(question, constraints.targets, motion)
+            _check_duplicates(aims, corrector.reduced.frames - 1.0)
+        except QueryError as error:
+            return error
+        return motion
 
     def _target_constraints(
         self, question: ValidatedQuestion, targets: tuple[JointTarget, ...], held: ConstrainedMotion
@@ -306,12 +289,6 @@ class ConstraintSolver:
         last = held.scene.reduced.frames - 1
         at = (goal.moment.share or 0.0) * last if goal.time is None else frame
         return PositionConstraint((goal.name,), goal.moment, (0, 1, 2), np.array(goal.position), at)
-
-    def _check_times(self, targets: tuple[JointTarget, ...], held: ConstrainedMotion) -> None:
-        for index, goal in enumerate(targets):
-            if goal.time is not None:
-                field = f"targets/{index}/time"
-                motion_question.check_rounded_range(field, goal.time, 0.0, held.duration, "s")
 
 
 def _same_joints_and_frame(a: PositionConstraint, b: PositionConstraint, last: float) -> bool:

@@ -13,18 +13,24 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import Booleans, Floats, Indices, Values, Variables
+from posefield.common.units import Booleans, Floats, Indices, Values
 from posefield.constraints import constraint, reachability
+from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import (
     Constraint,
-    CorrectionTask,
     StackedGradients,
     StackedValues,
     StackedVariables,
 )
 from posefield.constraints.motion_variables import MotionVariables
-from posefield.constraints.reachability import stacked_dot, stacked_solve
-from posefield.inference.reduced_motion import ResidualCovariance
+from posefield.constraints.reachability import CorrectionTask, stacked_dot, stacked_solve
+from posefield.inference import reduced_motion
+from posefield.inference.reduced_motion import ReducedTensor, ResidualCovariance
+from posefield.inference.session import PredictionState, Session
+from posefield.model_file import onnx_file
+from posefield.model_file.model_card import ModelCard
+from posefield.motion import measures
+from posefield.motion.measures import MeasuredMotion
 from posefield.question.results import ConstraintResult
 
 MAX_STEPS, MAX_HALVINGS = 25, 6
@@ -40,17 +46,86 @@ MISS_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class Correction:
-    """Result of a correction.
+class LevelCorrector:
+    """Data for corrections at one level of a model, computed once.
 
-    numbers: of the corrected motion. results: error of each constraint. steps: number of
-    iterations. distance: Mahalanobis distance of the constraints from the prediction.
+    reduced: reduced tensor. spread: covariance of the residuals of captured motions.
     """
 
-    numbers: Variables
-    results: tuple[ConstraintResult, ...]
-    steps: int
-    distance: float
+    card: ModelCard
+    reduced: ReducedTensor
+    spread: ResidualCovariance
+
+    def predict(self, state: PredictionState) -> ConstrainedMotion:
+        """Return the predicted motion, without constraints."""
+        scene = MotionVariables(
+            self.reduced, self.card.skeleton.parents, state.bones, self.card.cyclic
+        )
+        inner = self.reduced.motion(state.coefficients).ravel()
+        outer = [np.log(state.duration), *state.travel] if self.card.cyclic else []
+        return ConstrainedMotion(scene, np.concatenate([inner, outer]), state, ())
+
+    def solve_all(self, tasks: Sequence[CorrectionTask]) -> list[ConstrainedMotion]:
+        """Return the motions nearest to others that satisfy constraints.
+
+        Constraints beyond the spread of captured motions are approached up to it. Each motion has
+        the bytes that it has alone: products are those of one motion, stacked.
+        """
+        corrected = {
+            index: replace(motion, results=(), steps=0, distance=0.0)
+            for index, (motion, aims) in enumerate(tasks)
+            if not aims
+        }
+        kinds = [_kind(*task) for task in tasks]
+        for kind in dict.fromkeys(kinds):
+            rows = [row for row, other in enumerate(kinds) if other == kind and tasks[row][1]]
+            if rows:
+                alike = _correct_alike(self.spread, [tasks[row] for row in rows])
+                corrected |= zip(rows, alike, strict=True)
+        return [corrected[row] for row in range(len(tasks))]
+
+    def distance(self, motion: ConstrainedMotion, aims: Sequence[Constraint]) -> float:
+        """Return the Mahalanobis distance of the constraints from a predicted motion."""
+        numbers = motion.numbers[None]
+        looked = constraint.evaluate_many(aims, [motion.scene], numbers)
+        return float(
+            reachability.assess(self.spread, [(motion, aims)], numbers, *looked).distance[0]
+        )
+
+    def measured(self, motion: ConstrainedMotion) -> dict[str, float]:
+        """Return the values of the card's measured controls on a motion."""
+        scene = motion.scene
+        still = np.zeros((1, len(scene.parents), 3))
+        body = MeasuredMotion(still, 0.0, np.zeros(3), scene.parents, scene.bones)
+        values, moving = dict[str, float](), []
+        for control in self.card.controls:
+            if control.measure and control.measure.is_body_measure:
+                values[control.name] = measures.evaluate(control.measure, body)
+            elif control.measure:
+                moving.append((control.name, control.measure, 0.0))
+        for aim in constraint.from_controls(moving, self.reduced.frames):
+            numbers, _ = aim.evaluate(scene, motion.numbers)
+            values |= dict(zip(aim.names, map(float, numbers), strict=True))
+        return {
+            control.name: values[control.name]
+            for control in self.card.controls
+            if control.name in values
+        }
+
+
+def build_corrector(session: Session, level: int) -> LevelCorrector:
+    """Return the data for corrections at a level."""
+    weights = onnx_file.initializers(session.content)
+    card, samples = session.card, session.kriging_weights.samples
+    reduced = reduced_motion.read(weights, card.levels[level], card)
+    spread = reduced_motion.estimate(card, weights, samples, reduced)
+    return LevelCorrector(card, reduced, spread)
+
+
+def _kind(motion: ConstrainedMotion, aims: Sequence[Constraint]) -> tuple[object, ...]:
+    """Return what tasks have in common that are solved at once."""
+    kinds = tuple((aim.kind, len(aim.target)) for aim in aims)
+    return kinds, len(motion.numbers), motion.scene.predicted is None
 
 
 @dataclass(frozen=True)
@@ -112,40 +187,30 @@ class _Iterates:
             getattr(self, own.name)[places] = getattr(found, own.name)
 
 
-def correct(spread: ResidualCovariance, tasks: Sequence[CorrectionTask]) -> list[Correction]:
-    """Return the motions nearest to predictions that satisfy the constraints.
-
-    Constraints beyond the spread of captured motions are approached up to it. Each motion has the
-    bytes that it has alone: products are those of one motion, stacked.
-    """
-    found: dict[int, Correction] = {
-        place: Correction(own.begun, (), 0, 0.0) for place, own in enumerate(tasks) if not own.aims
-    }
-    kinds = [own.kind for own in tasks]
-    for kind in dict.fromkeys(kinds):
-        places = [at for at, own in enumerate(kinds) if own == kind and tasks[at].aims]
-        if places:
-            made = _correct_alike(spread, [tasks[place] for place in places])
-            found |= zip(places, made, strict=True)
-    return [found[place] for place in range(len(tasks))]
-
-
-def _correct_alike(spread: ResidualCovariance, tasks: Sequence[CorrectionTask]) -> list[Correction]:
-    scenes, aims = [own.scene for own in tasks], tasks[0].aims
-    begun = np.stack([own.begun for own in tasks])
-    looked = constraint.evaluate_many(aims, scenes, begun)
-    judged, seen = begun, looked
+def _correct_alike(
+    spread: ResidualCovariance, tasks: Sequence[CorrectionTask]
+) -> list[ConstrainedMotion]:
+    scenes, aims = [motion.scene for motion, _ in tasks], tasks[0][1]
+    first = np.stack([motion.numbers for motion, _ in tasks])
+    looked = constraint.evaluate_many(aims, scenes, first)
+    predicted, looked_at_predicted = first, looked
     if scenes[0].predicted is not None:
         # A take deviates from the prediction already; the spread is that about the prediction.
-        judged = np.stack([own.scene.predicted for own in tasks if own.scene.predicted is not None])
-        seen = constraint.evaluate_many(aims, scenes, judged)
-    found = reachability.assess(spread, tasks, judged, seen)
-    problems = _Problems(scenes, spread, aims, begun, seen[0] + found.reachable, found.weights)
-    last, steps = _descend(problems, looked)
+        predicted = np.stack([scene.predicted for scene in scenes if scene.predicted is not None])
+        looked_at_predicted = constraint.evaluate_many(aims, scenes, predicted)
+    reach = reachability.assess(spread, tasks, predicted, *looked_at_predicted)
+    goals = looked_at_predicted[0] + reach.reachable
+    last, steps = _descend(_Problems(scenes, spread, aims, first, goals, reach.weights), looked)
     return [
-        Correction(numbers, tuple(_constraint_results(own.aims, values)), count, float(distance))
-        for own, numbers, values, count, distance in zip(
-            tasks, last.numbers, last.values, steps, found.distance, strict=True
+        replace(
+            motion,
+            numbers=numbers,
+            results=tuple(_constraint_results(aims, values)),
+            steps=count,
+            distance=float(distance),
+        )
+        for (motion, aims), numbers, values, count, distance in zip(
+            tasks, last.numbers, last.values, steps, reach.distance, strict=True
         )
     ]
 
@@ -214,21 +279,14 @@ def _solve(
     return stacked_solve(matrices + 1e-9 * matrices * eye + 1e-300 * eye, right)
 
 
-def distance(spread: ResidualCovariance, task: CorrectionTask) -> float:
-    """Return the Mahalanobis distance of the constraints from a motion."""
-    numbers = task.begun[None]
-    looked = constraint.evaluate_many(task.aims, [task.scene], numbers)
-    return float(reachability.assess(spread, [task], numbers, looked).distance[0])
-
-
-def _constraint_results(aims: Sequence[Constraint], found: Values) -> list[ConstraintResult]:
-    said, start = [], 0
+def _constraint_results(aims: Sequence[Constraint], values: Values) -> list[ConstraintResult]:
+    results, start = [], 0
     for aim in aims:
-        left = aim.target - found[start : start + len(aim.target)]
+        left = aim.target - values[start : start + len(aim.target)]
         start += len(aim.target)
-        parts = np.abs(left) if len(aim.names) > 1 else [np.linalg.norm(left)]
-        said += [
+        misses = np.abs(left) if len(aim.names) > 1 else [np.linalg.norm(left)]
+        results += [
             ConstraintResult(name, float(miss), aim.unit, bool(miss <= MISS_TOLERANCE))
-            for name, miss in zip(aim.names, parts, strict=True)
+            for name, miss in zip(aim.names, misses, strict=True)
         ]
-    return said
+    return results

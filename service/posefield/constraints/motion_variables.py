@@ -36,48 +36,51 @@ class JointChain:
     directions: Annotated[Floats, "freedoms dof"]
     chart: RotationChart
 
-    def compute_poses(
-        self, moves: Annotated[Floats, "frames freedoms"], gone: RootPath
-    ) -> "ChainPoses":
-        """Return the chain's poses at coefficients (S, r1) of the first mode.
+    def positions(
+        self, moves: Annotated[Floats, "frames freedoms"], travel: RootPath
+    ) -> Annotated[Floats, "frames 3"]:
+        """Return the last joint's positions (S, 3), m, at coefficients (S, r1) of the first mode.
 
-        gone (S, 3): travel of the root so far: to the left and ahead, m, and turn, rad.
+        travel (S, 3): of the root so far: to the left and ahead, m, and turn, rad.
         """
-        found = self.mean + moves @ self.directions
-        vectors = found[:, 3:].reshape(len(moves), -1, 3)
-        turns = self.rotations @ quat.to_matrix(self.chart.quaternions(vectors))
-        if gone[:, 2].any():
-            turns[:, 0] = quat.to_matrix(quat.from_axis_angle(UP, gone[:, 2])) @ turns[:, 0]
-        roots = found[:, :3].copy()
-        roots[:, [0, 2]] += gone[:, :2]
-        return _forward(self.bones, vectors, turns, roots)
+        return self._forward(moves, travel)[2][:, -1]
 
-    def gradient(
-        self, pose: "ChainPoses", row: int
-    ) -> tuple[Annotated[Floats, "3 freedoms"], Vector]:
-        """Return the gradients of the last joint's position in one of the poses.
+    def position_and_gradients(
+        self, moves: Annotated[Floats, "1 freedoms"], travel: Annotated[Floats, "1 3"]
+    ) -> tuple[Vector, Annotated[Floats, "3 freedoms"], Vector]:
+        """Return the last joint's position (3,), m, and its gradients.
 
         The first is by the coefficients of the first mode (3, r1), m; the second by the turn of the
         travel (3,), m per radian.
         """
-        axes = pose.turned[row] @ self.chart.right_jacobian(pose.vectors[row])
-        arms = pose.positions[row, -1] - pose.positions[row]
+        vectors, turned, positions = (array[0] for array in self._forward(moves, travel))
+        axes = turned @ self.chart.right_jacobian(vectors)
+        arms = positions[-1] - positions
         moved = quat.cross(np.swapaxes(axes, -1, -2), arms[:, None])
         by_turning = moved.reshape(-1, 3).T @ self.directions[:, 3:].T
-        return by_turning + self.directions[:, :3].T, quat.cross(UP, arms[0])
+        return positions[-1], by_turning + self.directions[:, :3].T, quat.cross(UP, arms[0])
 
-
-@dataclass(frozen=True)
-class ChainPoses:
-    """A chain in S poses.
-
-    vectors: numbers (S, C, 3) of the rotations. turned: orientations (S, C, 3, 3). positions: (S,
-    C, 3), m.
-    """
-
-    vectors: Annotated[Floats, "frames chain 3"]
-    turned: Annotated[Floats, "frames chain 3 3"]
-    positions: Annotated[Floats, "frames chain 3"]
+    def _forward(
+        self, moves: Annotated[Floats, "frames freedoms"], travel: RootPath
+    ) -> tuple[
+        Annotated[Floats, "frames chain 3"],
+        Annotated[Floats, "frames chain 3 3"],
+        Annotated[Floats, "frames chain 3"],
+    ]:
+        """Return numbers of the rotations, orientations and positions, m, of the joints."""
+        numbers = self.mean + moves @ self.directions
+        vectors = numbers[:, 3:].reshape(len(moves), -1, 3)
+        turns = self.rotations @ quat.to_matrix(self.chart.quaternions(vectors))
+        if travel[:, 2].any():
+            turns[:, 0] = quat.to_matrix(quat.from_axis_angle(UP, travel[:, 2])) @ turns[:, 0]
+        turned, positions = turns.copy(), np.empty_like(vectors)
+        positions[:, 0] = numbers[:, :3]
+        positions[:, 0, [0, 2]] += travel[:, :2]
+        for link in range(1, len(self.bones)):
+            above = turned[:, link - 1]
+            positions[:, link] = positions[:, link - 1] + above @ self.bones[link]
+            turned[:, link] = above @ turns[:, link]
+        return vectors, turned, positions
 
 
 def chain_to(
@@ -91,21 +94,6 @@ def chain_to(
     mean, directions = reduced.mean[numbers], reduced.directions[:, numbers]
     turns, chart = quat.to_matrix(reduced.rotations[chain]), CHARTS[reduced.chart]
     return JointChain(bones[chain], turns, mean, directions, chart)
-
-
-def _forward(
-    bones: Annotated[Floats, "chain 3"],
-    vectors: Annotated[Floats, "frames chain 3"],
-    turns: Annotated[Floats, "frames chain 3 3"],
-    roots: RootPath,
-) -> ChainPoses:
-    turned, positions = turns.copy(), np.empty_like(vectors)
-    positions[:, 0] = roots
-    for link in range(1, len(bones)):
-        above = turned[:, link - 1]
-        positions[:, link] = positions[:, link - 1] + above @ bones[link]
-        turned[:, link] = above @ turns[:, link]
-    return ChainPoses(vectors, turned, positions)
 
 
 CYCLE_VARIABLES = 4
@@ -159,11 +147,7 @@ class MotionVariables:
     def positions(self, numbers: Variables, joint: int, places: Frames) -> RootPath:
         """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
         moves = self.reduced.moves(self.motion(numbers), places)
-        return (
-            self.chain(joint)
-            .compute_poses(moves, self._travel_so_far(numbers, places))
-            .positions[:, -1]
-        )
+        return self.chain(joint).positions(moves, self._travel_so_far(numbers, places))
 
     def evaluate_motions(
         self,
@@ -180,24 +164,25 @@ class MotionVariables:
         row, gone = self.reduced.row(at), self._travel_so_far(numbers, places)
         moves = row @ motions.reshape(len(motions), len(row), -1)
         moves = self.reduced.with_detail(moves, places)
-        return self.chain(joint).compute_poses(moves, gone).positions[:, -1]
+        return self.chain(joint).positions(moves, gone)
 
     def position_and_gradient(
         self, numbers: Variables, joint: int, at: float
     ) -> tuple[Vector, Annotated[Floats, "3 variables"]]:
         """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
         places = np.array([at], np.float64)
-        row, own = self.reduced.row(at), self.chain(joint)
+        row = self.reduced.row(at)
         moves = self.reduced.with_detail(row[None] @ self.motion(numbers), places)
-        pose = own.compute_poses(moves, self._travel_so_far(numbers, places))
-        by_freedoms, by_turn = own.gradient(pose, 0)
+        position, by_freedoms, by_turn = self.chain(joint).position_and_gradients(
+            moves, self._travel_so_far(numbers, places)
+        )
         inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
         if self.cyclic:
             share = at / (self.reduced.frames - 1)
             way = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
             outer = share * np.column_stack([np.zeros(3), way[:, 0], way[:, 1], by_turn])
             inner = np.hstack([inner, outer])
-        return pose.positions[0, -1], inner
+        return position, inner
 
     def _travel_so_far(self, numbers: Variables, places: Frames) -> RootPath:
         """Return the travel so far (S, 3) at canonical frames (S,)."""

@@ -13,9 +13,10 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Booleans, Floats, Indices
+from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import (
-    CorrectionTask,
+    Constraint,
     StackedGradients,
     StackedValues,
     StackedVariables,
@@ -35,6 +36,8 @@ MAX_DEVIATIONS = 3.7
 # Halvings of the interval of the price at which differences are within the largest distance.
 HALVINGS = 40
 
+CorrectionTask = tuple[ConstrainedMotion, Sequence[Constraint]]
+"""A motion, predicted or varied, and the constraints that its correction satisfies."""
 StackedMatrices = Annotated[Floats, "motions values values"]
 
 
@@ -74,84 +77,63 @@ class Reachability:
         All of them within the largest plausible distance; else a share of each constraint's
         difference, chosen for the least remaining error at that distance.
         """
-        found = self.differences.copy()
-        far = np.flatnonzero(self.distance > distance_limit(found.shape[1]))
+        reachable = self.differences.copy()
+        far = np.flatnonzero(self.distance > distance_limit(reachable.shape[1]))
         if len(far):
-            found[far] = self._nearest(far)
-        return found
+            reachable[far] = self._nearest(far)
+        return reachable
 
     def _nearest(self, far: Annotated[Indices, "chosen"]) -> Annotated[Floats, "chosen values"]:
         """Return the reachable parts (m, k) of differences beyond the largest distance."""
         limit = distance_limit(self.differences.shape[1])
-        each = self.members * self.differences[far][:, :, None]
-        across = each.swapaxes(1, 2)
-        apart = across @ np.linalg.solve(self.covariance[far], each)
+        differences = self.members * self.differences[far][:, :, None]
+        across = differences.swapaxes(1, 2)
+        products = across @ np.linalg.solve(self.covariance[far], differences)
         misses = (across**2 @ self.weights[far][..., None])[..., 0]
-        shares = _Shares.of(apart, misses)
+        # A constraint that is met already has a difference of zero.
+        scale = 1.0 / np.sqrt(np.where(misses == 0.0, 1.0, misses))
+        # In the eigenvectors, the systems of all prices are diagonal.
+        values, vectors = np.linalg.eigh(scale[:, :, None] * products * scale[:, None])
+        loads = ((scale * misses)[:, None] @ vectors)[:, 0]
+
+        def shares(price: Annotated[Floats, "motions"]) -> StackedValues:
+            """Return the shares (m, aims) for the least error plus `price` squared distances."""
+            solved = loads / (1.0 + price[:, None] * values)
+            free = scale * (vectors @ solved[..., None])[..., 0]
+            return np.asarray(np.minimum(np.maximum(free, 0.0), 1.0))
+
+        def is_too_far(price: Annotated[Floats, "motions"]) -> Booleans:
+            rows = shares(price)[:, None]
+            return np.asarray((rows @ products @ rows.swapaxes(1, 2))[:, 0, 0] > limit**2)
+
         low, high = np.zeros(len(far)), np.ones(len(far))
-        while (outside := shares.squared_lengths(high) > limit**2).any():
+        while (outside := is_too_far(high)).any():
             low, high = np.where(outside, high, low), np.where(outside, 4.0 * high, high)
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            outside = shares.squared_lengths(middle) > limit**2
+            outside = is_too_far(middle)
             low, high = np.where(outside, middle, low), np.where(outside, high, middle)
-        return np.asarray((each @ shares.at(high)[..., None])[..., 0])
-
-
-@dataclass(frozen=True)
-class _Shares:
-    """Shares (m, aims) of differences for the least error plus distance, at any price.
-
-    apart: (m, aims, aims), inner products of the differences by the inverse covariance. scale,
-    values, vectors: of the eigenvalues, in which the systems of all prices are diagonal. loads: the
-    right sides in them.
-    """
-
-    apart: StackedMatrices
-    scale: StackedValues
-    values: StackedValues
-    vectors: StackedMatrices
-    loads: StackedValues
-
-    @classmethod
-    def of(cls, apart: StackedMatrices, misses: StackedValues) -> "_Shares":
-        """Return the shares for squared errors `misses` (m, aims)."""
-        # A constraint that is met already has a difference of zero.
-        scale = 1.0 / np.sqrt(np.where(misses == 0.0, 1.0, misses))
-        values, vectors = np.linalg.eigh(scale[:, :, None] * apart * scale[:, None])
-        loads = ((scale * misses)[:, None] @ vectors)[:, 0]
-        return cls(apart, scale, values, vectors, loads)
-
-    def at(self, price: Annotated[Floats, "motions"]) -> StackedValues:
-        """Return the shares (m, aims); price: weight of the squared distance."""
-        found = self.loads / (1.0 + price[:, None] * self.values)
-        free = self.scale * (self.vectors @ found[..., None])[..., 0]
-        return np.asarray(np.minimum(np.maximum(free, 0.0), 1.0))
-
-    def squared_lengths(self, price: Annotated[Floats, "motions"]) -> Annotated[Floats, "motions"]:
-        """Return the squared Mahalanobis lengths (m,) of the shares of the differences."""
-        own = self.at(price)[:, None]
-        return np.asarray((own @ self.apart @ own.swapaxes(1, 2))[:, 0, 0])
+        return np.asarray((differences @ shares(high)[..., None])[..., 0])
 
 
 def assess(
     spread: ResidualCovariance,
     tasks: Sequence[CorrectionTask],
     numbers: StackedVariables,
-    looked: tuple[StackedValues, StackedGradients],
+    values: StackedValues,
+    gradients: StackedGradients,
 ) -> Reachability:
     """Return the reachability of the constraints of tasks of one kind from motions (M, numbers).
 
-    looked: values and gradients of the motions.
+    values, gradients: of the motions.
     """
-    sizes = [len(aim.target) for aim in tasks[0].aims]
+    sizes = [len(aim.target) for aim in tasks[0][1]]
     members = np.repeat(np.eye(len(sizes)), sizes, axis=0)
-    values, gradients = looked
-    sigmas = np.array([own.sigma for own in tasks])
+    sigmas = np.array([motion.state.sigma for motion, _ in tasks])
     covariance = np.square(sigmas)[:, None, None] * _blend_equal_shares(
         _residual_covariances(spread, tasks, numbers, gradients), members
     )
-    targets = np.stack([np.concatenate([aim.target for aim in own.aims]) for own in tasks])
+    targets = np.stack([np.concatenate([aim.target for aim in aims]) for _, aims in tasks])
     return Reachability(targets - values, covariance, members)
 
 
@@ -163,8 +145,8 @@ def distance_limit(values: int) -> float:
     """
     spread = np.sqrt(2.0 / (9.0 * 3.0))
     share = ((MAX_DEVIATIONS**2 / 3.0) ** (1.0 / 3.0) - (1.0 - spread**2)) / spread
-    own = np.sqrt(2.0 / (9.0 * values))
-    return float(np.sqrt(values * (1.0 - own**2 + share * own) ** 3))
+    deviation = np.sqrt(2.0 / (9.0 * values))
+    return float(np.sqrt(values * (1.0 - deviation**2 + share * deviation) ** 3))
 
 
 def _residual_covariances(
@@ -180,14 +162,15 @@ def _residual_covariances(
     motions = np.concatenate([spread.captured, spread.predicted])
     clips = len(spread.captured)
     strays = np.empty((len(tasks), clips, gradients.shape[1]))
-    for place, own in enumerate(tasks):
+    for index, (motion, aims) in enumerate(tasks):
         cancellation.check()
-        found = [aim.evaluate_motions(own.scene, numbers[place], motions) for aim in own.aims]
-        every = np.hstack(found)
-        strays[place] = (every[:clips] - every[clips:]) / spread.sigmas[:, None]
-    beside = gradients[:, :, motions.shape[1] :]
-    own_part = strays.swapaxes(1, 2) @ strays
-    return np.asarray(own_part + beside @ spread.beside @ beside.swapaxes(1, 2))
+        values = np.hstack(
+            [aim.evaluate_motions(motion.scene, numbers[index], motions) for aim in aims]
+        )
+        strays[index] = (values[:clips] - values[clips:]) / spread.sigmas[:, None]
+    outer = gradients[:, :, motions.shape[1] :]
+    inner_part = strays.swapaxes(1, 2) @ strays
+    return np.asarray(inner_part + outer @ spread.beside @ outer.swapaxes(1, 2))
 
 
 def _blend_equal_shares(
@@ -199,13 +182,13 @@ def _blend_equal_shares(
     contradicting constraints would seem near.
     """
     sizes = members.sum(axis=0)
-    place = np.concatenate([np.arange(size) for size in sizes])
-    beside = members @ sizes
-    alike = (place[:, None] == place) & (beside[:, None] == beside)
+    axes = np.concatenate([np.arange(size) for size in sizes])
+    sizes_of_values = members @ sizes
+    alike = (axes[:, None] == axes) & (sizes_of_values[:, None] == sizes_of_values)
     shared = members.T @ (alike * covariance) @ members / sizes
     # A value that never varies has a variance of zero.
-    own = np.maximum(shared, 1e-12) * np.eye(len(sizes))
-    shared = SHARE_CORRELATION * shared + (1.0 - SHARE_CORRELATION) * own
+    variances = np.maximum(shared, 1e-12) * np.eye(len(sizes))
+    shared = SHARE_CORRELATION * shared + (1.0 - SHARE_CORRELATION) * variances
     return (1.0 - EQUAL_SHARE) * covariance + EQUAL_SHARE * alike * (members @ shared @ members.T)
 
 

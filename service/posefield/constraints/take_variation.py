@@ -15,7 +15,8 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, PointControls, PointLabels, PointValues, Values
 from posefield.common.value_cache import ValueCache
-from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import reduced_motion
 from posefield.inference.session import Session
@@ -60,13 +61,93 @@ def _seed(asked: _SeedPoint) -> int:
     return asked[0]
 
 
-class TakeSampler:
-    """Deviations of the takes of one model."""
+DETAIL_CACHE = 512
+"""Number of cached details, of 12 kB each: a crowd asks for the same ones in every frame."""
 
-    def __init__(self, session: Session) -> None:
+
+class TakeVariation:
+    """Variation of the motions of one model.
+
+    eventful_times: number of time functions, the first ones, that vary in a motion without cycle.
+    """
+
+    def __init__(self, session: Session, eventful_times: int = EVENTFUL_TIMES) -> None:
         self._session = session
+        self._eventful_times = eventful_times
         self._field_cached = lru_cache(FIELD_CACHE)(self._field)
-        self._deviations_kept: ValueCache[_SeedPoint, Values] = ValueCache(DEVIATION_CACHE)
+        self._deviations_cached = ValueCache[_SeedPoint, Values](DEVIATION_CACHE)
+        self._detail_cached = lru_cache(DETAIL_CACHE)(self._detail)
+
+    def vary(
+        self,
+        bench: LevelCorrector,
+        begun: ConstrainedMotion,
+        question: ValidatedQuestion,
+        take: TakeSettings,
+    ) -> ConstrainedMotion:
+        """Return a take of a prediction at the controls and labels of its question."""
+        if take.seed:
+            seeds = np.array([take.seed])
+            changes = self.changes(bench, question.point, question.labels, seeds)
+            moved = begun.numbers + take.variety * changes[0]
+            scene = replace(begun.scene, predicted=begun.numbers)
+            begun = replace(begun, scene=scene, numbers=moved)
+        if not take.detail:
+            return begun
+        detailed = replace(bench.reduced, detail=self.detail(bench, take.seed))
+        return replace(begun, scene=replace(begun.scene, reduced=detailed))
+
+    def changes(
+        self,
+        bench: LevelCorrector,
+        controls: PointControls,
+        labels: PointLabels,
+        seeds: Annotated[Indices, "points"],
+    ) -> Annotated[Floats, "points variables"]:
+        """Return the changes (B, numbers) of motions at controls (B, d) and labels (B, p).
+
+        seeds (B,): of their takes; zero changes nothing.
+        """
+        by = self.deviations(controls, labels, seeds)
+        card, (times, freedoms, modes) = self._session.card, bench.reduced.core.shape
+        # A coarser level has the leading coefficients, and these have the leading part of the root.
+        count = min(modes, bench.spread.residuals.shape[1])
+        motions = by[:, :count] @ bench.spread.residuals.T
+        if not card.cyclic:
+            motions.reshape(-1, times, freedoms)[:, self._eventful_times :] = 0.0
+            return motions
+        # Files of earlier versions have no joint root; their cycles last and travel as predicted.
+        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, by.shape[1])))
+        return np.hstack([motions, by @ root.T])
+
+    def along_paths(
+        self,
+        controls: Annotated[Floats, "paths points controls"],
+        labels: Annotated[Floats, "paths labels"],
+        seeds: Annotated[Indices, "paths"],
+    ) -> Annotated[Floats, "paths points modes"]:
+        """Return deviations (N, B, r3) of a cycle's coefficients along paths of controls (N, B, d).
+
+        They are uncorrelated, each with the variance of sigma: `change_coefficients` correlates
+        them. labels (N, p) and seeds (N,): one of each path; zero for seeds of zero.
+        """
+        modes = self._session.card.levels[0].ranks[2]
+        return self._deviations_along(controls, labels, seeds)[..., :modes]
+
+    def details(
+        self, seeds: Annotated[Indices, "paths"]
+    ) -> Annotated[Floats, "paths frames freedoms"]:
+        """Return the details (N, T, r1) of seeds (N,), at the finest level."""
+        card = self._session.card
+        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seeds)
+
+    def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
+        """Return the detail (T, r1) of a seed."""
+        return self._detail_cached(seed)[:, : len(bench.reduced.directions)]
+
+    def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
+        card = self._session.card
+        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seed)
 
     def deviations(
         self, controls: PointControls, labels: PointLabels, seeds: Annotated[Indices, "points"]
@@ -84,10 +165,10 @@ class TakeSampler:
         # As bytes, whose hash is computed once.
         keys = [(int(seeds[place]), rows[place].tobytes()) for place in varied]
         if keys:
-            found[varied] = self._deviations_kept.find_all(keys, self._deviations)
+            found[varied] = self._deviations_cached.find_all(keys, self._deviations)
         return found
 
-    def along(
+    def _deviations_along(
         self,
         controls: Annotated[Floats, "paths points controls"],
         labels: Annotated[Floats, "paths labels"],
@@ -137,94 +218,6 @@ class TakeSampler:
     def _root_of_sill(self) -> float:
         sill = onnx_file.initializers(self._session.content)["sill"]
         return float(np.sqrt(sill.item()))
-
-
-DETAIL_CACHE = 512
-"""Number of cached details, of 12 kB each: a crowd asks for the same ones in every frame."""
-
-
-class TakeVariation:
-    """Variation of the motions of one model.
-
-    eventful_times: number of time functions, the first ones, that vary in a motion without cycle.
-    """
-
-    def __init__(self, session: Session, eventful_times: int = EVENTFUL_TIMES) -> None:
-        self._session = session
-        self._eventful_times = eventful_times
-        self._sampler = TakeSampler(session)
-        self._detail_cached = lru_cache(DETAIL_CACHE)(self._detail)
-
-    def vary(
-        self,
-        bench: LevelCorrector,
-        begun: ConstrainedMotion,
-        question: ValidatedQuestion,
-        take: TakeSettings,
-    ) -> ConstrainedMotion:
-        """Return a take of a prediction at the controls and labels of its question."""
-        if take.seed:
-            seeds = np.array([take.seed])
-            changes = self.changes(bench, question.point, question.labels, seeds)
-            moved = begun.numbers + take.variety * changes[0]
-            scene = replace(begun.scene, predicted=begun.numbers)
-            begun = replace(begun, scene=scene, numbers=moved)
-        if not take.detail:
-            return begun
-        detailed = replace(bench.reduced, detail=self.detail(bench, take.seed))
-        return replace(begun, scene=replace(begun.scene, reduced=detailed))
-
-    def changes(
-        self,
-        bench: LevelCorrector,
-        controls: PointControls,
-        labels: PointLabels,
-        seeds: Annotated[Indices, "points"],
-    ) -> Annotated[Floats, "points variables"]:
-        """Return the changes (B, numbers) of motions at controls (B, d) and labels (B, p).
-
-        seeds (B,): of their takes; zero changes nothing.
-        """
-        by = self._sampler.deviations(controls, labels, seeds)
-        card, (times, freedoms, modes) = self._session.card, bench.reduced.core.shape
-        # A coarser level has the leading coefficients, and these have the leading part of the root.
-        count = min(modes, bench.spread.residuals.shape[1])
-        motions = by[:, :count] @ bench.spread.residuals.T
-        if not card.cyclic:
-            motions.reshape(-1, times, freedoms)[:, self._eventful_times :] = 0.0
-            return motions
-        # Files of earlier versions have no joint root; their cycles last and travel as predicted.
-        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, by.shape[1])))
-        return np.hstack([motions, by @ root.T])
-
-    def along_paths(
-        self,
-        controls: Annotated[Floats, "paths points controls"],
-        labels: Annotated[Floats, "paths labels"],
-        seeds: Annotated[Indices, "paths"],
-    ) -> Annotated[Floats, "paths points modes"]:
-        """Return deviations (N, B, r3) of a cycle's coefficients along paths of controls (N, B, d).
-
-        They are uncorrelated, each with the variance of sigma: `change_coefficients` correlates
-        them. labels (N, p) and seeds (N,): one of each path; zero for seeds of zero.
-        """
-        modes = self._session.card.levels[0].ranks[2]
-        return self._sampler.along(controls, labels, seeds)[..., :modes]
-
-    def details(
-        self, seeds: Annotated[Indices, "paths"]
-    ) -> Annotated[Floats, "paths frames freedoms"]:
-        """Return the details (N, T, r1) of seeds (N,), at the finest level."""
-        card = self._session.card
-        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seeds)
-
-    def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
-        """Return the detail (T, r1) of a seed."""
-        return self._detail_cached(seed)[:, : len(bench.reduced.directions)]
-
-    def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
-        card = self._session.card
-        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seed)
 
 
 def change_coefficients(

@@ -12,9 +12,9 @@ import numpy as np
 from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import Floats
 from posefield.constraints import take_variation
-from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import TravelConstraint
-from posefield.constraints.gauss_newton import MISS_TOLERANCE
+from posefield.constraints.gauss_newton import MISS_TOLERANCE, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
 from posefield.constraints.take_variation import TakeSettings
 from posefield.model_file import answer_bounds

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.constraints import constrained_motion
-from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints import gauss_newton
+from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import PositionConstraint
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.inference.session import Session
 from posefield.motion.measures import Measure
 
@@ -38,7 +39,7 @@ class Begun:
 
 def begin(opened: Session, level: int = 0) -> Begun:
     """A motion in the middle of the controls, of the first performer."""
-    bench = constrained_motion.build_corrector(opened, level)
+    bench = gauss_newton.build_corrector(opened, level)
     point = np.median(opened.card.examples, axis=0, keepdims=True)
     performers = len(opened.card.performers)
     state = opened.state(point, np.array([0.0, 0.3, 0.61]), np.eye(1, performers), level)

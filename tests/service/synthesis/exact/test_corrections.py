@@ -9,7 +9,6 @@ from scipy.spatial import distance as apart
 from scipy.stats import chi
 
 from posefield.constraints import constraint, reachability
-from posefield.constraints.constraint import CorrectionTask
 from posefield.constraints.reachability import Reachability
 
 
@@ -127,8 +126,7 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
 def looked_at(begun, aims) -> Reachability:
     scene, numbers = begun.held.scene, begun.held.numbers
     seen = constraint.evaluate_many(aims, [scene], numbers[None])
-    task = CorrectionTask(scene, begun.held.state.sigma, numbers, aims)
-    return reachability.assess(begun.bench.spread, [task], numbers[None], seen)
+    return reachability.assess(begun.bench.spread, [(begun.held, aims)], numbers[None], *seen)
 
 
 def judged(differences, covariance, members):

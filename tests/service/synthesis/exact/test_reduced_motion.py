@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from beginning import begin
 
-from posefield.constraints import constrained_motion
+from posefield.constraints import gauss_newton
 from posefield.constraints.constraint import (
     PositionConstraint,
     StepLengthConstraint,
@@ -125,7 +125,7 @@ def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_ex
 
 def read(content):
     """Spread of a file's finest level, and its rank of samples."""
-    own = constrained_motion.build_corrector(session.open_bytes(content, "x.onnx"), 0)
+    own = gauss_newton.build_corrector(session.open_bytes(content, "x.onnx"), 0)
     return own.spread, own.reduced.core.shape[2]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.constraints.take_variation import TakeSampler
+from posefield.constraints.take_variation import TakeVariation
 from posefield.inference import reduced_motion, session
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
@@ -73,8 +73,8 @@ def test_a_captured_clip_is_its_own_only_take_without_nugget(model):
     card = model.session.card
     exact = replace(card, kriging=replace(card.kriging, nugget=0.0))
     row = np.array(card.examples[:1]), card.clip_labels[:1]
-    found = TakeSampler(replace(model.session, card=exact)).deviations(*row, np.array([SEED]))
-    noisy = TakeSampler(model.session).deviations(*row, np.array([SEED]))
+    found = TakeVariation(replace(model.session, card=exact)).deviations(*row, np.array([SEED]))
+    noisy = TakeVariation(model.session).deviations(*row, np.array([SEED]))
     # Without nugget the system is badly conditioned.
     assert np.abs(found).max() < 1e-3 * np.abs(noisy).max()
 
@@ -84,7 +84,7 @@ def test_a_take_is_a_smooth_function_of_the_controls(model):
     values = np.linspace(control.minimum, control.maximum, 41)
     points = np.array([[*middle(model, **{control.name: value}).values()] for value in values])
     nobody = np.zeros((1, sum(model.session.card.label_counts)))
-    sampler = TakeSampler(model.session)
+    sampler = TakeVariation(model.session)
 
     def largest_step(seeds):
         pairs = zip(points, seeds, strict=True)
