@@ -86,7 +86,7 @@ class ArchiveOrder:
             "lie outside what was sampled, or in a gap of it": sum(
                 bool(preview.warnings) for preview in self.previews
             ),
-            "miss some target": sum(preview.missed for preview in self.previews),
+            "miss some target": sum(preview.misses_target for preview in self.previews),
         }
         total, encoder = len(self.previews), self.format.encoder
         warnings = [f"{count} of {total} clips {text}" for text, count in counts.items() if count]

@@ -73,11 +73,11 @@ def evaluate_poses(
     if not motions:
         return []
     groups, first = frame_groups.of_lengths(frames), motions[0].scene
-    parts = [
+    pairs = [
         motion.scene.reduced.turn_products(motion.scene.motion(motion.numbers), at)
         for motion, at in zip(motions, frames, strict=True)
     ]
-    products, roots = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    products, roots = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
     rotations = first.reduced.rotations_of(products)
     if first.cyclic:
         travel = np.array([motion.travel for motion in motions])[groups.group]

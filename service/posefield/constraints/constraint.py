@@ -73,16 +73,16 @@ class PositionConstraint:
 
     def frame(self, last: float) -> float | None:
         """Return the moment's canonical frame, 0 to last; None if the motion determines it."""
-        known = {"start": 0.0, "end": last, "landmark": self.at}
-        return known.get(self.moment.at or "")
+        frames = {"start": 0.0, "end": last, "landmark": self.at}
+        return frames.get(self.moment.at or "")
 
     def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the values and their gradients."""
         joints = self.moment.joints
         at = _moment_frame(scene, numbers, self.moment, self.at)
-        found = [scene.position_and_gradient(numbers, joint, at) for joint in joints]
-        values = np.mean([value for value, _ in found], axis=0)
-        gradients = np.mean([gradient for _, gradient in found], axis=0)
+        pairs = [scene.position_and_gradient(numbers, joint, at) for joint in joints]
+        values = np.mean([value for value, _ in pairs], axis=0)
+        gradients = np.mean([gradient for _, gradient in pairs], axis=0)
         return values[list(self.axes)], gradients[list(self.axes)]
 
     @property
@@ -94,17 +94,17 @@ class PositionConstraint:
         self, scenes: Sequence[MotionVariables], numbers: StackedVariables
     ) -> tuple[StackedValues, StackedGradients]:
         """Return the values (M, k) of motions and their gradients (M, k, numbers)."""
-        return _stacked([self.evaluate(*own) for own in zip(scenes, numbers, strict=True)])
+        return _stacked([self.evaluate(*motion) for motion in zip(scenes, numbers, strict=True)])
 
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions values"]:
         """Return the values (n, k) of other motions."""
         at = _moment_frame(scene, numbers, self.moment, self.at)
-        found = [
+        positions = [
             scene.evaluate_motions(numbers, motions, joint, at) for joint in self.moment.joints
         ]
-        return np.asarray(np.mean(found, axis=0)[:, list(self.axes)], np.float64)
+        return np.asarray(np.mean(positions, axis=0)[:, list(self.axes)], np.float64)
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,9 @@ class StepLengthConstraint:
         first, second = (
             scene.position_and_gradient(numbers, joint, at) for joint in self.moment.joints
         )
-        ahead = first[0][2] - second[0][2]
-        sign = 1.0 if ahead >= 0.0 else -1.0
-        return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
+        distance = first[0][2] - second[0][2]
+        sign = 1.0 if distance >= 0.0 else -1.0
+        return np.array([sign * distance]), sign * (first[1] - second[1])[2:]
 
     @property
     def kind(self) -> Hashable:
@@ -135,7 +135,7 @@ class StepLengthConstraint:
         self, scenes: Sequence[MotionVariables], numbers: StackedVariables
     ) -> tuple[StackedValues, StackedGradients]:
         """Return the values (M, k) of motions and their gradients (M, k, numbers)."""
-        return _stacked([self.evaluate(*own) for own in zip(scenes, numbers, strict=True)])
+        return _stacked([self.evaluate(*motion) for motion in zip(scenes, numbers, strict=True)])
 
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
@@ -177,9 +177,9 @@ class TravelConstraint:
         if self.quantity == "turn":
             gradients[:, 0, -1] = np.degrees(1.0)
             return values[:, None], gradients
-        way = np.maximum(np.hypot(travel[:, 0], travel[:, 1]), 1e-9)
+        distance = np.maximum(np.hypot(travel[:, 0], travel[:, 1]), 1e-9)
         per = duration if self.quantity == "speed" else np.ones(len(duration))
-        gradients[:, 0, -CYCLE_VARIABLES + 1 : -1] = travel[:, :2] / (way * per)[:, None]
+        gradients[:, 0, -CYCLE_VARIABLES + 1 : -1] = travel[:, :2] / (distance * per)[:, None]
         if self.quantity == "speed":
             gradients[:, 0, -CYCLE_VARIABLES] = -values
         return values[:, None], gradients
@@ -204,37 +204,39 @@ def evaluate_many(
 ) -> tuple[StackedValues, StackedGradients]:
     """Return the values (M, k) and gradients (M, k, numbers) of several constraints of motions."""
     cancellation.check()
-    found = [aim.evaluate_many(scenes, numbers) for aim in aims]
-    values, gradients = zip(*found, strict=True)
+    pairs = [aim.evaluate_many(scenes, numbers) for aim in aims]
+    values, gradients = zip(*pairs, strict=True)
     return np.concatenate(values, axis=1), np.concatenate(gradients, axis=1)
 
 
 def _stacked(
-    found: Sequence[ValuesAndGradients],
+    pairs: Sequence[ValuesAndGradients],
 ) -> tuple[StackedValues, StackedGradients]:
     """Return the values (M, k) and gradients (M, k, numbers) of motions."""
-    values, gradients = zip(*found, strict=True)
+    values, gradients = zip(*pairs, strict=True)
     return np.stack(values), np.stack(gradients)
 
 
-def from_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> list[Constraint]:
+def from_controls(controls: Sequence[tuple[str, Measure, float]], frames: int) -> list[Constraint]:
     """Return the constraints of measured controls, given as name, measure and target value.
 
     frames: number of canonical frames. Positions of the same joints at the same moment become one
     constraint, so that its error is one distance.
     """
     aims: list[Constraint] = []
-    places: dict[Measure, list[tuple[str, int, float]]] = {}
-    for name, own, goal in asked:
-        if own.quantity in TRAVEL_QUANTITIES:
-            aims.append(TravelConstraint((name,), own.quantity, np.array([goal]), own.unit))
-        elif own.quantity == "step_length":
-            aims.append(StepLengthConstraint((name,), own, np.array([goal])))
+    values_by_moment: dict[Measure, list[tuple[str, int, float]]] = {}
+    for name, measure, goal in controls:
+        if measure.quantity in TRAVEL_QUANTITIES:
+            aims.append(TravelConstraint((name,), measure.quantity, np.array([goal]), measure.unit))
+        elif measure.quantity == "step_length":
+            aims.append(StepLengthConstraint((name,), measure, np.array([goal])))
         else:
-            moment = Measure("height", own.joints, own.at, own.share)
-            places.setdefault(moment, []).append((name, POSITION_AXES[own.quantity], goal))
-    for moment, parts in places.items():
-        names, axes, goals = zip(*parts, strict=True)
+            moment = Measure("height", measure.joints, measure.at, measure.share)
+            values_by_moment.setdefault(moment, []).append(
+                (name, POSITION_AXES[measure.quantity], goal)
+            )
+    for moment, coordinates in values_by_moment.items():
+        names, axes, goals = zip(*coordinates, strict=True)
         aims.append(
             PositionConstraint(
                 names, moment, axes, np.array(goals), (moment.share or 0.0) * (frames - 1)
@@ -243,21 +245,23 @@ def from_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> l
     return aims
 
 
-def _moment_frame(scene: MotionVariables, numbers: Variables, own: Measure, given: float) -> float:
+def _moment_frame(
+    scene: MotionVariables, numbers: Variables, measure: Measure, landmark: float
+) -> float:
     """Return the canonical frame at which a quantity is measured.
 
-    given: frame of a landmark.
+    landmark: frame of a landmark.
     """
     last = scene.reduced.frames - 1
-    if own.at in ("start", "end", "landmark"):
-        return {"start": 0.0, "end": float(last), "landmark": given}[own.at]
+    if measure.at in ("start", "end", "landmark"):
+        return {"start": 0.0, "end": float(last), "landmark": landmark}[measure.at]
     # Determined by the motion: at an extreme, the gradient at that frame equals the gradient of the
     # extreme.
-    joints = own.joints if own.at != "farthest" else (0, *own.joints)
-    places = np.arange(last + 1.0)
-    positions = np.stack([scene.positions(numbers, joint, places) for joint in joints], axis=1)
-    if own.at == "farthest":
+    joints = measure.joints if measure.at != "farthest" else (0, *measure.joints)
+    frames = np.arange(last + 1.0)
+    positions = np.stack([scene.positions(numbers, joint, frames) for joint in joints], axis=1)
+    if measure.at == "farthest":
         away = positions[:, 1:].mean(axis=1) - positions[:, 0]
         return float(np.argmax(np.sum(np.square(away), axis=-1)))
-    seen = Measure(own.quantity, tuple(range(len(joints))), own.at)
-    return measures.moment_frame(seen, positions, 0.0)
+    local = Measure(measure.quantity, tuple(range(len(joints))), measure.at)
+    return measures.moment_frame(local, positions, 0.0)

@@ -61,17 +61,17 @@ class ConstraintSolver:
         The open controls are near those of a captured clip that is typical for the other controls
         and the targets.
         """
-        open_ = set(question.inferred)
-        given = {name: v for name, v in question.controls.items() if name not in open_}
-        given |= controls_from_targets(self._session.card, given, targets)
-        if len(given) == len(question.controls):
-            return given
-        return self._fit_controls(question, given, targets, chooser)
+        inferred = set(question.inferred)
+        values = {name: v for name, v in question.controls.items() if name not in inferred}
+        values |= controls_from_targets(self._session.card, values, targets)
+        if len(values) == len(question.controls):
+            return values
+        return self._fit_controls(question, values, targets, chooser)
 
     def _fit_controls(
         self,
         question: ValidatedQuestion,
-        given: dict[str, float],
+        fixed: dict[str, float],
         targets: tuple[JointTarget, ...],
         chooser: ControlImputer,
     ) -> dict[str, float]:
@@ -82,33 +82,37 @@ class ConstraintSolver:
         in each round. It stops when the distance of the targets is within the spread of captured
         motions; a closer fit would attribute chance to the controls.
         """
-        seen = np.hstack([self._positions_cached(goal.moment, goal.time) for goal in targets])
-        wanted = asked = np.array([value for goal in targets for value in goal.position])
+        captured = np.hstack([self._positions_cached(goal.moment, goal.time) for goal in targets])
+        goals = shifted = np.array([value for goal in targets for value in goal.position])
         tried: list[tuple[float, dict[str, float]]] = []
-        local = chooser.near_measures(given, question.labels, seen, wanted)
-        found = local.captured()
+        impute = chooser.near_measures(fixed, question.labels, captured, goals)
+        controls = impute.captured()
         for _ in range(MAX_ROUNDS):
-            own = replace(question, controls=found, point=np.array([list(found.values())]))
-            begun = self.solve(own, NO_CONSTRAINTS)
-            aims = self._target_constraints(own, targets, begun)
-            tried.append((self.corrector(question.level).distance(begun, aims), found))
-            if tried[-1][0] <= math.sqrt(len(wanted)):
+            complete = replace(
+                question, controls=controls, point=np.array([list(controls.values())])
+            )
+            motion = self.solve(complete, NO_CONSTRAINTS)
+            aims = self._target_constraints(complete, targets, motion)
+            tried.append((self.corrector(question.level).distance(motion, aims), controls))
+            if tried[-1][0] <= math.sqrt(len(goals)):
                 break
             if len(tried) > 1:
-                asked = asked + wanted - constraint.evaluate(aims, begun.scene, begun.numbers)[0]
-            found = local(asked)
+                shifted = (
+                    shifted + goals - constraint.evaluate(aims, motion.scene, motion.numbers)[0]
+                )
+            controls = impute(shifted)
         return min(tried, key=lambda pair: pair[0])[1]
 
-    def solve(self, question: ValidatedQuestion, found: ConstraintSet) -> ConstrainedMotion:
+    def solve(self, question: ValidatedQuestion, constraints: ConstraintSet) -> ConstrainedMotion:
         """Return the motion that satisfies its constraints, as far as captured motions reach.
 
         Without constraints, it is the predicted motion or its take. Raises InvalidField for a
         target at a time outside the clip.
         """
-        (held,) = self.solve_all([(question, found)])
-        if isinstance(held, QueryError):
-            raise held
-        return held
+        (motion,) = self.solve_all([(question, constraints)])
+        if isinstance(motion, QueryError):
+            raise motion
+        return motion
 
     def solve_all(
         self, questions: Sequence[tuple[ValidatedQuestion, ConstraintSet]]
@@ -134,9 +138,9 @@ class ConstraintSolver:
             self._correctors[level] = gauss_newton.build_corrector(self._session, level)
         return self._correctors[level]
 
-    def measured(self, question: ValidatedQuestion, held: ConstrainedMotion) -> dict[str, float]:
+    def measured(self, question: ValidatedQuestion, motion: ConstrainedMotion) -> dict[str, float]:
         """Return the measured controls of a motion."""
-        return self.corrector(question.level).measured(held)
+        return self.corrector(question.level).measured(motion)
 
     def poses(
         self, requests: Sequence[tuple[ValidatedQuestion, ConstrainedMotion, Frames, Trust]]
@@ -167,15 +171,15 @@ class ConstraintSolver:
     ) -> Annotated[Floats, "samples 3"]:
         """Return a joint's predicted position (n, 3), m, at a moment of each captured clip."""
         goal = JointTarget("", moment, (0.0, 0.0, 0.0), time)
-        found = []
+        positions = []
         for state in self._captured if time is None else self._predicted(time):
             cancellation.check()
-            begun = self.corrector(0).predict(state)
-            aim = self._position_constraint(goal, begun, state.frames[0])
-            motions = begun.scene.motion(begun.numbers).reshape(1, -1)
+            motion = self.corrector(0).predict(state)
+            aim = self._position_constraint(goal, motion, state.frames[0])
+            motions = motion.scene.motion(motion.numbers).reshape(1, -1)
             # `evaluate_motions` computes the value without its gradient, which is not needed here.
-            found.append(aim.evaluate_motions(begun.scene, begun.numbers, motions)[0])
-        return np.array(found)
+            positions.append(aim.evaluate_motions(motion.scene, motion.numbers, motions)[0])
+        return np.array(positions)
 
     @cached_property
     def _captured(self) -> list[PredictionState]:
@@ -186,13 +190,18 @@ class ConstraintSolver:
         """Return the prediction for each captured clip, with the canonical frame of a time, s."""
         card, when = self._session.card, np.array([time])
         pairs = zip(card.examples, card.clip_labels, strict=True)
-        return [self._session.state(np.array([own]), when, labels[None]) for own, labels in pairs]
+        return [
+            self._session.state(np.array([controls]), when, labels[None])
+            for controls, labels in pairs
+        ]
 
-    def _frames(self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames) -> Frames:
+    def _frames(
+        self, question: ValidatedQuestion, motion: ConstrainedMotion, times: Frames
+    ) -> Frames:
         """Return the canonical frames (S,) of times (S,), s, scaled by a corrected duration."""
-        shares = when * (held.state.duration / held.duration)
-        own = self._session.state(question.point, shares, question.labels, question.level)
-        return own.frames
+        shares = times * (motion.state.duration / motion.duration)
+        state = self._session.state(question.point, shares, question.labels, question.level)
+        return state.frames
 
     def _solve(
         self, questions: Sequence[tuple[ValidatedQuestion, ConstraintSet]]
@@ -271,22 +280,25 @@ class ConstraintSolver:
         return motion
 
     def _target_constraints(
-        self, question: ValidatedQuestion, targets: tuple[JointTarget, ...], held: ConstrainedMotion
+        self,
+        question: ValidatedQuestion,
+        targets: tuple[JointTarget, ...],
+        motion: ConstrainedMotion,
     ) -> list[PositionConstraint]:
         """Return the constraints of targets, at the canonical frames of the given motion."""
         # The duration is known only after the correction; times beyond the longest plausible clip
         # are limited because they may overflow float32.
         longest = question_validation.duration_range(self._session.card)[1]
         times = np.array([min(goal.time or 0.0, longest) for goal in targets])
-        timed = self._frames(question, held, times) if len(times) else times
+        timed = self._frames(question, motion, times) if len(times) else times
         pairs = zip(targets, timed.tolist(), strict=True)
-        return [self._position_constraint(goal, held, frame) for goal, frame in pairs]
+        return [self._position_constraint(goal, motion, frame) for goal, frame in pairs]
 
     def _position_constraint(
-        self, goal: JointTarget, held: ConstrainedMotion, frame: float
+        self, goal: JointTarget, motion: ConstrainedMotion, frame: float
     ) -> PositionConstraint:
         """Return the constraint of a target; frame: canonical frame of its time, if it has one."""
-        last = held.scene.reduced.frames - 1
+        last = motion.scene.reduced.frames - 1
         at = (goal.moment.share or 0.0) * last if goal.time is None else frame
         return PositionConstraint((goal.name,), goal.moment, (0, 1, 2), np.array(goal.position), at)
 
@@ -315,26 +327,30 @@ def _check_duplicates(targets: Sequence[PositionConstraint], last: float) -> Non
 
 
 def controls_from_targets(
-    card: ModelCard, given: Mapping[str, float], goals: tuple[JointTarget, ...]
+    card: ModelCard, known_controls: Mapping[str, float], goals: tuple[JointTarget, ...]
 ) -> dict[str, float]:
     """Return values of controls that targets determine, limited to the sampled ranges.
 
     The targets remain constraints.
     """
-    found = {}
+    values = {}
     for goal in goals:
         for control in card.controls:
-            own = control.measure
-            if control.name in given or own is None or own.quantity not in POSITION_AXES:
+            measure = control.measure
+            if (
+                control.name in known_controls
+                or measure is None
+                or measure.quantity not in POSITION_AXES
+            ):
                 continue
-            same = (own.joints, own.at, own.share) == (
+            same = (measure.joints, measure.at, measure.share) == (
                 goal.moment.joints,
                 goal.moment.at,
                 goal.moment.share,
             )
             if same and goal.time is None:
-                value = float(goal.position[POSITION_AXES[own.quantity]])
+                value = float(goal.position[POSITION_AXES[measure.quantity]])
                 # Beyond the sampled range, the correction approaches the target, not the model's
                 # extrapolation.
-                found[control.name] = min(max(value, control.minimum), control.maximum)
-    return found
+                values[control.name] = min(max(value, control.minimum), control.maximum)
+    return values

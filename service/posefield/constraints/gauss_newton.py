@@ -132,14 +132,14 @@ def _kind(motion: ConstrainedMotion, aims: Sequence[Constraint]) -> tuple[object
 class _Problems:
     """Constraints and metric of M corrections of one kind.
 
-    aims: of one of them, whose targets are not used. begun: (M, numbers). goals: values (M, k) to
-    reach. weights (M, k): of the values in the squared errors.
+    aims: of one of them, whose targets are not used. first: (M, numbers), before the correction.
+    goals: values (M, k) to reach. weights (M, k): of the values in the squared errors.
     """
 
     scenes: Sequence[MotionVariables]
     spread: ResidualCovariance
     aims: Sequence[Constraint]
-    begun: StackedVariables
+    first: StackedVariables
     goals: StackedValues
     weights: StackedValues
 
@@ -147,8 +147,8 @@ class _Problems:
         """Return some of the problems."""
         return replace(
             self,
-            scenes=[self.scenes[place] for place in chosen.tolist()],
-            begun=self.begun[chosen],
+            scenes=[self.scenes[row] for row in chosen.tolist()],
+            first=self.first[chosen],
             goals=self.goals[chosen],
             weights=self.weights[chosen],
         )
@@ -170,21 +170,21 @@ class _Problems:
 
 @dataclass(frozen=True)
 class _Iterates:
-    """Motions of M corrections. whole: whether to correct from the predictions anew (M,)."""
+    """Motions of M corrections. anew: whether to correct from the predictions anew (M,)."""
 
     numbers: StackedVariables
     values: StackedValues
     gradients: StackedGradients
-    whole: Annotated[Booleans, "motions"]
+    anew: Annotated[Booleans, "motions"]
 
     def select(self, chosen: Annotated[Indices, "chosen"]) -> "_Iterates":
         """Return some of the iterates."""
-        return _Iterates(*(getattr(self, own.name)[chosen] for own in fields(self)))
+        return _Iterates(*(getattr(self, column.name)[chosen] for column in fields(self)))
 
-    def write(self, places: Annotated[Indices, "chosen"], found: "_Iterates") -> None:
+    def write(self, rows: Annotated[Indices, "chosen"], iterates: "_Iterates") -> None:
         """Replace some of the iterates by others."""
-        for own in fields(self):
-            getattr(self, own.name)[places] = getattr(found, own.name)
+        for column in fields(self):
+            getattr(self, column.name)[rows] = getattr(iterates, column.name)
 
 
 def _correct_alike(
@@ -219,19 +219,19 @@ def _descend(
     problems: _Problems, looked: tuple[StackedValues, StackedGradients]
 ) -> tuple[_Iterates, list[int]]:
     """Return the corrected motions, and the number of steps of each."""
-    count = len(problems.begun)
-    now = _Iterates(problems.begun.copy(), *looked, np.ones(count, bool))
+    count = len(problems.first)
+    last = _Iterates(problems.first.copy(), *looked, np.ones(count, bool))
     steps, active = np.zeros(count, np.int64), np.arange(count)
     for _ in range(MAX_STEPS):
-        left = np.abs(problems.goals[active] - now.values[active]).max(axis=1)
+        left = np.abs(problems.goals[active] - last.values[active]).max(axis=1)
         active = active[left >= TOLERANCE]
         if not len(active):
             break
-        moved, found = _next_iterates(problems.select(active), now.select(active))
-        active = active[moved]
-        now.write(active, found)
+        nearer, iterates = _next_iterates(problems.select(active), last.select(active))
+        active = active[nearer]
+        last.write(active, iterates)
         steps[active] += 1
-    return now, steps.tolist()
+    return last, steps.tolist()
 
 
 def _next_iterates(
@@ -245,27 +245,27 @@ def _next_iterates(
     metres = np.array([aim.unit == "m" for aim in problems.aims for _ in aim.target])
     far = np.maximum(np.abs(left[:, metres]).max(axis=1, initial=0.0), 1e-12)
     share = np.minimum(1.0, TRUST_RADIUS / far)
-    base = np.where(now.whole[:, None], problems.begun, now.numbers)
+    base = np.where(now.anew[:, None], problems.first, now.numbers)
     along = (now.gradients @ (now.numbers - base)[..., None])[..., 0]
     before = problems.errors(now.values)
-    found = now.select(np.arange(len(left)))
+    iterates = now.select(np.arange(len(left)))
     pending = np.arange(len(left))
     for _ in range(MAX_HALVINGS):
-        own = problems.select(pending)
+        open_problems = problems.select(pending)
         toward = share[pending, None] * left[pending] + along[pending]
-        tried = base[pending] + own.least_changes(now.gradients[pending], toward)
-        values, gradients = own.evaluate(tried)
-        better = own.errors(values) < SUFFICIENT_DECREASE * before[pending]
+        tried = base[pending] + open_problems.least_changes(now.gradients[pending], toward)
+        values, gradients = open_problems.evaluate(tried)
+        better = open_problems.errors(values) < SUFFICIENT_DECREASE * before[pending]
         done = pending[better]
         shortened = share[done] < 1.0
-        found.write(done, _Iterates(tried[better], values[better], gradients[better], shortened))
+        iterates.write(done, _Iterates(tried[better], values[better], gradients[better], shortened))
         pending = pending[~better]
         if not len(pending):
             break
         share[pending] *= 0.5
-    moved = np.ones(len(left), bool)
-    moved[pending] = False
-    return moved, found.select(np.flatnonzero(moved))
+    nearer = np.ones(len(left), bool)
+    nearer[pending] = False
+    return nearer, iterates.select(np.flatnonzero(nearer))
 
 
 def _solve(

@@ -56,8 +56,8 @@ class JointChain:
         vectors, turned, positions = (array[0] for array in self._forward(moves, travel))
         axes = turned @ self.chart.right_jacobian(vectors)
         arms = positions[-1] - positions
-        moved = quat.cross(np.swapaxes(axes, -1, -2), arms[:, None])
-        by_turning = moved.reshape(-1, 3).T @ self.directions[:, 3:].T
+        by_axes = quat.cross(np.swapaxes(axes, -1, -2), arms[:, None])
+        by_turning = by_axes.reshape(-1, 3).T @ self.directions[:, 3:].T
         return positions[-1], by_turning + self.directions[:, :3].T, quat.cross(UP, arms[0])
 
     def _forward(
@@ -144,10 +144,10 @@ class MotionVariables:
             return 0.0, np.zeros(3)
         return float(numbers[-CYCLE_VARIABLES]), numbers[-CYCLE_VARIABLES + 1 :]
 
-    def positions(self, numbers: Variables, joint: int, places: Frames) -> RootPath:
+    def positions(self, numbers: Variables, joint: int, frames: Frames) -> RootPath:
         """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
-        moves = self.reduced.moves(self.motion(numbers), places)
-        return self.chain(joint).positions(moves, self._travel_so_far(numbers, places))
+        moves = self.reduced.moves(self.motion(numbers), frames)
+        return self.chain(joint).positions(moves, self._travel_so_far(numbers, frames))
 
     def evaluate_motions(
         self,
@@ -160,31 +160,31 @@ class MotionVariables:
 
         All other variables, such as the travel, are those of this motion.
         """
-        places = np.full(len(motions), at, np.float64)
-        row, gone = self.reduced.row(at), self._travel_so_far(numbers, places)
+        frames = np.full(len(motions), at, np.float64)
+        row, travel = self.reduced.row(at), self._travel_so_far(numbers, frames)
         moves = row @ motions.reshape(len(motions), len(row), -1)
-        moves = self.reduced.with_detail(moves, places)
-        return self.chain(joint).positions(moves, gone)
+        moves = self.reduced.with_detail(moves, frames)
+        return self.chain(joint).positions(moves, travel)
 
     def position_and_gradient(
         self, numbers: Variables, joint: int, at: float
     ) -> tuple[Vector, Annotated[Floats, "3 variables"]]:
         """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
-        places = np.array([at], np.float64)
+        frames = np.array([at], np.float64)
         row = self.reduced.row(at)
-        moves = self.reduced.with_detail(row[None] @ self.motion(numbers), places)
+        moves = self.reduced.with_detail(row[None] @ self.motion(numbers), frames)
         position, by_freedoms, by_turn = self.chain(joint).position_and_gradients(
-            moves, self._travel_so_far(numbers, places)
+            moves, self._travel_so_far(numbers, frames)
         )
         inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
         if self.cyclic:
             share = at / (self.reduced.frames - 1)
-            way = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
-            outer = share * np.column_stack([np.zeros(3), way[:, 0], way[:, 1], by_turn])
+            axes = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
+            outer = share * np.column_stack([np.zeros(3), axes[:, 0], axes[:, 1], by_turn])
             inner = np.hstack([inner, outer])
         return position, inner
 
-    def _travel_so_far(self, numbers: Variables, places: Frames) -> RootPath:
+    def _travel_so_far(self, numbers: Variables, frames: Frames) -> RootPath:
         """Return the travel so far (S, 3) at canonical frames (S,)."""
-        share = places / (self.reduced.frames - 1)
+        share = frames / (self.reduced.frames - 1)
         return share[:, None] * self.duration_and_travel(numbers)[1]

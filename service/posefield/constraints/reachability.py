@@ -170,7 +170,7 @@ def _residual_covariances(
         strays[index] = (values[:clips] - values[clips:]) / spread.sigmas[:, None]
     outer = gradients[:, :, motions.shape[1] :]
     inner_part = strays.swapaxes(1, 2) @ strays
-    return np.asarray(inner_part + outer @ spread.beside @ outer.swapaxes(1, 2))
+    return np.asarray(inner_part + outer @ spread.cycle @ outer.swapaxes(1, 2))
 
 
 def _blend_equal_shares(

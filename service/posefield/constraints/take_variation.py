@@ -57,8 +57,8 @@ class TakeSettings:
 _SeedPoint = tuple[int, bytes]
 
 
-def _seed(asked: _SeedPoint) -> int:
-    return asked[0]
+def _seed(seed_point: _SeedPoint) -> int:
+    return seed_point[0]
 
 
 DETAIL_CACHE = 512
@@ -80,26 +80,26 @@ class TakeVariation:
 
     def vary(
         self,
-        bench: LevelCorrector,
-        begun: ConstrainedMotion,
+        corrector: LevelCorrector,
+        motion: ConstrainedMotion,
         question: ValidatedQuestion,
         take: TakeSettings,
     ) -> ConstrainedMotion:
         """Return a take of a prediction at the controls and labels of its question."""
         if take.seed:
             seeds = np.array([take.seed])
-            changes = self.changes(bench, question.point, question.labels, seeds)
-            moved = begun.numbers + take.variety * changes[0]
-            scene = replace(begun.scene, predicted=begun.numbers)
-            begun = replace(begun, scene=scene, numbers=moved)
+            changes = self.changes(corrector, question.point, question.labels, seeds)
+            numbers = motion.numbers + take.variety * changes[0]
+            scene = replace(motion.scene, predicted=motion.numbers)
+            motion = replace(motion, scene=scene, numbers=numbers)
         if not take.detail:
-            return begun
-        detailed = replace(bench.reduced, detail=self.detail(bench, take.seed))
-        return replace(begun, scene=replace(begun.scene, reduced=detailed))
+            return motion
+        detailed = replace(corrector.reduced, detail=self.detail(corrector, take.seed))
+        return replace(motion, scene=replace(motion.scene, reduced=detailed))
 
     def changes(
         self,
-        bench: LevelCorrector,
+        corrector: LevelCorrector,
         controls: PointControls,
         labels: PointLabels,
         seeds: Annotated[Indices, "points"],
@@ -108,17 +108,17 @@ class TakeVariation:
 
         seeds (B,): of their takes; zero changes nothing.
         """
-        by = self.deviations(controls, labels, seeds)
-        card, (times, freedoms, modes) = self._session.card, bench.reduced.core.shape
+        deviations = self.deviations(controls, labels, seeds)
+        card, (times, freedoms, modes) = self._session.card, corrector.reduced.core.shape
         # A coarser level has the leading coefficients, and these have the leading part of the root.
-        count = min(modes, bench.spread.residuals.shape[1])
-        motions = by[:, :count] @ bench.spread.residuals.T
+        count = min(modes, corrector.spread.residuals.shape[1])
+        motions = deviations[:, :count] @ corrector.spread.residuals.T
         if not card.cyclic:
             motions.reshape(-1, times, freedoms)[:, self._eventful_times :] = 0.0
             return motions
         # Files of earlier versions have no joint root; their cycles last and travel as predicted.
-        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, by.shape[1])))
-        return np.hstack([motions, by @ root.T])
+        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, deviations.shape[1])))
+        return np.hstack([motions, deviations @ root.T])
 
     def along_paths(
         self,
@@ -141,9 +141,9 @@ class TakeVariation:
         card = self._session.card
         return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seeds)
 
-    def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
+    def detail(self, corrector: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
         """Return the detail (T, r1) of a seed."""
-        return self._detail_cached(seed)[:, : len(bench.reduced.directions)]
+        return self._detail_cached(seed)[:, : len(corrector.reduced.directions)]
 
     def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
         card = self._session.card
@@ -160,13 +160,13 @@ class TakeVariation:
         limited = np.asarray(self._session.bounds.limit(controls), np.float64)
         points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
         rows = np.hstack([points, labels])
-        found = np.zeros((len(rows), self._count))
+        values = np.zeros((len(rows), self._count))
         varied = np.flatnonzero(seeds).tolist()
         # As bytes, whose hash is computed once.
-        keys = [(int(seeds[place]), rows[place].tobytes()) for place in varied]
+        keys = [(int(seeds[row]), rows[row].tobytes()) for row in varied]
         if keys:
-            found[varied] = self._deviations_cached.find_all(keys, self._deviations)
-        return found
+            values[varied] = self._deviations_cached.find_all(keys, self._deviations)
+        return values
 
     def _deviations_along(
         self,
@@ -182,29 +182,29 @@ class TakeVariation:
         points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
         names = np.broadcast_to(labels[:, None], (*points.shape[:2], labels.shape[1]))
         points = np.concatenate([points, names], axis=-1)
-        found = np.zeros((*points.shape[:2], self._count))
+        values = np.zeros((*points.shape[:2], self._count))
         varied = np.flatnonzero(seeds)
         for first in range(0, len(varied), FIELDS_TOGETHER):
             cancellation.check()
             some = varied[first : first + FIELDS_TOGETHER]
-            own = random_field.simulate(self._session.kriging_weights, seeds[some], self._count)
-            found[some] = self._root_of_sill * own.evaluate(points[some])
-        return found
+            fields = random_field.simulate(self._session.kriging_weights, seeds[some], self._count)
+            values[some] = self._root_of_sill * fields.evaluate(points[some])
+        return values
 
-    def _deviations(self, asked: Sequence[_SeedPoint]) -> list[Values]:
+    def _deviations(self, seed_points: Sequence[_SeedPoint]) -> list[Values]:
         """Return the deviations (m,) at points of seeds, each as it is alone."""
-        found: dict[_SeedPoint, Values] = {}
+        by_point: dict[_SeedPoint, Values] = {}
         # Takes of one seed come one after another, while its field is in the cache.
-        for seed, some in groupby(sorted(asked, key=_seed), key=_seed):
-            every = list(some)
-            for first in range(0, len(every), POINTS_TOGETHER):
+        for seed, some in groupby(sorted(seed_points, key=_seed), key=_seed):
+            of_seed = list(some)
+            for first in range(0, len(of_seed), POINTS_TOGETHER):
                 cancellation.check()
-                part = every[first : first + POINTS_TOGETHER]
-                points = np.array([np.frombuffer(point) for _, point in part])
+                batch = of_seed[first : first + POINTS_TOGETHER]
+                points = np.array([np.frombuffer(point) for _, point in batch])
                 values = self._root_of_sill * self._field_cached(seed).evaluate_each(points)
                 # Copied: a part of an array would keep the whole in memory.
-                found.update(zip(part, map(np.copy, values), strict=True))
-        return [found[each] for each in asked]
+                by_point.update(zip(batch, map(np.copy, values), strict=True))
+        return [by_point[seed_point] for seed_point in seed_points]
 
     @property
     def _count(self) -> int:
@@ -221,15 +221,17 @@ class TakeVariation:
 
 
 def change_coefficients(
-    bench: LevelCorrector, by: Annotated[Floats, "points values"]
+    corrector: LevelCorrector, deviations: Annotated[Floats, "points values"]
 ) -> Annotated[Floats, "points modes"]:
     """Return the changes (B, r3) of a level's coefficients by deviations (B, m) of the finest."""
-    root = bench.spread.coefficients
+    root = corrector.spread.coefficients
     # A coarser level has the leading coefficients, and these have the leading part of the root.
-    return np.asarray(by[:, : len(root)] @ root.T)
+    return np.asarray(deviations[:, : len(root)] @ root.T)
 
 
-def settings(card: ModelCard, asked: MotionQuestion) -> TakeSettings | None:
+def settings(card: ModelCard, question: MotionQuestion) -> TakeSettings | None:
     """Return the take of a question, or None for the prediction."""
-    found = TakeSettings(asked.take, asked.variety, asked.detail and bool(card.making.detail))
-    return found if found.seed or found.detail else None
+    take = TakeSettings(
+        question.take, question.variety, question.detail and bool(card.making.detail)
+    )
+    return take if take.seed or take.detail else None

@@ -71,60 +71,60 @@ class ConstraintSet:
 NO_CONSTRAINTS = ConstraintSet((), ())
 
 
-def solver_cost(card: ModelCard, asked: MotionQuestion) -> int:
+def solver_cost(card: ModelCard, question: MotionQuestion) -> int:
     """Return the cost of solving the constraints of a question, in units of a plain target.
 
     Open controls cost several units.
     """
-    each = OPEN_COST if len(asked.controls) < len(card.controls) else 1
-    return each * len(asked.targets)
+    cost = OPEN_COST if len(question.controls) < len(card.controls) else 1
+    return cost * len(question.targets)
 
 
 def from_question(
-    card: ModelCard, question: ValidatedQuestion, asked: MotionQuestion
+    card: ModelCard, validated: ValidatedQuestion, question: MotionQuestion
 ) -> ConstraintSet:
     """Return the constraints of a question.
 
     Raises InvalidField for a control that is not measured on a motion, an unknown joint, an invalid
     position or time, and two targets for one joint at one moment.
     """
-    targets = tuple(_joint_target(card, i, target) for i, target in enumerate(asked.targets))
-    _check_duplicates(asked.targets, targets)
-    taken = {goal.moment for goal in targets if goal.time is None}
-    named = asked.exact not in ("auto", "none")
+    targets = tuple(_joint_target(card, i, target) for i, target in enumerate(question.targets))
+    _check_duplicates(question.targets, targets)
+    targeted = {goal.moment for goal in targets if goal.time is None}
+    has_names = question.exact not in ("auto", "none")
     controls = []
-    for control in _exact_controls(card, question, asked):
-        own = control.measure
-        assert own is not None
+    for control in _exact_controls(card, validated, question):
+        measure = control.measure
+        assert measure is not None
         if (
-            own.quantity in POSITION_AXES
-            and Measure("height", own.joints, own.at, own.share) in taken
+            measure.quantity in POSITION_AXES
+            and Measure("height", measure.joints, measure.at, measure.share) in targeted
         ):
             # The target of the same joint is more specific than a control that was not named in
             # `exact`.
-            if named:
+            if has_names:
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
-        goal = answer_bounds.limit_control(control, question.controls[control.name])
-        controls.append((control.name, own, goal))
-    return ConstraintSet(tuple(controls), targets, take_variation.settings(card, asked))
+        goal = answer_bounds.limit_control(control, validated.controls[control.name])
+        controls.append((control.name, measure, goal))
+    return ConstraintSet(tuple(controls), targets, take_variation.settings(card, question))
 
 
 def _exact_controls(
-    card: ModelCard, question: ValidatedQuestion, asked: MotionQuestion
+    card: ModelCard, validated: ValidatedQuestion, question: MotionQuestion
 ) -> Sequence[Control]:
     """Return the controls whose measured values the answer must match."""
-    given = [c for c in card.controls if c.name not in question.inferred]
-    if asked.exact == "none":
+    received = [c for c in card.controls if c.name not in validated.inferred]
+    if question.exact == "none":
         return ()
-    if asked.exact == "auto":
-        return [control for control in given if _is_measured(control)]
-    for name in asked.exact:
+    if question.exact == "auto":
+        return [control for control in received if _is_measured(control)]
+    for name in question.exact:
         control = card.control(name)
         if control is None:
-            own = [c.name for c in card.controls]
-            hint = did_you_mean(name, own)
-            expected = f"expected controls of this model: {', '.join(own)}"
+            names = [c.name for c in card.controls]
+            hint = did_you_mean(name, names)
+            expected = f"expected controls of this model: {', '.join(names)}"
             raise InvalidField("exact", f"{name!r}{hint}, {expected}")
         if not _is_measured(control):
             movable = ", ".join(c.name for c in card.controls if _is_measured(c))
@@ -132,9 +132,9 @@ def _exact_controls(
                 "exact",
                 f"{name!r} is not measured on a motion, expected some of: {movable or 'none'}",
             )
-        if name in question.inferred:
+        if name in validated.inferred:
             raise InvalidField("exact", f"{name!r} was not given, expected a control that was")
-    return [control for control in given if control.name in asked.exact]
+    return [control for control in received if control.name in question.exact]
 
 
 def _is_measured(control: Control) -> bool:
@@ -146,9 +146,9 @@ def _joint_target(card: ModelCard, index: int, target: Target) -> JointTarget:
     if index >= MAX_TARGETS:
         raise InvalidField("targets", f"more than {MAX_TARGETS}")
     if target.joint not in card.skeleton.names:
-        known = ", ".join(card.skeleton.names)
+        names = ", ".join(card.skeleton.names)
         hint = did_you_mean(target.joint, card.skeleton.names)
-        raise InvalidField(f"{field}/joint", f"{target.joint!r}{hint}, expected one of {known}")
+        raise InvalidField(f"{field}/joint", f"{target.joint!r}{hint}, expected one of {names}")
     joint = card.skeleton.names.index(target.joint)
     if len(target.position) != 3:
         raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
@@ -187,15 +187,15 @@ def _moment(card: ModelCard, field: str, joint: int, when: str) -> Measure:
 
 
 def _check_duplicates(targets: Sequence[Target], goals: Sequence[JointTarget]) -> None:
-    seen: dict[object, int] = {}
+    indices: dict[object, int] = {}
     for index, (target, goal) in enumerate(zip(targets, goals, strict=True)):
         key = (target.joint, goal.time, goal.moment)
-        if key in seen:
+        if key in indices:
             raise InvalidField(
                 f"targets/{index}",
-                f"{goal.name} has a target already (targets/{seen[key]}), expected one",
+                f"{goal.name} has a target already (targets/{indices[key]}), expected one",
             )
-        seen[key] = index
+        indices[key] = index
 
 
 # Speed depends on the travel, so it is last.
@@ -203,40 +203,40 @@ ORDER = ("turn", "stride_length", "speed")
 
 
 def bring_back(
-    bench: LevelCorrector,
-    held: ConstrainedMotion,
+    corrector: LevelCorrector,
+    motion: ConstrainedMotion,
     goals: ConstraintSet,
-    asked: Mapping[str, float],
+    requested: Mapping[str, float],
     bounds: AnswerBounds,
 ) -> ConstrainedMotion:
-    """Return the corrected motion within the bounds, with errors relative to the asked controls.
+    """Return the corrected motion within the bounds, with errors relative to the requested controls.
 
-    goals: of the correction, in which controls are limited. asked: controls as requested.
+    goals: of the correction, in which controls are limited. requested: controls as requested.
     """
-    numbers = held.numbers
-    if held.scene.cyclic:
-        numbers = _limit_duration(held, bounds)
+    numbers = motion.numbers
+    if motion.scene.cyclic:
+        numbers = _limit_duration(motion, bounds)
         for quantity in ORDER:
-            for name, own, goal in goals.controls:
-                if own.quantity == quantity:
-                    aim = TravelConstraint((name,), quantity, np.array([goal]), own.unit)
-                    control = bench.card.control(name)
+            for name, measure, goal in goals.controls:
+                if measure.quantity == quantity:
+                    aim = TravelConstraint((name,), quantity, np.array([goal]), measure.unit)
+                    control = corrector.card.control(name)
                     assert control is not None
-                    numbers = _without_overshoot(held.scene, numbers, aim, control)
-    found = replace(held, numbers=numbers)
-    measured = bench.measured(found)
-    controls, targets = split_results(held.results, len(goals.targets))
-    judged = [_result(met, asked, measured) for met in controls]
-    return replace(found, results=(*judged, *targets))
+                    numbers = _without_overshoot(motion.scene, numbers, aim, control)
+    bounded = replace(motion, numbers=numbers)
+    measured = corrector.measured(bounded)
+    controls, targets = split_results(motion.results, len(goals.targets))
+    results = [_result(met, requested, measured) for met in controls]
+    return replace(bounded, results=(*results, *targets))
 
 
-def _limit_duration(held: ConstrainedMotion, bounds: AnswerBounds) -> Floats:
+def _limit_duration(motion: ConstrainedMotion, bounds: AnswerBounds) -> Floats:
     """Return the numbers of a cycle, no shorter or longer than its prediction or the bounds."""
-    predicted = held.state.duration
-    least, most = bounds.duration_limits
-    numbers = held.numbers.copy()
+    predicted = motion.state.duration
+    shortest, longest = bounds.duration_limits
+    numbers = motion.numbers.copy()
     numbers[-CYCLE_VARIABLES] = np.clip(
-        numbers[-CYCLE_VARIABLES], np.log(min(least, predicted)), np.log(max(most, predicted))
+        numbers[-CYCLE_VARIABLES], np.log(min(shortest, predicted)), np.log(max(longest, predicted))
     )
     return numbers
 
@@ -250,18 +250,18 @@ def _without_overshoot(
     below = goal < control.minimum and value < goal
     if not (above or below):
         return numbers
-    found = numbers.copy()
+    limited = numbers.copy()
     if aim.quantity == "turn":
-        found[-1] = np.radians(goal)
+        limited[-1] = np.radians(goal)
     elif aim.quantity == "stride_length":
-        found[-CYCLE_VARIABLES + 1 : -1] *= goal / value
+        limited[-CYCLE_VARIABLES + 1 : -1] *= goal / value
     else:
-        found[-CYCLE_VARIABLES] += np.log(value / goal)
-    return found
+        limited[-CYCLE_VARIABLES] += np.log(value / goal)
+    return limited
 
 
 def _result(
-    met: ConstraintResult, asked: Mapping[str, float], measured: Mapping[str, float]
+    met: ConstraintResult, requested: Mapping[str, float], measured: Mapping[str, float]
 ) -> ConstraintResult:
-    miss = abs(asked[met.what] - measured[met.what])
+    miss = abs(requested[met.what] - measured[met.what])
     return replace(met, miss=miss, reached=miss <= MISS_TOLERANCE)

@@ -36,7 +36,7 @@ async def answer_pose(request: ServiceRequest) -> Response:
         prepared = await run_in_thread(poses.prepare, model, question, limiter=POSE_LIMITER)
     else:
         prepared = poses.prepare(model, question)
-    constraints = model.constraints(prepared.question, question)
+    constraints = model.constraints(prepared.validated, question)
     if constraints is not None or len(question.times) > encoder.inline_limit:
         content = await run_in_thread(
             _encode_poses, model, encoder, prepared, constraints, limiter=POSE_LIMITER

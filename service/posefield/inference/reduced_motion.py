@@ -124,7 +124,7 @@ class ReducedTensor:
     ) -> Annotated[Floats, "poses freedoms"]:
         """Return the coefficients (S, r1) of the directions of poses of motions of their own.
 
-        coefficients: sample coefficients (S, r3) of each motion. places: canonical frames (S,).
+        coefficients: sample coefficients (S, r3) of each motion. frames: canonical frames (S,).
         """
         r2, r1, r3 = self.core.shape
         motions = coefficients @ self.core.reshape(r2 * r1, r3).T
@@ -291,7 +291,7 @@ class ResidualCovariance:
 
     All for a sigma of one metre. residuals: (r2 r1, r3), a root of the covariance of residuals.
     coefficients: (r3, r3), the same for the sample coefficients, lower triangular.
-    time: (r2, r2) and freedoms: (r1, r1), its marginals, their product scaled to its trace. beside:
+    time: (r2, r2) and freedoms: (r1, r1), its marginals, their product scaled to its trace. cycle:
     (b, b), covariance of the logarithm of the duration and of a cycle's travel; empty for motions
     without cycles. captured: (n, r2 r1), reduced motions of the captured clips. predicted: (n, r2
     r1), their leave-one-out predictions. sigmas: (n,), standard deviations of the predictions, m,
@@ -302,7 +302,7 @@ class ResidualCovariance:
     coefficients: Annotated[Floats, "modes modes"]
     time: Annotated[Floats, "times times"]
     freedoms: Annotated[Floats, "freedoms freedoms"]
-    beside: Annotated[Floats, "beside beside"]
+    cycle: Annotated[Floats, "cycle cycle"]
     captured: Annotated[Floats, "samples reduced"]
     predicted: Annotated[Floats, "samples reduced"]
     sigmas: PerSample
@@ -317,7 +317,7 @@ class ResidualCovariance:
         even = blocks.reshape(inner.shape)
         explained = (inner @ self.residuals) @ self.residuals.T
         both = MARGINAL_WEIGHT * even + (1.0 - MARGINAL_WEIGHT) * explained
-        other_quantities = gradients[..., len(self.residuals) :] @ self.beside
+        other_quantities = gradients[..., len(self.residuals) :] @ self.cycle
         return np.concatenate([both, other_quantities], axis=-1).swapaxes(-1, -2)
 
 

@@ -110,8 +110,8 @@ class Session:
         if not self.bounds.is_inside(controls):
             _, raw, bounded = self._outside_durations(controls, labels, level)
             stretch = float(raw[0]) / float(bounded[0])
-            (asked,) = self._run_unbounded(controls, None, ("sigma",), labels, level)
-            asked_sigma = float(asked[0])
+            (sigma_as_requested,) = self._run_unbounded(controls, None, ("sigma",), labels, level)
+            asked_sigma = float(sigma_as_requested[0])
             controls = np.asarray(self.bounds.limit(controls), np.float64)
         values = ("coefficients", "frame", "bone_offsets", "duration", "sigma", "way")
         arrays = self._run_unbounded(
@@ -178,9 +178,9 @@ class Session:
     @cached_property
     def kriging_weights(self) -> KrigingWeights:
         """Kriging weights of the captured clips."""
-        own = self.card
-        points = kriging_model.half_ranges(np.array(own.examples), *own.sampled_ranges)
-        return KrigingWeights(own.kriging, np.hstack([points, own.clip_labels]))
+        card = self.card
+        points = kriging_model.half_ranges(np.array(card.examples), *card.sampled_ranges)
+        return KrigingWeights(card.kriging, np.hstack([points, card.clip_labels]))
 
     @property
     def memory(self) -> int:

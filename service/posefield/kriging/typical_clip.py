@@ -30,7 +30,7 @@ def medoid(points: Annotated[Floats, "clips values"]) -> int:
 def typical_row(points: Annotated[Floats, "clips values"], costs: PerClip) -> int:
     """Return the medoid of the rows near given values.
 
-    places (n, k): rows in the space of the open values. costs (n,): squared distances from the
+    points (n, k): rows in the space of the open values. costs (n,): squared distances from the
     given values, in `NEAR`. Rows weigh exp(-cost / 2), and only the nearest ones are candidates.
     """
     beyond = costs - costs.min()

@@ -314,13 +314,13 @@ class ClipPreview:
     """Properties of a clip that are known before its synthesis.
 
     frames: number of frames. warnings: of the controls, as in the answer; deviations of controls
-    that the correction constrains are told with the values at which they act. missed: true if the
-    clip misses a target.
+    that the correction constrains are told with the values at which they act. misses_target:
+    whether the clip misses a target.
     """
 
     frames: int
     warnings: tuple[str, ...]
-    missed: bool = False
+    misses_target: bool = False
 
 
 def check(model: Synthesizer, question: ClipQuestion) -> None:
@@ -340,13 +340,15 @@ def preview_clip(
     """
     draft = ClipDraft(question, frame_limit)
     draft.validate(model)
-    validated, constraints, missed = draft.validated, draft.constraints, False
+    validated, constraints, misses_target = draft.validated, draft.constraints, False
     # Constraints can change the duration, as a target speed does.
     strict = question.extrapolate == "refuse" or model.session.card.cyclic
     if constraints and (constraints.targets or strict):
         motion = model.solve_constraints(validated, constraints, question.extrapolate)
         _, targets = split_results(motion.results, len(constraints.targets))
-        missed = question.extrapolate != "ok" and not all(target.reached for target in targets)
+        misses_target = question.extrapolate != "ok" and not all(
+            target.reached for target in targets
+        )
         duration = motion.duration
     else:
         (duration,) = _durations(model, [validated])
@@ -355,4 +357,4 @@ def preview_clip(
         validated.warnings, validated.deviations, question.extrapolate
     )
     # A loop ends with its first frame again.
-    return ClipPreview(len(draft.times) + question.loop, warnings, missed)
+    return ClipPreview(len(draft.times) + question.loop, warnings, misses_target)

@@ -49,8 +49,8 @@ def pose_takes(
 
     controls (N, d), times (N, 1), s, and labels (N, p) are those of the characters.
     """
-    bench = model.solver.corrector(level)
-    reduced, (r2, r1, _) = bench.reduced, bench.reduced.core.shape
+    corrector = model.solver.corrector(level)
+    reduced, (r2, r1, _) = corrector.reduced, corrector.reduced.core.shape
     names = (
         ("coefficients", "frame", "way") if model.session.card.cyclic else ("coefficients", "frame")
     )
@@ -58,7 +58,7 @@ def pose_takes(
     coefficients, frame_column, *ways = (array.astype(float) for array in arrays)
     frames, travel = frame_column[:, 0], ways[0] if ways else np.zeros((len(controls), 3))
     motions = coefficients @ reduced.core.reshape(r2 * r1, -1).T
-    changes = model.solver.variation.changes(bench, controls, labels, takes.seeds)
+    changes = model.solver.variation.changes(corrector, controls, labels, takes.seeds)
     motions += takes.variety[:, None] * changes[:, : r2 * r1]
     moves = np.einsum("nt,ntd->nd", reduced.rows(frames), motions.reshape(-1, r2, r1))
     moves += _details(model, takes, frames, level)
@@ -79,14 +79,14 @@ def _details(
     model: Synthesizer, takes: CharacterTakes, frames: Frames, level: int
 ) -> Annotated[Floats, "points freedoms"]:
     """Return the details (N, r1) of the characters at their canonical frames (N,)."""
-    bench = model.solver.corrector(level)
-    found = np.zeros((len(frames), len(bench.reduced.directions)))
+    corrector = model.solver.corrector(level)
+    details = np.zeros((len(frames), len(corrector.reduced.directions)))
     for seed in np.unique(takes.seeds[takes.detail]):
         cancellation.check()
         rows = np.flatnonzero(takes.detail & (takes.seeds == seed))
-        sampled = model.solver.variation.detail(bench, int(seed))
-        found[rows] = quat.interpolate_rows(sampled, frames[rows])
-    return found
+        sampled = model.solver.variation.detail(corrector, int(seed))
+        details[rows] = quat.interpolate_rows(sampled, frames[rows])
+    return details
 
 
 # Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
@@ -144,7 +144,7 @@ class _GraphOutputs:
     @property
     def arrays(self) -> dict[str, Singles]:
         """Return the outputs that the graph has, by name."""
-        return {name: whole for name, whole in vars(self).items() if whole is not None}
+        return {name: array for name, array in vars(self).items() if array is not None}
 
 
 def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
@@ -155,24 +155,24 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     character at fault.
     """
     card = model.session.card
-    controls, supported, said = crowd_validation.check_controls(
+    controls, supported, warnings = crowd_validation.check_controls(
         card, model.validator.support, question
     )
     labels = crowd_validation.labels(question, card)
     crowd_validation.check_levels(question, len(card.levels))
     early = question.times < 0.0
     crowd_validation.raise_for_first("time", question.times, early, "s, expected 0 s or later")
-    levels, error_px, sentences = _levels(model, question)
+    levels, error_px, budget_warnings = _levels(model, question)
     takes = crowd_validation.check_takes(card, question)
-    asked = _GraphInputs(
+    inputs = _GraphInputs(
         controls.astype(np.float32),
         question.times.astype(np.float32)[:, None],
         labels,
         *vars(takes).values(),
     )
-    block = _run_graph(model, asked, levels)
+    block = _run_graph(model, inputs, levels)
     if question.blending is not None:
-        _blend(model, asked, block, levels, question.blending)
+        _blend(model, inputs, block, levels, question.blending)
     crowd_validation.check_durations(card, block.duration)
     exact = (
         (levels == 0)
@@ -196,7 +196,7 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         block.duration,
         block.sigma,
         supported,
-        (*said, *sentences, *detail_warnings(model, question.takes)),
+        (*warnings, *budget_warnings, *detail_warnings(model, question.takes)),
         tuple(curve.name for curve in card.curves),
         block.curves,
     )
@@ -208,21 +208,21 @@ def _levels(
     """Return levels (N,), the pixels (N,) of their errors (None without a view), and warnings."""
     if not isinstance(question.detail, LevelCriteria):
         return question.detail, None, ()
-    ladder, asked = model.level_table, question.detail
+    ladder, view = model.level_table, question.detail
     middle = question.placement.positions + model.rest_position
-    scale = level_selection.pixels_per_metre(asked.camera, middle, model.radius)
-    if question.blending is None or asked.previous is None:
-        choice = level_selection.select_levels(ladder, scale, asked)
-        levels, said = choice.levels, level_selection.budget_warnings(choice, ladder, asked)
+    scale = level_selection.pixels_per_metre(view.camera, middle, model.radius)
+    if question.blending is None or view.previous is None:
+        choice = level_selection.select_levels(ladder, scale, view)
+        levels, warnings = choice.levels, level_selection.budget_warnings(choice, ladder, view)
     else:
-        levels, said = _levels_in_transition(
-            ladder, scale, asked, asked.previous, question.blending
+        levels, warnings = _levels_in_transition(
+            ladder, scale, view, view.previous, question.blending
         )
-    return levels, (ladder.errors[levels] * scale).astype(np.float32), said
+    return levels, (ladder.errors[levels] * scale).astype(np.float32), warnings
 
 
 def _levels_in_transition(
-    ladder: LevelTable, scale: Floats, asked: LevelCriteria, previous: Indices, blending: Blending
+    ladder: LevelTable, scale: Floats, view: LevelCriteria, previous: Indices, blending: Blending
 ) -> tuple[Indices, tuple[str, ...]]:
     """Return levels (N,) and warnings where some characters are in a transition between two levels.
 
@@ -230,28 +230,28 @@ def _levels_in_transition(
     budget of the others.
     """
     free = blending.shares >= 1.0
-    levels, budget = previous.copy(), asked.budget
+    levels, budget = previous.copy(), view.budget
     if budget is not None:
         spent = ladder.costs[previous[~free]] + ladder.costs[blending.levels[~free]]
         budget = max(budget - float(spent.sum()), 0.0)
     if not free.any():
         return levels, ()
-    rest = replace(asked, previous=previous[free], budget=budget)
+    rest = replace(view, previous=previous[free], budget=budget)
     choice = level_selection.select_levels(ladder, scale[free], rest)
     levels[free] = choice.levels
     return levels, level_selection.budget_warnings(choice, ladder, rest)
 
 
-def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _GraphOutputs:
-    block = _empty_outputs(model.session.card, len(asked))
+def _run_graph(model: Synthesizer, inputs: _GraphInputs, levels: Indices) -> _GraphOutputs:
+    block = _empty_outputs(model.session.card, len(inputs))
 
-    def fill(part: tuple[int, Indices | slice]) -> None:
-        level, rows = part
-        given, labels = (asked.controls[rows], asked.times[rows]), asked.labels[rows]
-        answers = model.session.run(*given, *block.arrays, labels=labels, level=level)
-        for (name, whole), answer in zip(block.arrays.items(), answers, strict=True):
-            whole[rows] = answer[:, 0] if name in _PER_TIME else answer
-        _pose_takes(model, asked, block, level, np.arange(len(asked))[rows])
+    def fill(call: tuple[int, Indices | slice]) -> None:
+        level, rows = call
+        columns, labels = (inputs.controls[rows], inputs.times[rows]), inputs.labels[rows]
+        answers = model.session.run(*columns, *block.arrays, labels=labels, level=level)
+        for (name, column), answer in zip(block.arrays.items(), answers, strict=True):
+            column[rows] = answer[:, 0] if name in _PER_TIME else answer
+        _pose_takes(model, inputs, block, level, np.arange(len(inputs))[rows])
 
     # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
     calls = list(_calls(levels))
@@ -261,15 +261,19 @@ def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _Gra
 
 
 def _pose_takes(
-    model: Synthesizer, asked: _GraphInputs, block: _GraphOutputs, level: int, rows: Indices
+    model: Synthesizer, inputs: _GraphInputs, block: _GraphOutputs, level: int, rows: Indices
 ) -> None:
     """Replace the poses of those of the characters that have a take, in place."""
-    varied = rows[(asked.seeds[rows] > 0) | asked.detail[rows]]
+    varied = rows[(inputs.seeds[rows] > 0) | inputs.detail[rows]]
     if len(varied):
-        own = asked.rows(varied)
-        takes = CharacterTakes(own.seeds, own.variety, own.detail)
-        given = (own.controls.astype(float), own.times.astype(float), own.labels.astype(float))
-        turned, path, values = pose_takes(model, takes, *given, level)
+        rows_inputs = inputs.rows(varied)
+        takes = CharacterTakes(rows_inputs.seeds, rows_inputs.variety, rows_inputs.detail)
+        columns = (
+            rows_inputs.controls.astype(float),
+            rows_inputs.times.astype(float),
+            rows_inputs.labels.astype(float),
+        )
+        turned, path, values = pose_takes(model, takes, *columns, level)
         block.rotations[varied], block.root_position[varied] = turned, path
         if block.curves is not None:
             block.curves[varied] = values
@@ -284,7 +288,7 @@ def _empty_outputs(card: ModelCard, count: int) -> _GraphOutputs:
 
 def _blend(
     model: Synthesizer,
-    asked: _GraphInputs,
+    inputs: _GraphInputs,
     block: _GraphOutputs,
     levels: Indices,
     blending: Blending,
@@ -292,11 +296,11 @@ def _blend(
     """Blend poses of the previous levels into those of characters in transition, in place."""
     rows = np.flatnonzero((blending.shares < 1.0) & (blending.levels != levels))
     if len(rows):
-        before = _run_graph(model, asked.rows(rows), blending.levels[rows])
+        before = _run_graph(model, inputs.rows(rows), blending.levels[rows])
         shares = blending.shares[rows].astype(np.float32)
-        for name, whole in block.arrays.items():
+        for name, column in block.arrays.items():
             mixing = quat.nlerp if name == "rotations" else quat.lerp
-            whole[rows] = mixing(getattr(before, name), whole[rows], shares)
+            column[rows] = mixing(getattr(before, name), column[rows], shares)
         if block.curves is not None:
             # Rounding of the blend may leave the limits.
             blended = block.curves[rows].astype(np.float64)
@@ -308,12 +312,12 @@ _PER_TIME = ("rotations", "root_position", "travel", onnx_runtime.CURVES)
 
 def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
     """Yield the level and rows of each call; contiguous rows as a slice."""
-    most = min(max(len(levels) // CALLS, FEWEST_ROWS), MOST_ROWS)
+    largest = min(max(len(levels) // CALLS, FEWEST_ROWS), MOST_ROWS)
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        for part in np.array_split(rows, -(-len(rows) // most)):
-            together = part[-1] - part[0] + 1 == len(part)
-            yield level, slice(part[0], part[-1] + 1) if together else part
+        for batch in np.array_split(rows, -(-len(rows) // largest)):
+            together = batch[-1] - batch[0] + 1 == len(batch)
+            yield level, slice(batch[0], batch[-1] + 1) if together else batch
 
 
 def _place(block: _GraphOutputs, placement: Placement) -> None:

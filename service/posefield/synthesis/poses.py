@@ -42,13 +42,13 @@ rows.
 class PreparedPoseQuestion:
     """A question for poses with its validated part and its times.
 
-    given: the question as received. question: its validated part. when: times (S,), s, as given.
+    question: as received. validated: its validated part. when: times (S,), s, as given.
     graph_times: times (S,), s, limited to the longest plausible clip, as the graph's input. first,
     last: the smallest and the largest time given.
     """
 
-    given: PoseQuestion
-    question: ValidatedQuestion
+    question: PoseQuestion
+    validated: ValidatedQuestion
     when: Floats
     graph_times: Floats
     first: float
@@ -57,75 +57,75 @@ class PreparedPoseQuestion:
     @property
     def level(self) -> int:
         """Level of detail."""
-        return self.question.level
+        return self.validated.level
 
 
-def synthesize_poses(model: Synthesizer, asked: PoseQuestion) -> PoseAnswer[Any]:
+def synthesize_poses(model: Synthesizer, question: PoseQuestion) -> PoseAnswer[Any]:
     """Return the poses (S,) of the question, constrained where it has targets.
 
     Raises InvalidField for a control, time, performer or level that cannot be used, and for
     constraints that do not fit the model. Where `extrapolate` is "refuse", raises OutsideSamples
     for controls without similar captured clips and OutOfReach for a missed target.
     """
-    checked = prepare(model, asked)
-    constraints = model.constraints(checked.question, asked)
+    prepared = prepare(model, question)
+    constraints = model.constraints(prepared.validated, question)
     if constraints is not None:
-        return synthesize_constrained(model, checked, constraints)
-    return build_answer(model, checked, run_batch(model, [checked])[0])
+        return synthesize_constrained(model, prepared, constraints)
+    return build_answer(model, prepared, run_batch(model, [prepared])[0])
 
 
-def prepare(model: Synthesizer, asked: PoseQuestion) -> PreparedPoseQuestion:
+def prepare(model: Synthesizer, question: PoseQuestion) -> PreparedPoseQuestion:
     """Return the question of `synthesize_poses`, validated without a call of the model.
 
     Raises InvalidField and OutsideSamples.
     """
-    question, times = model.question(asked), asked.times
+    validated, times = model.question(question), question.times
     if not 1 <= len(times) <= MAX_POSES:
         raise InvalidField("times", f"{len(times)} times, expected 1 to {MAX_POSES}")
     when = [motion_question.check_number(f"times/{i}", value) for i, value in enumerate(times)]
     # The duration is known only after the call of the graph; times beyond the longest plausible
     # clip are limited because they may overflow float32.
     longest = model.durations[1]
-    first, last, given = min(when), max(when), np.array(when)
+    first, last, array = min(when), max(when), np.array(when)
     fits = 0.0 <= first and last <= longest
-    within = given if fits else np.clip(given, 0.0, longest)
-    return PreparedPoseQuestion(asked, question, given, within, first, last)
+    within = array if fits else np.clip(array, 0.0, longest)
+    return PreparedPoseQuestion(question, validated, array, within, first, last)
 
 
 def synthesize_constrained(
-    model: Synthesizer, asked: PreparedPoseQuestion, goals: ConstraintSet
+    model: Synthesizer, prepared: PreparedPoseQuestion, constraints: ConstraintSet
 ) -> PoseAnswer[np.float64]:
     """Return the poses of a motion that meets constraints; raises as `synthesize_poses` does."""
-    question, given = asked.question, asked.given
-    found = model.solve_constraints(question, goals, given.extrapolate)
-    when = _check_times(asked, model.check_duration(found.duration))
-    trust = model.constrained_trust(given, question, found)
-    (answer,) = model.solver.poses([(question, found, when, trust)])
+    question, received = prepared.validated, prepared.question
+    motion = model.solve_constraints(question, constraints, received.extrapolate)
+    when = _check_times(prepared, model.check_duration(motion.duration))
+    trust = model.constrained_trust(received, question, motion)
+    (answer,) = model.solver.poses([(question, motion, when, trust)])
     return answer
 
 
-def run_batch(model: Synthesizer, asked: Sequence[PreparedPoseQuestion]) -> list[OutputRow]:
+def run_batch(model: Synthesizer, batch: Sequence[PreparedPoseQuestion]) -> list[OutputRow]:
     """Return the graph's outputs for questions of one level and equal numbers of times.
 
     One call of the graph. Where `is_batch_exact` is true, a question's bytes do not depend on the
     others in the call.
     """
-    first = asked[0].question
-    if len(asked) == 1 and len(asked[0].when) == 1:
+    first = batch[0].validated
+    if len(batch) == 1 and len(batch[0].when) == 1:
         # A matrix product with one row sums in another order, so a single question is duplicated.
-        arrays = (first.point, first.labels, asked[0].graph_times[None])
+        arrays = (first.point, first.labels, batch[0].graph_times[None])
         points, labels, when = (array.repeat(2, axis=0) for array in arrays)
     else:
-        points = np.concatenate([each.question.point for each in asked])
-        labels = np.concatenate([each.question.labels for each in asked])
-        when = np.array([each.graph_times for each in asked])
+        points = np.concatenate([prepared.validated.point for prepared in batch])
+        labels = np.concatenate([prepared.validated.labels for prepared in batch])
+        when = np.array([prepared.graph_times for prepared in batch])
     names = pose_outputs(model.session.card)
     answers = model.session.run(points, when, *names, labels=labels, level=first.level)
-    return [tuple(answer[row] for answer in answers) for row in range(len(asked))]
+    return [tuple(answer[row] for answer in answers) for row in range(len(batch))]
 
 
 def build_answer(
-    model: Synthesizer, asked: PreparedPoseQuestion, row: OutputRow
+    model: Synthesizer, prepared: PreparedPoseQuestion, row: OutputRow
 ) -> PoseAnswer[np.float32]:
     """Return the answer of one row of `run_batch`.
 
@@ -134,8 +134,8 @@ def build_answer(
     rotations, root, offsets, length, sigma, *curves = row
     duration = model.check_duration(float(length))
     # The graph limits times to the end of the clip.
-    when = _check_times(asked, duration)
-    trust = model.trust(asked.given, asked.question, duration, float(sigma))
+    when = _check_times(prepared, duration)
+    trust = model.trust(prepared.question, prepared.validated, duration, float(sigma))
     return PoseAnswer(when, rotations, root, offsets, trust, *curves)
 
 
@@ -145,15 +145,15 @@ def is_batch_exact(model: Synthesizer, level: int) -> bool:
     Measured once per level with a sample of questions: graphs of earlier versions sum in an order
     that depends on the row's position.
     """
-    known = model.exact_levels
-    if level not in known:
-        asked = [_sample(model, share, level) for share in np.linspace(0.0, 1.0, SAMPLE_SIZE)]
-        alone = (run_batch(model, [each])[0] for each in asked)
-        both = zip(run_batch(model, asked), alone, strict=True)
-        known[level] = all(
-            np.array_equal(a, b) for row, own in both for a, b in zip(row, own, strict=True)
+    exact = model.exact_levels
+    if level not in exact:
+        sample = [_sample(model, share, level) for share in np.linspace(0.0, 1.0, SAMPLE_SIZE)]
+        alone = (run_batch(model, [prepared])[0] for prepared in sample)
+        both = zip(run_batch(model, sample), alone, strict=True)
+        exact[level] = all(
+            np.array_equal(a, b) for row, single in both for a, b in zip(row, single, strict=True)
         )
-    return known[level]
+    return exact[level]
 
 
 def _sample(model: Synthesizer, share: float, level: int) -> PreparedPoseQuestion:
@@ -168,11 +168,11 @@ def _sample(model: Synthesizer, share: float, level: int) -> PreparedPoseQuestio
     )
 
 
-def _check_times(asked: PreparedPoseQuestion, duration: float) -> Floats:
+def _check_times(prepared: PreparedPoseQuestion, duration: float) -> Floats:
     """Return the times (S,), s; InvalidField for a time outside a clip of this duration."""
-    if asked.first >= 0.0 and asked.last <= duration:
-        return asked.when
-    times = enumerate(asked.when.tolist())
+    if prepared.first >= 0.0 and prepared.last <= duration:
+        return prepared.when
+    times = enumerate(prepared.when.tolist())
     return np.array(
         [motion_question.check_rounded_range(f"times/{i}", t, 0.0, duration, "s") for i, t in times]
     )

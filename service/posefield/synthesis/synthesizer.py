@@ -58,24 +58,26 @@ class Synthesizer(NamedModel):
         """Shortest and longest plausible duration, s."""
         return question_validation.duration_range(self.session.card)
 
-    def question(self, asked: MotionQuestion) -> ValidatedQuestion:
+    def question(self, question: MotionQuestion) -> ValidatedQuestion:
         """Return the validated question; open controls are conditional means.
 
         The means are conditional on the given controls and the targets. Raises InvalidField and
         OutsideSamples as the validation does.
         """
-        check_take(asked.take, asked.variety)
-        if asked.take:
-            random_field.check_features(self.session.card.kriging, asked.take)
-        policy, who, level = asked.extrapolate, asked.performer, asked.level
-        given = self.validator.question(asked.controls, policy, who, level, asked.labels)
-        if not (given.inferred and asked.targets):
-            return given
+        check_take(question.take, question.variety)
+        if question.take:
+            random_field.check_features(self.session.card.kriging, question.take)
+        policy, performer, level = question.extrapolate, question.performer, question.level
+        validated = self.validator.question(
+            question.controls, policy, performer, level, question.labels
+        )
+        if not (validated.inferred and question.targets):
+            return validated
         # Validation comes first: the search for controls takes about a second.
-        constraints = targets.from_question(self.session.card, given, asked)
-        controls = self.solver.controls(given, constraints.targets, self.validator.imputer)
-        complete = self.validator.question(controls, policy, who, level, asked.labels)
-        return replace(complete, inferred=given.inferred)
+        constraints = targets.from_question(self.session.card, validated, question)
+        controls = self.solver.controls(validated, constraints.targets, self.validator.imputer)
+        complete = self.validator.question(controls, policy, performer, level, question.labels)
+        return replace(complete, inferred=validated.inferred)
 
     @cached_property
     def measures(self) -> bool:
@@ -83,27 +85,30 @@ class Synthesizer(NamedModel):
         return any(control.measure for control in self.session.card.controls)
 
     def constraints(
-        self, question: ValidatedQuestion, asked: MotionQuestion
+        self, validated: ValidatedQuestion, question: MotionQuestion
     ) -> ConstraintSet | None:
         """Return the constraints of a question, or None for the prediction.
 
         Raises as `targets.from_question` does.
         """
-        if not (asked.has_constraints or self.measures):
+        if not (question.has_constraints or self.measures):
             return None
-        return targets.from_question(self.session.card, question, asked) or None
+        return targets.from_question(self.session.card, validated, question) or None
 
     def solve_constraints(
-        self, question: ValidatedQuestion, goals: ConstraintSet, extrapolate: ExtrapolationPolicy
+        self,
+        question: ValidatedQuestion,
+        constraints: ConstraintSet,
+        extrapolate: ExtrapolationPolicy,
     ) -> ConstrainedMotion:
         """Return the motion that meets its targets.
 
         Raises OutOfReach for a missed target if `extrapolate` is "refuse".
         """
-        held = self.solver.solve(question, goals)
+        motion = self.solver.solve(question, constraints)
         if extrapolate == "refuse":
-            check_targets(goals, held.results)
-        return held
+            check_targets(constraints, motion.results)
+        return motion
 
     def check_duration(self, duration: float) -> float:
         """Return the duration, s; OutsideSamples if extrapolation makes it implausible."""
@@ -115,47 +120,49 @@ class Synthesizer(NamedModel):
         return duration
 
     def trust(
-        self, asked: MotionQuestion, question: ValidatedQuestion, duration: float, sigma: float
+        self, question: MotionQuestion, validated: ValidatedQuestion, duration: float, sigma: float
     ) -> Trust:
         """Return the trust of an answer with this duration, s, and sigma, m."""
-        who, apart = question.performer, question.deviations
-        warnings = question_validation.merge_warnings(question.warnings, apart, asked.extrapolate)
-        if asked.detail and not self.session.card.making.detail:
+        performer, deviations = validated.performer, validated.deviations
+        warnings = question_validation.merge_warnings(
+            validated.warnings, deviations, question.extrapolate
+        )
+        if question.detail and not self.session.card.making.detail:
             warnings = (*warnings, NO_DETAIL)
-        named = who is not None or PERFORMER in question.named_labels
-        seen = named if self.session.card.performers else None
-        shares = self.session.card.joint_sigma if asked.joint_sigma else ()
-        varies = asked.take or asked.detail
-        take = take_variation.settings(self.session.card, asked) if varies else None
+        has_performer = performer is not None or PERFORMER in validated.named_labels
+        performer_seen = has_performer if self.session.card.performers else None
+        shares = self.session.card.joint_sigma if question.joint_sigma else ()
+        varies = question.take or question.detail
+        take = take_variation.settings(self.session.card, question) if varies else None
         return Trust(
             self.identity,
-            question.controls,
-            who,
-            question.level,
+            validated.controls,
+            performer,
+            validated.level,
             duration,
             sigma,
-            question.supported,
+            validated.supported,
             warnings,
-            seen,
-            inferred=question.inferred,
+            performer_seen,
+            inferred=validated.inferred,
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
-            deviations=apart,
-            labels=question.named_labels,
+            deviations=deviations,
+            labels=validated.named_labels,
             take={} if take is None else asdict(take),
         )
 
     def constrained_trust(
-        self, asked: MotionQuestion, question: ValidatedQuestion, held: ConstrainedMotion
+        self, question: MotionQuestion, validated: ValidatedQuestion, motion: ConstrainedMotion
     ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
-        measured = self.solver.measured(question, held)
-        controls, reached = split_results(held.results, len(asked.targets))
-        apart = self._deviations(question, measured, controls)
-        question = replace(question, deviations=apart)
-        own = self.trust(asked, question, held.duration, held.state.asked_sigma)
-        said = () if asked.extrapolate == "ok" else miss_warnings(reached)
-        warnings = (*own.warnings, *said)
-        return structs.replace(own, warnings=warnings, measured=measured, targets=held.results)
+        measured = self.solver.measured(validated, motion)
+        controls, reached = split_results(motion.results, len(question.targets))
+        deviations = self._deviations(validated, measured, controls)
+        validated = replace(validated, deviations=deviations)
+        trust = self.trust(question, validated, motion.duration, motion.state.asked_sigma)
+        misses = () if question.extrapolate == "ok" else miss_warnings(reached)
+        warnings = (*trust.warnings, *misses)
+        return structs.replace(trust, warnings=warnings, measured=measured, targets=motion.results)
 
     def _deviations(
         self,
@@ -169,35 +176,45 @@ class Synthesizer(NamedModel):
         deviations are measured.
         """
         reached = {met.what: met.reached for met in results}
-        found = {each.control: each for each in question.deviations if each.control not in reached}
+        by_control = {
+            deviation.control: deviation
+            for deviation in question.deviations
+            if deviation.control not in reached
+        }
         for control in self.session.card.controls:
             name = control.name
             if not reached.get(name, True):
-                found[name] = question_validation.deviation(
+                by_control[name] = question_validation.deviation(
                     control, question.controls[name], measured[name]
                 )
-        return tuple(found[name] for name in question.controls if name in found)
+        return tuple(by_control[name] for name in question.controls if name in by_control)
 
 
-def miss_warnings(met: Sequence[ConstraintResult]) -> tuple[str, ...]:
+def miss_warnings(results: Sequence[ConstraintResult]) -> tuple[str, ...]:
     """Return a sentence for each constraint that is not met."""
-    return tuple(_miss_warning(each) for each in met if not each.reached)
+    return tuple(_miss_warning(result) for result in results if not result.reached)
 
 
-def check_targets(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> None:
+def check_targets(constraints: ConstraintSet, results: Sequence[ConstraintResult]) -> None:
     """Raise OutOfReach, which names the first, if a constraint is not met."""
-    for field, each in zip(_constraint_fields(goals, met), met, strict=True):
-        if not each.reached:
-            raise OutOfReach(field, "; ".join(miss_warnings(met)))
+    for field, result in zip(_constraint_fields(constraints, results), results, strict=True):
+        if not result.reached:
+            raise OutOfReach(field, "; ".join(miss_warnings(results)))
 
 
-def _constraint_fields(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> Iterator[str]:
+def _constraint_fields(
+    constraints: ConstraintSet, results: Sequence[ConstraintResult]
+) -> Iterator[str]:
     """Yield the field of each constraint in the question; controls precede targets."""
-    controls, reached = split_results(met, len(goals.targets))
-    yield from (f"controls/{each.what}" for each in controls)
+    controls, reached = split_results(results, len(constraints.targets))
+    yield from (f"controls/{control.what}" for control in controls)
     yield from (f"targets/{index}" for index in range(len(reached)))
 
 
-def _miss_warning(met: ConstraintResult) -> str:
-    miss = f"{100.0 * met.miss:.1f} cm" if met.unit == "m" else f"{met.miss:.3g} {met.unit}"
-    return f"{met.what} stays {miss} from its target: out of reach"
+def _miss_warning(result: ConstraintResult) -> str:
+    miss = (
+        f"{100.0 * result.miss:.1f} cm"
+        if result.unit == "m"
+        else f"{result.miss:.3g} {result.unit}"
+    )
+    return f"{result.what} stays {miss} from its target: out of reach"

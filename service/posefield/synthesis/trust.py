@@ -57,18 +57,18 @@ def rank_candidates(
     samples (n, d): captured, in half-ranges like the candidates. Each gain assumes the candidates
     before it as captured.
     """
-    known = _ConditionedField.conditioned_on(candidates, samples)
-    found: list[tuple[int, VarianceReduction]] = []
-    most = min(count, len(candidates))
-    for done in range(most):
+    field = _ConditionedField.conditioned_on(candidates, samples)
+    ranked: list[tuple[int, VarianceReduction]] = []
+    steps = min(count, len(candidates))
+    for done in range(steps):
         cancellation.check()
-        gains = known.gains()
-        gains[[at for at, _ in found]] = -1.0
+        gains = field.gains()
+        gains[[at for at, _ in ranked]] = -1.0
         at = int(np.argmax(gains))
-        found.append((at, VarianceReduction(float(gains[at]), float(known.variances[at]))))
-        known.condition_on(at)
-        progress(done + 1, most)
-    return found
+        ranked.append((at, VarianceReduction(float(gains[at]), float(field.variances[at]))))
+        field.condition_on(at)
+        progress(done + 1, steps)
+    return ranked
 
 
 @dataclass
@@ -94,11 +94,13 @@ class _ConditionedField:
         averaged = np.unique(
             np.linspace(0, len(candidates) - 1, AVERAGED_CANDIDATES).astype(np.int64)
         )
-        own = covariances(samples, samples) + NUGGET * np.eye(len(samples))
-        known = np.linalg.solve(np.linalg.cholesky(own), covariances(samples, candidates))
-        toward = covariances(candidates, candidates[averaged]) - known.T @ known[:, averaged]
-        left = 1.0 - np.sum(np.square(known), axis=0)
-        return cls(candidates, list(known), left, toward, averaged)
+        covariance = covariances(samples, samples) + NUGGET * np.eye(len(samples))
+        whitened = np.linalg.solve(np.linalg.cholesky(covariance), covariances(samples, candidates))
+        remaining = (
+            covariances(candidates, candidates[averaged]) - whitened.T @ whitened[:, averaged]
+        )
+        left = 1.0 - np.sum(np.square(whitened), axis=0)
+        return cls(candidates, list(whitened), left, remaining, averaged)
 
     def gains(self) -> Annotated[Floats, "candidates"]:
         """Return the share by which the mean variance falls if each candidate (C,) is captured."""
@@ -107,12 +109,14 @@ class _ConditionedField:
 
     def condition_on(self, at: int) -> None:
         """Condition the field on one of the candidates as well."""
-        known = np.stack(self.whitened)
-        own = covariances(self.candidates, self.candidates[[at]])[:, 0] - known.T @ known[:, at]
-        said = own / np.sqrt(self.variances[at] + NUGGET)
-        self.whitened.append(said)
-        self.variances = self.variances - np.square(said)
-        self.remaining = self.remaining - said[:, None] * said[self.averaged]
+        whitened = np.stack(self.whitened)
+        covariance = (
+            covariances(self.candidates, self.candidates[[at]])[:, 0] - whitened.T @ whitened[:, at]
+        )
+        row = covariance / np.sqrt(self.variances[at] + NUGGET)
+        self.whitened.append(row)
+        self.variances = self.variances - np.square(row)
+        self.remaining = self.remaining - row[:, None] * row[self.averaged]
 
 
 DRAWN_CANDIDATES, MAX_CANDIDATES = 1000, 10_000
@@ -121,7 +125,7 @@ DRAWN_CANDIDATES, MAX_CANDIDATES = 1000, 10_000
 
 def suggest(
     model: Synthesizer,
-    asked: SuggestQuestion,
+    question: SuggestQuestion,
     candidates: Sequence[Mapping[str, float]] | None = None,
     progress: ProgressCallback = ignore_progress,
 ) -> Suggestions:
@@ -131,14 +135,21 @@ def suggest(
     assumes that the points before it were captured. Raises InvalidField for an unknown label and
     for an unusable candidate.
     """
-    card, own = model.session.card, model.validator.support
-    weights = question_validation.label_weights(card, asked.performer, asked.labels)[0]
-    points = _drawn_points(own) if candidates is None else _given_points(model, candidates)
+    card, captured_support = model.session.card, model.validator.support
+    weights = question_validation.label_weights(card, question.performer, question.labels)[0]
+    points = (
+        _drawn_points(captured_support) if candidates is None else _given_points(model, candidates)
+    )
     captured = _captured_indices(card, weights)
-    scaled, known = own.scaled(points), own.samples[captured]
-    ranked = rank_candidates(scaled, known, asked.count, progress)
-    found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
-    return Suggestions(model.identity, asked.performer, len(points), found, asked.labels)
+    scaled, samples = captured_support.scaled(points), captured_support.samples[captured]
+    ranked = rank_candidates(scaled, samples, question.count, progress)
+    suggestions = tuple(
+        _suggestion(card, captured_support, captured, points[at], reduction)
+        for at, reduction in ranked
+    )
+    return Suggestions(
+        model.identity, question.performer, len(points), suggestions, question.labels
+    )
 
 
 def _captured_indices(card: ModelCard, weights: Floats) -> Indices:
@@ -146,13 +157,13 @@ def _captured_indices(card: ModelCard, weights: Floats) -> Indices:
 
     A label set without such a name admits all clips. Raises InvalidField if no clip is left.
     """
-    kept = np.ones(len(card.examples), dtype=bool)
+    mask = np.ones(len(card.examples), dtype=bool)
     for columns in kriging_model.label_columns(0, card.label_counts):
         if weights[columns].any():
-            kept &= card.clip_labels[:, columns] @ weights[columns] > 0.0
-    if not kept.any():
+            mask &= card.clip_labels[:, columns] @ weights[columns] > 0.0
+    if not mask.any():
         raise InvalidField("labels", "no captured clip has these names together")
-    return np.flatnonzero(kept)
+    return np.flatnonzero(mask)
 
 
 def _given_points(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
@@ -176,30 +187,34 @@ def _value(control: Control, controls: Mapping[str, float]) -> float:
     return question_validation.check_control(control, controls[control.name])
 
 
-def _drawn_points(own: Support) -> Floats:
+def _drawn_points(captured_support: Support) -> Floats:
     """Return points (DRAWN, d) across the sampled ranges by Roberts' additive recurrence."""
-    d = len(own.low)
+    d = len(captured_support.low)
     ratio = 2.0
     for _ in range(64):
         # The root of x^(d + 1) = x + 1; for one control, the golden ratio.
         ratio = (1.0 + ratio) ** (1.0 / (d + 1))
     steps = ratio ** -np.arange(1.0, d + 1.0)
     share = np.mod(0.5 + np.arange(1, DRAWN_CANDIDATES + 1)[:, None] * steps, 1.0)
-    return own.low + share * (own.high - own.low)
+    return captured_support.low + share * (captured_support.high - captured_support.low)
 
 
 def _suggestion(
-    card: ModelCard, own: Support, captured: Indices, point: Floats, found: VarianceReduction
+    card: ModelCard,
+    captured_support: Support,
+    captured: Indices,
+    point: Floats,
+    reduction: VarianceReduction,
 ) -> Suggestion:
     """Return a point with its nearest captured clip and the control in which that differs most."""
-    gaps = 0.5 * np.abs(own.samples[captured] - own.scaled(point[None]))
+    gaps = 0.5 * np.abs(captured_support.samples[captured] - captured_support.scaled(point[None]))
     nearest = int(np.argmin(np.sum(np.square(gaps), axis=1)))
     control = int(np.argmax(gaps[nearest]))
-    names = [each.name for each in card.controls]
+    names = [axis.name for axis in card.controls]
     return Suggestion(
         dict(zip(names, point.tolist(), strict=True)),
-        found.gain,
-        found.variance,
+        reduction.gain,
+        reduction.variance,
         card.sources[captured[nearest]],
         names[control],
         float(gaps[nearest, control]),
@@ -209,58 +224,60 @@ def _suggestion(
 NEAREST, MOST = 10, 10_000
 
 
-def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
+def explain_result(model: Synthesizer, why: WhyQuestion) -> Explanation:
     """Return the nearest captured clips, their weights and the support of an answer.
 
     Raises InvalidField and OutsideSamples as the validation of questions does.
     """
     card = model.session.card
-    question = model.validator.question(
-        asked.controls, asked.extrapolate, asked.performer, 0, asked.labels
-    )
+    question = model.validator.question(why.controls, why.extrapolate, why.performer, 0, why.labels)
     distances = model.session.kriging_weights.distances(_point(card, question))[0]
     limited = model.session.bounds.limit(question.point).astype(np.float64)
     acting = replace(question, point=limited)
     weights = model.session.kriging_weights.weights(_point(card, acting))[0]
     order = np.argsort(distances, kind="stable")
-    near, others = order[: asked.nearest], order[asked.nearest :]
+    near, rest_indices = order[: why.nearest], order[why.nearest :]
     # Kriging weights sum to one, so at least one is positive.
     positive = np.maximum(weights, 0.0)
     shares = positive / positive.sum()
-    found = tuple(
+    nearest = tuple(
         _captured_clip(card, i, distances[i], weights[i], shares[i]) for i in near.tolist()
     )
-    rest = float(weights[others].sum()), float(shares[others].sum())
-    controls, who = question.controls, question.performer
-    said = question_validation.merge_warnings(
-        question.warnings, question.deviations, asked.extrapolate
+    rest = float(weights[rest_indices].sum()), float(shares[rest_indices].sum())
+    controls, performer = question.controls, question.performer
+    warnings = question_validation.merge_warnings(
+        question.warnings, question.deviations, why.extrapolate
     )
     inferred, backing = question.inferred, _support_report(model.validator, question)
     return Explanation(
         model.identity,
         controls,
-        who,
-        said,
+        performer,
+        warnings,
         backing,
-        found,
-        len(others),
+        nearest,
+        len(rest_indices),
         *rest,
         inferred,
         question.named_labels,
     )
 
 
-def _support_report(door: QuestionValidator, question: ValidatedQuestion) -> SupportReport:
-    own = door.support
-    beyond = dict(zip(question.controls, own.beyond(question.point)[0].tolist(), strict=True))
-    variance = float(own.variance(question.point)[0])
-    return SupportReport(question.supported, beyond, support.RANGE_MARGIN, variance, own.limit)
+def _support_report(validator: QuestionValidator, question: ValidatedQuestion) -> SupportReport:
+    captured_support = validator.support
+    beyond = dict(
+        zip(question.controls, captured_support.beyond(question.point)[0].tolist(), strict=True)
+    )
+    variance = float(captured_support.variance(question.point)[0])
+    return SupportReport(
+        question.supported, beyond, support.RANGE_MARGIN, variance, captured_support.limit
+    )
 
 
 def _point(card: ModelCard, question: ValidatedQuestion) -> Floats:
     """Return the point (1, d + p) of the kriging model."""
-    place = kriging_model.half_ranges(question.point, *card.sampled_ranges)
-    return np.hstack([place, question.labels])
+    point = kriging_model.half_ranges(question.point, *card.sampled_ranges)
+    return np.hstack([point, question.labels])
 
 
 def _captured_clip(
@@ -268,76 +285,76 @@ def _captured_clip(
 ) -> CapturedClip:
     names = (control.name for control in card.controls)
     controls = dict(zip(names, card.examples[index], strict=True))
-    named = card.clip_names(index)
-    who = named.pop(PERFORMER, None)
+    label_names = card.clip_names(index)
+    performer = label_names.pop(PERFORMER, None)
     numbers = float(distance), float(weight), float(share)
-    return CapturedClip(card.sources[index], controls, who, *numbers, named)
+    return CapturedClip(card.sources[index], controls, performer, *numbers, label_names)
 
 
 # Larger batches exceed a core's cache between operators and take 1.5 times as long per row.
 BATCH = 1024
 
 
-def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
+def grid(model: Synthesizer, question: SigmaQuestion) -> SigmaGrid:
     """Return the grid of sigma and support.
 
     Raises InvalidField for an unknown control or label, and for a value too far outside the
     sampled range.
     """
     card = model.session.card
-    question_validation.check_names(card, asked.controls)
-    labels = question_validation.label_weights(card, asked.performer, asked.labels)
-    across = _axis(card, "across", asked.across, asked.columns, asked)
-    along = _axis(card, "along", asked.along, asked.rows, asked)
-    fixed = _fixed(card, asked)
+    question_validation.check_names(card, question.controls)
+    labels = question_validation.label_weights(card, question.performer, question.labels)
+    across = _axis(card, "across", question.across, question.columns, question)
+    along = _axis(card, "along", question.along, question.rows, question)
+    fixed = _fixed(card, question)
     points = _points(card, across, along, fixed)
     sigma = _sigmas(model, points, labels)
-    shape = asked.rows, asked.columns
+    shape = question.rows, question.columns
     return SigmaGrid(
         model.identity,
         across,
         along,
         fixed,
-        asked.performer,
+        question.performer,
         sigma.reshape(shape),
         _inside(card, points).reshape(shape),
         model.validator.support.supported(points).reshape(shape),
-        asked.labels,
+        question.labels,
     )
 
 
 def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
     """Return sigma (B,), m, at points (B, d)."""
-    found = []
+    batches = []
     for first in range(0, len(points), BATCH):
         cancellation.check()
-        found.append(
+        batches.append(
             model.session.run(points[first : first + BATCH], None, "sigma", labels=labels)[0]
         )
-    return np.concatenate(found)
+    return np.concatenate(batches)
 
 
-def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> GridAxis:
+def _axis(card: ModelCard, field: str, name: str, count: int, question: SigmaQuestion) -> GridAxis:
     control = card.control(name)
     if control is None:
-        own = [c.name for c in card.controls]
-        found = f"{name!r}{did_you_mean(name, own)}"
+        names = [c.name for c in card.controls]
+        unknown = f"{name!r}{did_you_mean(name, names)}"
         raise InvalidField(
-            field, f"{found}, expected one of this model's controls, {', '.join(own)}"
+            field, f"{unknown}, expected one of this model's controls, {', '.join(names)}"
         )
-    if name in asked.controls:
+    if name in question.controls:
         raise InvalidField(f"controls/{name}", f"given, and {field} the grid too; expected one")
-    room = asked.margin * (control.maximum - control.minimum)
+    room = question.margin * (control.maximum - control.minimum)
     return GridAxis(control, np.linspace(control.minimum - room, control.maximum + room, count))
 
 
-def _fixed(card: ModelCard, asked: SigmaQuestion) -> dict[str, float]:
+def _fixed(card: ModelCard, question: SigmaQuestion) -> dict[str, float]:
     """Return the values of the controls that are not axes, in the card's order."""
-    usual = {control.name: control.default for control in card.controls} | dict(asked.controls)
+    values = {control.name: control.default for control in card.controls} | dict(question.controls)
     return {
-        control.name: question_validation.check_control(control, usual[control.name])
+        control.name: question_validation.check_control(control, values[control.name])
         for control in card.controls
-        if control.name not in (asked.across, asked.along)
+        if control.name not in (question.across, question.along)
     }
 
 

@@ -42,18 +42,18 @@ character changes its speed over seconds."""
 class WalkerTakes:
     """Takes of N distinct motions of a walking crowd.
 
-    asked: as in the order. seeds (N,): 0 for the prediction. variety: size of the deviations.
+    take: as in the order. seeds (N,): 0 for the prediction. variety: size of the deviations.
     detail: whether details are added.
     """
 
-    asked: WalkerTake
+    take: WalkerTake
     seeds: Annotated[Indices, "motions"]
     variety: float
     detail: bool
 
     def facts(self) -> dict[str, Any]:
         """Return the facts about the takes, as plain values."""
-        return {"seed": self.asked, "variety": self.variety, "detail": self.detail}
+        return {"seed": self.take, "variety": self.variety, "detail": self.detail}
 
 
 @dataclass(frozen=True)
@@ -68,13 +68,13 @@ class _Deviations:
     details: Annotated[Floats, "motions canonical freedoms"] | None
 
     def detail_rows(
-        self, rows: Annotated[Indices, "poses"], places: Annotated[Floats, "poses"]
+        self, rows: Annotated[Indices, "poses"], frames: Annotated[Floats, "poses"]
     ) -> Annotated[Floats, "poses freedoms"]:
         """Return the details (K, r1) of characters by row (K,) at canonical frames (K,)."""
         if self.details is None:
             return np.zeros((len(rows), 1))
-        before = np.minimum(places.astype(np.int64), self.details.shape[1] - 2)
-        share = (places - before)[:, None]
+        before = np.minimum(frames.astype(np.int64), self.details.shape[1] - 2)
+        share = (frames - before)[:, None]
         first, second = self.details[rows, before], self.details[rows, before + 1]
         return np.asarray((1.0 - share) * first + share * second)
 
@@ -85,98 +85,100 @@ def of_order(card: ModelCard, order: CrowdOrder) -> WalkerTakes | None:
     Detail is off for a model whose file has none. Raises InvalidField for a seed or a variety out
     of range, and for a model without takes.
     """
-    taken, count = order.take, order.motions or order.count
-    if taken != "index" and not 0 <= taken <= MAX_TAKE:
-        raise InvalidField("take", f"{taken}, expected 'index' or 0 to {MAX_TAKE}")
+    take, count = order.take, order.motions or order.count
+    if take != "index" and not 0 <= take <= MAX_TAKE:
+        raise InvalidField("take", f"{take}, expected 'index' or 0 to {MAX_TAKE}")
     if not 0.0 <= order.variety <= 1.0:
         raise InvalidField("variety", f"{order.variety:g}, expected 0 to 1")
-    if taken:
-        random_field.check_features(card.kriging, taken)
+    if take:
+        random_field.check_features(card.kriging, take)
     detail = order.detail and bool(card.making.detail)
-    if not (taken or detail):
+    if not (take or detail):
         return None
-    seeds = 1 + np.arange(count) if taken == "index" else np.full(count, taken)
-    return WalkerTakes(taken, seeds, order.variety, detail)
+    seeds = 1 + np.arange(count) if take == "index" else np.full(count, take)
+    return WalkerTakes(take, seeds, order.variety, detail)
 
 
 def pose_maker(
-    model: Synthesizer, takes: WalkerTakes, plan: LocomotionPlan, who: Indices
+    model: Synthesizer, takes: WalkerTakes, plan: LocomotionPlan, walkers: Indices
 ) -> PoseMaker:
     """Return what computes poses of takes of characters (M,) of a plan, in ascending order."""
-    found = _deviations(model, takes, plan, who)
+    deviations = _deviations(model, takes, plan, walkers)
 
     def pose(
-        session: Session, plan: LocomotionPlan, who: Indices, frames: Indices, level: int
+        session: Session, plan: LocomotionPlan, walkers: Indices, frames: Indices, level: int
     ) -> RelativePoses:
-        own = _relative_poses(model, found, plan, (who, frames), level)
-        return locomotion_plan.place_poses(plan, (who, frames), own)
+        relative = _relative_poses(model, deviations, plan, (walkers, frames), level)
+        return locomotion_plan.place_poses(plan, (walkers, frames), relative)
 
     return pose
 
 
 def _deviations(
-    model: Synthesizer, takes: WalkerTakes, plan: LocomotionPlan, who: Indices
+    model: Synthesizer, takes: WalkerTakes, plan: LocomotionPlan, walkers: Indices
 ) -> _Deviations:
-    seeds = takes.seeds[who]
-    by = deviations_along(model, plan, who, seeds, KNOT_SECONDS)
+    seeds = takes.seeds[walkers]
+    coefficients = deviations_along(model, plan, walkers, seeds, KNOT_SECONDS)
     details = model.solver.variation.details(seeds) if takes.detail else None
-    return _Deviations(who, takes.variety * by, details)
+    return _Deviations(walkers, takes.variety * coefficients, details)
 
 
 def deviations_along(
     model: Synthesizer,
     plan: LocomotionPlan,
-    who: Annotated[Indices, "motions"],
+    walkers: Annotated[Indices, "motions"],
     seeds: Annotated[Indices, "motions"],
-    apart: float,
+    interval: float,
 ) -> Annotated[Floats, "motions frames modes"]:
     """Return uncorrelated deviations (M, F, r3) of takes along the paths of characters (M,).
 
-    seeds: (M,). apart: interval of the points at which they are computed, s, with lines between.
+    seeds: (M,). interval: that of the points at which they are computed, s, with lines between.
     """
     frames = plan.controls.shape[1]
-    knots = np.append(np.arange(0, frames - 1, max(1, int(apart * plan.rate))), frames - 1)
-    labels = plan.labels.weights[plan.who[who]]
-    by = model.solver.variation.along_paths(plan.controls[who][:, knots], labels, seeds)
-    places = np.interp(np.arange(frames), knots, np.arange(len(knots)))
-    before = np.minimum(places.astype(np.int64), max(len(knots) - 2, 0))
-    after, share = np.minimum(before + 1, len(knots) - 1), (places - before)[:, None]
-    return np.asarray((1.0 - share) * by[:, before] + share * by[:, after])
+    knots = np.append(np.arange(0, frames - 1, max(1, int(interval * plan.rate))), frames - 1)
+    labels = plan.labels.weights[plan.who[walkers]]
+    deviations = model.solver.variation.along_paths(plan.controls[walkers][:, knots], labels, seeds)
+    positions = np.interp(np.arange(frames), knots, np.arange(len(knots)))
+    before = np.minimum(positions.astype(np.int64), max(len(knots) - 2, 0))
+    after, share = np.minimum(before + 1, len(knots) - 1), (positions - before)[:, None]
+    return np.asarray((1.0 - share) * deviations[:, before] + share * deviations[:, after])
 
 
 def _relative_poses(
     model: Synthesizer,
-    found: _Deviations,
+    deviations: _Deviations,
     plan: LocomotionPlan,
     pair: tuple[Indices, Indices],
     level: int,
 ) -> RelativePoses:
     """Return K poses relative to the travel, of pairs of a character (K,) and a frame (K,)."""
     labels, phases = plan.labels.weights[plan.who[pair[0]]], plan.phases[pair]
-    own = stride.strides(model.session, plan.controls[pair], labels, level)
-    bench = model.solver.corrector(level)
-    rows = np.searchsorted(found.chosen, pair[0])
+    strides = stride.strides(model.session, plan.controls[pair], labels, level)
+    corrector = model.solver.corrector(level)
+    rows = np.searchsorted(deviations.chosen, pair[0])
     posed = [np.empty((len(phases), *shape)) for shape in _shapes(model.session.card)]
-    for part in stride.batches(len(phases)):
+    for batch in stride.batches(len(phases)):
         cancellation.check()
-        times = (phases[part] * own.durations[part])[:, None]
-        given = plan.controls[pair][part], times
+        times = (phases[batch] * strides.durations[batch])[:, None]
+        inputs = plan.controls[pair][batch], times
         coefficients, canonical, travel = (
             array.astype(float)
             for array in model.session.run(
-                *given, "coefficients", "frame", "way", labels=labels[part], level=level
+                *inputs, "coefficients", "frame", "way", labels=labels[batch], level=level
             )
         )
-        places = canonical[:, 0]
-        by = found.coefficients[rows[part], pair[1][part]]
-        moved = take_variation.change_coefficients(bench, by)
-        coefficients[:, : moved.shape[1]] += moved
-        moves = bench.reduced.moves_of_coefficients(coefficients, places)
-        moves += found.detail_rows(rows[part], places)[:, : moves.shape[1]]
-        for whole, values in zip(posed, _poses(bench.reduced, moves, places, travel), strict=True):
-            whole[part] = values
+        frames = canonical[:, 0]
+        deviations_of_batch = deviations.coefficients[rows[batch], pair[1][batch]]
+        changes = take_variation.change_coefficients(corrector, deviations_of_batch)
+        coefficients[:, : changes.shape[1]] += changes
+        moves = corrector.reduced.moves_of_coefficients(coefficients, frames)
+        moves += deviations.detail_rows(rows[batch], frames)[:, : moves.shape[1]]
+        for column, values in zip(
+            posed, _poses(corrector.reduced, moves, frames, travel), strict=True
+        ):
+            column[batch] = values
     rotations, roots, values = posed
-    relative = stride.relative_poses(own, phases, rotations, roots)
+    relative = stride.relative_poses(strides, phases, rotations, roots)
     return replace(relative, curves=values) if values.shape[1] else relative
 
 
@@ -188,7 +190,7 @@ def _shapes(card: ModelCard) -> list[tuple[int, ...]]:
 def _poses(
     reduced: ReducedTensor,
     moves: Annotated[Floats, "poses freedoms"],
-    places: Annotated[Floats, "poses"],
+    frames: Annotated[Floats, "poses"],
     travel: Annotated[Floats, "poses 3"],
 ) -> tuple[
     Annotated[Floats, "poses joints 4"],
@@ -197,8 +199,8 @@ def _poses(
 ]:
     """Return rotations (K, J, 4), root positions (K, 3), m, and curves (K, C), with travel."""
     rotations, roots, values = reduced.poses_of_moves(moves)
-    gone = (places / (reduced.frames - 1))[:, None] * travel
-    return *skeleton.add_travel(rotations, roots, gone), values
+    travel_so_far = (frames / (reduced.frames - 1))[:, None] * travel
+    return *skeleton.add_travel(rotations, roots, travel_so_far), values
 
 
 MIN_RATE = 20.0
@@ -216,12 +218,12 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     standing = wants_standing_feet(gait.session.card, order)
     make = _motion_maker(model, takes, standing)
     crowd = walking_crowd.build_crowd(model, gait, order, make)
-    said: dict[str, Any] = {"feet_stand": standing}
+    facts: dict[str, Any] = {"feet_stand": standing}
     if takes is not None:
-        said["take"] = takes.facts()
+        facts["take"] = takes.facts()
     if order.detail and not model.session.card.making.detail:
-        said["warnings"] = [NO_DETAIL]
-    return replace(crowd, facts={**crowd.facts, **said})
+        facts["warnings"] = [NO_DETAIL]
+    return replace(crowd, facts={**crowd.facts, **facts})
 
 
 def _motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool) -> MotionMaker:
@@ -229,9 +231,11 @@ def _motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool)
     if takes is None:
         return make
 
-    def vary(session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule) -> Motions:
-        pose = pose_maker(model, takes, plan, who)
-        return make(session, plan, who, shown, pose)
+    def vary(
+        session: Session, plan: LocomotionPlan, walkers: Indices, schedule: LevelSchedule
+    ) -> Motions:
+        pose = pose_maker(model, takes, plan, walkers)
+        return make(session, plan, walkers, schedule, pose)
 
     return vary
 
@@ -244,11 +248,11 @@ def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
     """
     if order.feet not in (None, "stand"):
         return False
-    known, slow = bool(card.feet and foot_contacts(card)), order.fps < MIN_RATE
-    legs = known and bool(choose_legs(card).feet)
+    knows_contacts, slow = bool(card.feet and foot_contacts(card)), order.fps < MIN_RATE
+    legs = knows_contacts and bool(choose_legs(card).feet)
     if order.feet is None:
         return legs and not slow
-    if not known:
+    if not knows_contacts:
         raise InvalidField("feet", "'stand', but this model knows no contacts of feet")
     if not legs:
         raise InvalidField("feet", "'stand', but no two bones lead to a foot of this model")
@@ -261,29 +265,29 @@ def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
 
 def foot_contacts(card: ModelCard) -> tuple[FootContact, ...]:
     """Return the contacts of feet; a hand's contacts with things are none."""
-    return tuple(own for own in card.contacts if own.joint in card.feet)
+    return tuple(contact for contact in card.contacts if contact.joint in card.feet)
 
 
 def choose_legs(card: ModelCard) -> LimbChoice:
     """Return the legs of the feet whose contacts are known; those of the skeleton at rest."""
     skeleton = card.skeleton
-    feet = [own.joint for own in foot_contacts(card)]
+    feet = [contact.joint for contact in foot_contacts(card)]
     return footsteps.choose_limbs(skeleton.parents, skeleton.offsets, feet, ())
 
 
 def standing_motions(
     session: Session,
     plan: LocomotionPlan,
-    who: Indices,
-    shown: LevelSchedule,
+    walkers: Indices,
+    schedule: LevelSchedule,
     pose: PoseMaker = locomotion_plan.synthesize_poses,
 ) -> Motions:
     """Return the motions of characters (M,) of the plan with standing feet.
 
     Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
     """
-    motions = walking_crowd.motions(session, plan, who, shown, pose)
-    plans = _plan_feet(session, plan, who, shown, motions)
+    motions = walking_crowd.motions(session, plan, walkers, schedule, pose)
+    plans = _plan_feet(session, plan, walkers, schedule, motions)
     count, frames, *shape = motions.rotations.shape
     # The rotations of the legs are written into those of the motions.
     shift, *paths = foot_placement.place_grids(plans, motions.rotations.reshape(-1, *shape))
@@ -303,15 +307,19 @@ def standing_motions(
 
 
 def _plan_feet(
-    session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule, motions: Motions
+    session: Session,
+    plan: LocomotionPlan,
+    walkers: Indices,
+    schedule: LevelSchedule,
+    motions: Motions,
 ) -> list[FeetPlan]:
     card = session.card
     choice = choose_legs(card)
     contacts = [foot_contacts(card)[index] for index in choice.feet]
     columns = [card.contacts.index(contact) for contact in contacts]
-    likely = contact_probabilities(session, plan, who, shown)[..., columns]
+    likely = contact_probabilities(session, plan, walkers, schedule)[..., columns]
     doubles = (motions.bone_offsets, motions.rotations, motions.root_position)
-    bones, rotations, roots = (part.astype(np.float64) for part in doubles)
+    bones, rotations, roots = (array.astype(np.float64) for array in doubles)
     return body_plans.plan_motions(
         [
             PlanRequest(
@@ -328,44 +336,52 @@ def _plan_feet(
 
 
 def contact_probabilities(
-    session: Session, plan: LocomotionPlan, who: Annotated[Indices, "motions"], shown: LevelSchedule
+    session: Session,
+    plan: LocomotionPlan,
+    walkers: Annotated[Indices, "motions"],
+    schedule: LevelSchedule,
 ) -> Annotated[Floats, "motions frames contacts"]:
     """Return the probabilities (M, F, C) of the contacts of characters (M,) of the plan.
 
-    shown: levels (M, F); where they change, probabilities are blended as the poses are.
+    schedule: levels (M, F); where they change, probabilities are blended as the poses are.
     """
-    shape = (len(who), plan.phases.shape[1])
+    shape = (len(walkers), plan.phases.shape[1])
     count = shape[0] * shape[1]
-    found = np.empty((count, len(session.card.contacts)))
+    probabilities = np.empty((count, len(session.card.contacts)))
     for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
         character, frame = np.divmod(np.arange(count)[rows], shape[1])
-        found[rows] = _blended_contacts(session, plan, (who[character], frame), shown.rows(rows))
-    return found.reshape(*shape, -1)
+        probabilities[rows] = _blended_contacts(
+            session, plan, (walkers[character], frame), schedule.rows(rows)
+        )
+    return probabilities.reshape(*shape, -1)
 
 
 def _blended_contacts(
-    session: Session, plan: LocomotionPlan, pairs: Pairs, shown: LevelSchedule
+    session: Session, plan: LocomotionPlan, pairs: Pairs, schedule: LevelSchedule
 ) -> Annotated[Floats, "pairs contacts"]:
     """Return the probabilities of K pairs of a character and a frame."""
-    found, shares = _contacts_at_levels(session, plan, pairs, shown.levels), shown.shares
+    probabilities, shares = (
+        _contacts_at_levels(session, plan, pairs, schedule.levels),
+        schedule.shares,
+    )
     between = np.flatnonzero(shares < 1.0)
     if len(between):
         some = pairs[0][between], pairs[1][between]
-        before = _contacts_at_levels(session, plan, some, shown.previous[between])
-        found[between] = before + shares[between, None] * (found[between] - before)
-    return found
+        before = _contacts_at_levels(session, plan, some, schedule.previous[between])
+        probabilities[between] = before + shares[between, None] * (probabilities[between] - before)
+    return probabilities
 
 
 def _contacts_at_levels(
     session: Session, plan: LocomotionPlan, pairs: Pairs, levels: Indices
 ) -> Annotated[Floats, "pairs contacts"]:
     """Return the probabilities of K pairs, each at its level (K,)."""
-    found = np.empty((len(levels), len(session.card.contacts)))
+    probabilities = np.empty((len(levels), len(session.card.contacts)))
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
         pair = pairs[0][rows], pairs[1][rows]
         labels = plan.labels.weights[plan.who[pair[0]]]
-        found[rows] = stride.contact_probabilities(
+        probabilities[rows] = stride.contact_probabilities(
             session, plan.controls[pair], labels, plan.phases[pair], level
         )
-    return found
+    return probabilities

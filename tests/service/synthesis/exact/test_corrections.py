@@ -160,7 +160,7 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
         total += np.outer(there - told, there - told) / sigma**2
     _, gradients = aim.evaluate(scene, numbers)
     beside = gradients[:, spread.captured.shape[1] :]
-    total += beside @ spread.beside @ beside.T
+    total += beside @ spread.cycle @ beside.T
     own = 0.9 * total + 0.1 * np.trace(total) / 3.0 * np.eye(3)
     own *= walking.held.state.sigma**2
     expected = apart.mahalanobis([0.02, 0.01, -0.03], np.zeros(3), np.linalg.inv(own))

@@ -150,5 +150,5 @@ def test_the_metric_is_a_covariance(walking, rng):
     assert np.allclose(own.apply_shrunk(gradients), full @ gradients.T)
     # Shrinking keeps the size of it all.
     inner = own.residuals @ own.residuals.T
-    kept = np.trace(full) - np.trace(own.beside)
+    kept = np.trace(full) - np.trace(own.cycle)
     assert kept == pytest.approx(np.trace(inner))
