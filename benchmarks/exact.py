@@ -10,8 +10,8 @@ from rows import Row
 from timing import in_turn
 
 from posefield.constraints import gauss_newton
-from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.constraints.constraint import PositionConstraint
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.inference import session
 from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import PredictionState, Session

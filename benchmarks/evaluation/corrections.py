@@ -14,8 +14,8 @@ from evaluation.methods import EXACT
 from posefield.common.units import Floats
 from posefield.constraints import gauss_newton
 from posefield.constraints.constrained_motion import ConstrainedMotion
-from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.constraints.constraint import PositionConstraint
+from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.inference import session
 from posefield.inference.onnx_runtime import OUTPUTS
 from posefield.inference.session import PredictionState, Session

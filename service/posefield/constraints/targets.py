@@ -209,7 +209,7 @@ def bring_back(
     requested: Mapping[str, float],
     bounds: AnswerBounds,
 ) -> ConstrainedMotion:
-    """Return the corrected motion within the bounds, with errors relative to the requested controls.
+    """Return the corrected motion within the bounds, with errors from the requested controls.
 
     goals: of the correction, in which controls are limited. requested: controls as requested.
     """
