@@ -145,10 +145,10 @@ def _write_recipes(
     replaced = recipe_folder.expect_free(output, family_options.overwrite)
     files = MotionFiles(KEPT_POSES)
     read = _read(folder, stated, files)
-    names = [recording.file for recording in read.recordings]
+    figures = {recording.file: read.figures[recording.file] for recording in read.recordings}
     statements = FileStatements(family_options.unit, stated.up, _roles(stated), stated.rate)
-    with ProgressBar("bodies", len(names)) as bar:
-        kinds = found_families.find_kinds(folder, names, statements, bar.update, read.figures)
+    with ProgressBar("bodies", len(figures)) as bar:
+        kinds = found_families.find_kinds(folder, figures, statements, bar.update)
     with ProgressBar("candidates", family_options.candidates) as bar:
         listed = found_families.find_families(
             read.recordings, kinds, family_options.candidates, bar.update

@@ -76,7 +76,6 @@ def find(program: Path | None) -> BlenderProgram:
 
 
 def _checked(path: Path, command: tuple[str, ...], version: re.Match[str]) -> BlenderProgram:
-    """Return the program; FileError if it is too old."""
     number = version[0].removeprefix("Blender ")
     if (int(version[1]), int(version[2])) < LEAST_VERSION:
         oldest = ".".join(map(str, LEAST_VERSION))
@@ -144,7 +143,6 @@ def _rigid_bones(clip: Clip) -> Positions:
 def _read(
     path: Path, options: ReadOptions, blender: Path | None
 ) -> tuple[MotionFile, tuple[str, ...]]:
-    """Return the motion of a file, and the note on Blender if it was needed."""
     if path.suffix.lower() != FBX:
         return motion_readers.read(path, options), ()
     if not path.is_file():

@@ -166,7 +166,6 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
 
 
 def _candidates(clips: FamilyClips) -> dict[ProposedControl, Floats]:
-    """Return the measures (N,) of the clips that may be controls."""
     roles = ["hips", "head", *_limb_ends(clips.joints)]
     measured = {
         ProposedControl(axis, role, at): _measured(clips, Measure(axis, (clips.joints[role],), at))

@@ -59,7 +59,7 @@ def find_strides(recording: Recording) -> list[Stride]:
     lead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
     signal = moving_mean(lead, round(SMOOTHING * recording.rate))
     extrema = alternating_extrema(signal)
-    strides_found = []
+    strides = []
     for (first, kind), (middle, _), (last, _) in zip(
         extrema, extrema[1:], extrema[2:], strict=False
     ):
@@ -73,8 +73,8 @@ def find_strides(recording: Recording) -> list[Stride]:
             step = max(1, round(WAY_STEP * recording.rate))
             hips = recording.places["hips"][first : last + 1 : step, [0, 2]]
             distance = float(np.linalg.norm(np.diff(hips, axis=0), axis=1).sum())
-            strides_found.append(Stride(first, last, distance / swing))
-    return strides_found
+            strides.append(Stride(first, last, distance / swing))
+    return strides
 
 
 def moving_mean(values: Floats, frames: int) -> Floats:
@@ -242,11 +242,11 @@ def _reviewed(recordings: Sequence[Recording], path: Path) -> Examples:
 def _span(
     recordings: Sequence[Recording],
     file: str,
-    seconds_of_part: tuple[float, float],
+    seconds_range: tuple[float, float],
     shortest: float,
 ) -> Span:
     """Return a part of a recording, s; InvalidField if the recording is unknown or lacks it."""
-    start, end = seconds_of_part
+    start, end = seconds_range
     for index, recording in enumerate(recordings):
         if recording.file == file:
             seconds = (len(recording) - 1) / recording.rate

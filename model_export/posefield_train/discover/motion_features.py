@@ -235,7 +235,6 @@ def principal_components(values: Floats) -> tuple[Floats, Floats]:
 
 
 def _turned(vectors: Floats, angles: Floats) -> Floats:
-    """Return vectors (F, 3) turned about y by angles (F,), rad."""
     x, y, z = vectors.T
     cos, sin = np.cos(angles), np.sin(angles)
     return np.stack([x * cos + z * sin, y, z * cos - x * sin], axis=1)

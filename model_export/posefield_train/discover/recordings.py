@@ -71,7 +71,6 @@ def _motion(positions: Mapping[str, Floats], roles: Sequence[str]) -> Positions:
 
 
 def _counterpart(role: str) -> str:
-    """Return the role on the other side; the role itself in the middle of the body."""
     for side, other in (("left", "right"), ("right", "left")):
         if role.startswith(side):
             return other + role.removeprefix(side)
@@ -194,7 +193,9 @@ def read_recordings(
             body = _body(name, read(path, ReadOptions(rate=statements.rate)), statements)
             frames += len(body.recording)
             measured[body.joints] += 1
-            bodies.append(body if measured[body.joints] <= MOST_WHOLE else body.light())
+            if measured[body.joints] > MOST_WHOLE:
+                body = replace(body, figure=body.figure.with_few_frames())
+            bodies.append(body)
         except FileError as fault:
             refused[name] = motion_readers.reason(fault, path)
         except UnusableRecording as fault:
@@ -235,10 +236,6 @@ class Body:
     figure: proposals.Figure
     leg: float
     up: Proposal
-
-    def light(self) -> "Body":
-        """Return the body with few of its measured frames."""
-        return replace(self, figure=self.figure.with_few_frames())
 
 
 def _body(name: str, file: MotionFile, stated: FileStatements) -> Body:
@@ -345,7 +342,7 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
     """
     axes: dict[tuple[str, ...], UpAxis | None] = {}
     reasons: dict[tuple[str, ...], str] = {}
-    turned = []
+    upright = []
     for body in bodies:
         if body.joints not in axes:
             alike = [other.figure for other in bodies if other.joints == body.joints]
@@ -368,5 +365,5 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
         positions = {
             r: motion_file.to_y_up(vectors, axis) for r, vectors in body.recording.places.items()
         }
-        turned.append(replace(body.recording, places=positions))
-    return turned
+        upright.append(replace(body.recording, places=positions))
+    return upright

@@ -91,7 +91,6 @@ def _direction(points: Floats) -> Floats:
 
 
 def _path(bones: Floats) -> str:
-    """Return the path of bones (F, B, 2, 2)."""
     lines = bones.reshape(-1, 4)
     return "".join(f"M{x:.0f} {y:.0f}L{u:.0f} {v:.0f}" for x, y, u, v in lines)
 

@@ -16,12 +16,11 @@ from posefield_train.discover import family_search, found_clips, motion_features
 from posefield_train.discover.family_search import FEWEST, FamilyQuality
 from posefield_train.discover.motion_features import Corpus
 from posefield_train.discover.recordings import FileStatements, Recording
-from posefield_train.probe import probe_report, proposals, recipe_draft
+from posefield_train.probe import probe_report, recipe_draft
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Figure, Proposal
-from posefield_train.source import clip_table, common_topology, motion_readers
+from posefield_train.source import clip_table, common_topology
 from posefield_train.source.common_topology import RoleJoints, TopologyError
-from posefield_train.source.motion_file import ReadOptions
 
 SAME_BONE = 0.0005
 """Largest difference of a bone's length between files of one performer, m."""
@@ -45,26 +44,20 @@ class BodyKind:
 
 def find_kinds(
     folder: Path,
-    files: Sequence[str],
+    figures: Mapping[str, Figure],
     stated: FileStatements,
     report: Callable[[int], None] = lambda _: None,
-    figures: Mapping[str, Figure] | None = None,
 ) -> list[BodyKind]:
     """Return the kinds of bodies of a folder's files, in the order of their first files.
 
-    figures: of files that were read before. Raises InvalidField for files whose unit or up axis is
-    neither stated nor told by the bodies.
+    figures: of the bodies, by file. Raises InvalidField for files whose unit or up axis is neither
+    stated nor told by the bodies.
     """
     groups: dict[tuple[str, ...], list[tuple[str, Figure]]] = {}
-    for count, file in enumerate(files, 1):
-        figure = figures[file] if figures else _measured(folder / file, stated.rate)
+    for count, (file, figure) in enumerate(figures.items(), 1):
         groups.setdefault(tuple(figure.names), []).append((file, figure))
         report(count)
     return [_kind(folder, joints, group, stated) for joints, group in groups.items()]
-
-
-def _measured(path: Path, rate: float | None) -> Figure:
-    return proposals.measure(motion_readers.read(path, ReadOptions(rate=rate))).without_frames()
 
 
 def _kind(
@@ -74,22 +67,19 @@ def _kind(
     stated: FileStatements,
 ) -> BodyKind:
     files, figures = [file for file, _ in group], [stated_roles for _, stated_roles in group]
-    report_of_kind = _stated(
-        probe_report.report_of([folder / file for file in files], figures), stated
-    )
+    report = _stated(probe_report.report_of([folder / file for file in files], figures), stated)
     for name, key in (("metres_per_unit", "unit"), ("up", "up")):
-        if report_of_kind.proposed[name].value is None:
-            evidence = "; ".join(report_of_kind.proposed[name].evidence)
+        if report.proposed[name].value is None:
+            evidence = "; ".join(report.proposed[name].evidence)
             raise InvalidField(key, f"not told by {files[0]} ({evidence}), expected a statement")
-    unit = float(report_of_kind.proposed["metres_per_unit"].value)
+    unit = float(report.proposed["metres_per_unit"].value)
     names = name_performers(files, [unit * stated_roles.bones[1:] for stated_roles in figures])
     stated_roles = {role: joint for role, joint in stated.roles.items() if joint in joints}
     performers = dict(zip(files, names, strict=True))
-    return BodyKind(joints, report_of_kind, performers, figures[0].file.skeleton, stated_roles)
+    return BodyKind(joints, report, performers, figures[0].file.skeleton, stated_roles)
 
 
 def _stated(report: ProbeReport, stated: FileStatements) -> ProbeReport:
-    """Return the report with statements in place of proposals and guesses."""
     values = {"metres_per_unit": stated.metres_per_unit, "up": stated.up, "rate": stated.rate}
     proposed = {
         name: Proposal(value, "certain", STATED)
@@ -272,8 +262,8 @@ def read(path: Path) -> list[FamilyRow]:
         first, last = (cells.frame(line, record, key) for key in ("first_frame", "last_frame"))
         cost = cells.number(line, record, "cost") if record["cost"] else None
         accepted = record["accepted"] == "true"
-        cells_of_row = (record["file"], first, last, record["performer"], record[column])
-        rows.append(FamilyRow(*cells_of_row, cost, accepted))
+        cells_before_cost = (record["file"], first, last, record["performer"], record[column])
+        rows.append(FamilyRow(*cells_before_cost, cost, accepted))
     return rows
 
 
@@ -318,10 +308,10 @@ def find_families(
         quality = family_search.assess(joined, family)
         rows = [_row(corpus, member.span, member.cost, kinds) for member in family.members]
         example = _row(corpus, family.example, 0.0, kinds)
-        family_found = FoundFamily(
+        candidate = FoundFamily(
             "motions", tuple(rows), example, (), family.seconds, quality, {}, quality.reasons
         )
-        families.append(_of_one_topology(family_found, kinds, recordings))
+        families.append(_of_one_topology(candidate, kinds, recordings))
     strides = _strides(recordings, kinds)
     return families if strides is None else [*families, strides]
 
@@ -342,7 +332,6 @@ def _clip(
 
 
 def _strides(recordings: Sequence[Recording], kinds: Sequence[BodyKind]) -> FoundFamily | None:
-    """Return the strides that travel as a family; None if there are few."""
     pairs = [
         (recording, one)
         for recording in recordings
@@ -370,24 +359,22 @@ def _of_one_topology(
     common = [at for at, _ in counts.most_common()]
     if len(common) > 1 and not can_share([kinds[at] for at in common]):
         common = common[:1]
-    kept_rows, left_out = [], {}
+    rows, left_out = [], {}
     for row in family.rows:
         is_whole = by_file[row.file].is_whole(row.first_frame, row.last_frame)
         if numbers[row.file] in common and is_whole:
-            kept_rows.append(row)
+            rows.append(row)
         else:
             clip_name = f"{row.file}@{row.first_frame / by_file[row.file].rate:.1f}"
             left_out[clip_name] = (
                 "a joint leaps" if not is_whole else "other joints than most clips"
             )
     reasons = family.reasons
-    if len(kept_rows) < FEWEST:
-        reasons = (*reasons, f"{len(kept_rows)} clips of one skeleton, expected {FEWEST} or more")
-    if len({row.recording for row in kept_rows}) < 2:
+    if len(rows) < FEWEST:
+        reasons = (*reasons, f"{len(rows)} clips of one skeleton, expected {FEWEST} or more")
+    if len({row.recording for row in rows}) < 2:
         reasons = (*reasons, "clips of one recording, expected two recordings or more")
     # Clips in which a joint leaps may have been all of a kind.
-    left = {numbers[row.file] for row in kept_rows} or {common[0]}
-    family_kinds = tuple(kinds[at] for at in common if at in left)
-    return replace(
-        family, rows=tuple(kept_rows), kinds=family_kinds, left_out=left_out, reasons=reasons
-    )
+    left = {numbers[row.file] for row in rows} or {common[0]}
+    shared_kinds = tuple(kinds[at] for at in common if at in left)
+    return replace(family, rows=tuple(rows), kinds=shared_kinds, left_out=left_out, reasons=reasons)

@@ -61,10 +61,10 @@ def propose(
     return proposal
 
 
-def _family_clips(family_recipe: Recipe, examples: Sequence[ingest.Example]) -> FamilyClips:
+def _family_clips(draft: Recipe, examples: Sequence[ingest.Example]) -> FamilyClips:
     names = examples[0].clip.skeleton.names
-    roles = {str(role): joint for role, joint in family_recipe.roles.items()}
-    if family_recipe.skeleton.is_unified:
+    roles = {str(role): joint for role, joint in draft.roles.items()}
+    if draft.skeleton.is_unified:
         roles = common_topology.model_roles(names)
     joints: Mapping[str, int] = {
         role: names.index(joint) for role, joint in roles.items() if joint in names
@@ -74,7 +74,7 @@ def _family_clips(family_recipe: Recipe, examples: Sequence[ingest.Example]) -> 
         joints,
         tuple(one.row.performer for one in examples),
         tuple(one.recording for one in examples),
-        family_recipe.motion.cyclic,
+        draft.motion.cyclic,
     )
 
 
@@ -219,7 +219,6 @@ def control_name(control: ProposedControl) -> str:
 
 
 def _evidence(proposal: ControlProposal) -> list[str]:
-    """Return how much of the variance of left-out recordings remains with the controls."""
     single = len(proposal.controls) - len(proposal.remaining) + 1
     lines = []
     for at, left in enumerate(proposal.remaining):

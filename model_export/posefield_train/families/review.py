@@ -191,7 +191,6 @@ def _check_numbers(reviewed: ReviewedFolder, decisions: Decisions) -> None:
 
 
 def _drop(reviewed: ReviewedFolder, clip: DroppedClip) -> None:
-    """Mark the clip of a family that a file and a time name as not accepted."""
     # A family that the same decisions merged before has its clips in the other one.
     number = reviewed.family(clip.family).get("into", clip.family)
     recordings, rows = reviewed.facts["recordings"], reviewed.rows[number]
@@ -212,7 +211,6 @@ def _drop(reviewed: ReviewedFolder, clip: DroppedClip) -> None:
 
 
 def _merge(reviewed: ReviewedFolder, first: int, second: int) -> None:
-    """Move the clips of a family into another, and propose its event and controls again."""
     into, gone = reviewed.family(first), reviewed.family(second)
     if into["kind"] != gone["kind"]:
         said = f"{first} are {into['kind']} and {second} {gone['kind']}, expected the same"

@@ -98,11 +98,11 @@ def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None)
         report(count)
     if not figures:
         raise next(iter(faults.values()))
-    report_of_files = report_of(list(figures), list(figures.values()))
+    result = report_of(list(figures), list(figures.values()))
     if len(faulty) > SHOWN_FAULTS:
         faulty[SHOWN_FAULTS:] = [f"{len(faulty) - SHOWN_FAULTS} further faults of frames"]
     reasons = {str(path): motion_readers.reason(figure, path) for path, figure in faults.items()}
-    return replace(report_of_files, warnings=(*report_of_files.warnings, *faulty), refused=reasons)
+    return replace(result, warnings=(*result.warnings, *faulty), refused=reasons)
 
 
 def report_of(paths: Sequence[Path], figures: Sequence[Figure]) -> ProbeReport:
@@ -179,7 +179,6 @@ def _warnings(figures: Sequence[Figure], alike: Sequence[Figure]) -> list[str]:
 
 
 def _mixed_settings(alike: Sequence[Figure]) -> list[str]:
-    """Return the warnings on files in another unit, or with another up axis, than most."""
     warnings = []
     legs = {figure.file.source: leg for figure in alike if (leg := figure.leg_length())}
     middle = float(np.median(list(legs.values()))) if legs else 0.0

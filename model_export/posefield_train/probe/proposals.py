@@ -164,7 +164,6 @@ def _stated(values: Sequence[Any], measured: Proposal, unit: str = "") -> Propos
 
 
 def _measured_unit(figures: Sequence[Figure]) -> Proposal:
-    """Return the length of the files' unit in metres, from the length of the legs."""
     lengths = [leg for figure in figures if (leg := figure.leg_length())]
     # Of files in several units those of most.
     alike = [[leg for leg in lengths if one / OTHER_UNIT < leg <= one] for one in lengths]
@@ -200,7 +199,6 @@ def propose_up(figures: Sequence[Figure]) -> Proposal:
 
 
 def _measured_up(figures: Sequence[Figure]) -> Proposal:
-    """Return the up axis, from the bodies in motion, the floor under their feet, and at rest."""
     moving = [_upward(figure, figure.positions) for figure in figures]
     at_rest = [
         _upward(figure, figure.file.skeleton.at_rest(figure.file.skeleton.offsets)[None])

@@ -39,7 +39,6 @@ class ReachingMotion:
 
 
 def _trunk_motion(controls: SampleControls, goal: TrunkDisplacement, u: Floats) -> ReachingMotion:
-    """Return the motion of the trunk and the right shoulder blade, which carry the reaching arm."""
     still = np.tile(quat.IDENTITY, (len(u), len(sample_body.NAMES), 1))
     path = sample_trunk.root_path(controls, goal, u)
     turns = sample_trunk.rotations(controls, goal, u)

@@ -57,7 +57,6 @@ def _spread(group: int, index: int, size: int) -> Floats:
 
 
 def _trial_controls(stature: float, standing: bool, spread: Floats) -> SampleControls:
-    """Return the controls of a trial, rounded as the table prints them."""
     low, high = sample_controls.limits("hip_height", stature, 0.0)
     band = (
         (high - sample_controls.STAND_RANGE, high)
@@ -222,7 +221,6 @@ _BALL = "Zrotation Yrotation Xrotation"
 
 
 def _files(chosen: Iterable[SampleTrial]) -> dict[str, bytes]:
-    """Return the contents of all files of some samples, by path relative to their directory."""
     files: dict[str, bytes] = {}
     rows = [["file", "performer", *RANGES, "event_frame"]]
     for number, sample in enumerate(chosen, start=1):
@@ -311,7 +309,6 @@ def _offset(indent: str, offset: Floats) -> str:
 
 
 def _joint(figure: Skeleton, joint: int, depth: int = 0) -> Iterator[str]:
-    """Yield the lines of a joint and its descendants."""
     outer, inner = "  " * depth, "  " * (depth + 1)
     yield f"{outer}{'JOINT' if joint else 'ROOT'} {figure.names[joint]}"
     yield f"{outer}{{"

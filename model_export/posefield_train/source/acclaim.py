@@ -199,7 +199,6 @@ _Draft = dict[str, _Line]
 
 
 def _bone_drafts(lines: Sequence[_Line]) -> dict[str, _Draft]:
-    """Return the bones between `begin` and `end` by their names."""
     drafts: dict[str, _Draft] = {}
     draft: _Draft = {}
     for line in lines:
@@ -337,7 +336,6 @@ def _groups(lines: Iterator[_Line], max_lines: int) -> Iterator[list[_Line]]:
 
 
 def _turns(angles: Floats, axes: str, order: str) -> Floats:
-    """Return rotations (F, 4) by angles (F, k), degrees, about axes, in an order of them."""
     # The last turn is the outermost.
     outwards = [axis for axis in reversed(order) if axis in axes]
     columns = [axes.index(axis) for axis in outwards]

@@ -121,8 +121,6 @@ class _Tokens:
 
 @dataclass
 class _JointDraft:
-    """A joint before its closing brace."""
-
     name: str
     parent: int
     line: int

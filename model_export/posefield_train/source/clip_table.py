@@ -262,7 +262,6 @@ class ClipRow:
 
     @property
     def _motion_name(self) -> str:
-        """Return the name of the file, with the animation if it holds several."""
         return self.file.name if self.animation is None else f"{self.file.name}[{self.animation}]"
 
     def error(self, message: str) -> RecipeError:

@@ -121,7 +121,6 @@ def _indices(joints: Skeleton, stated: StatedRoles) -> dict[str, int]:
 
 
 def _spine_length(joints: Skeleton, between: Sequence[int], indices: Mapping[str, int]) -> int:
-    """Return the number of joints between hips and head that belong to the spine."""
     neck = indices.get("neck")
     # Of a body without a spine the joint that carries the arms is one.
     if neck in between[1:]:
@@ -243,19 +242,18 @@ def joint_points(
         for number in (0, 1)
     ]
     names = numbered("spine", topology.spine), (*numbered("neck", topology.neck), "head")
-    points_of_bodies = []
+    bodies_points = []
     for body, body_chains, bones in zip(bodies, chains, lengths, strict=True):
         limbs = {role: joint for role, joint in body.limbs.items() if role in topology.names}
         points = {name: JointPoint(at, at) for name, at in {"hips": body.hips, **limbs}.items()}
         for number in (0, 1):
             placed = _sample(body_chains[number], bones, shares[number])
             points |= dict(zip(names[number], placed, strict=True))
-        points_of_bodies.append({name: points[name] for name in topology.names})
-    return points_of_bodies
+        bodies_points.append({name: points[name] for name in topology.names})
+    return bodies_points
 
 
 def _shares(chain: Sequence[int], bones: Floats) -> Floats:
-    """Return the share of a chain's length at each of its joints."""
     along = np.concatenate([[0.0], np.cumsum(bones[list(chain[1:])])])
     return np.asarray(along / along[-1] if along[-1] > 0.0 else np.linspace(0.0, 1.0, len(along)))
 

@@ -178,10 +178,10 @@ UNIT_RANGE = [0.0, 1.0]
 DEFAULT_DISTANCE_CM = 2.0
 
 
-def _check_curve_range(ends_of_range: list[float] | None) -> list[float] | None:
-    if ends_of_range is not None and not ends_of_range[0] < ends_of_range[1]:
-        raise ValueError(f"found {ends_of_range}, expected the smaller end first")
-    return ends_of_range
+def _check_curve_range(bounds: list[float] | None) -> list[float] | None:
+    if bounds is not None and not bounds[0] < bounds[1]:
+        raise ValueError(f"found {bounds}, expected the smaller end first")
+    return bounds
 
 
 class CurveKeys(RecipePart):

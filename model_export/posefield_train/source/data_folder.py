@@ -113,22 +113,20 @@ def _member_error(member: ZipMember, fault: Exception) -> RecipeError:
 FileLocation = Path | ZipMember
 
 
-def read(file_location: FileLocation, max_bytes: int, what: str) -> bytes:
+def read(path: FileLocation, max_bytes: int, what: str) -> bytes:
     """Return the whole content of a file; `what` names it in the message of one that is too large.
 
     Raises RecipeError for more than `max_bytes` bytes, reading at most one byte more, and if the
     file cannot be read.
     """
     try:
-        with file_location.open("rb") as file:
+        with path.open("rb") as file:
             content = file.read(max_bytes + 1)
     except OSError as fault:
-        raise RecipeError(str(file_location), f"cannot be read: {fault.strerror}") from fault
+        raise RecipeError(str(path), f"cannot be read: {fault.strerror}") from fault
     if len(content) > max_bytes:
         size = f"{max_bytes // 1000} kB"
-        raise RecipeError(
-            str(file_location), f"found more than {size}, expected {what} of at most {size}"
-        )
+        raise RecipeError(str(path), f"found more than {size}, expected {what} of at most {size}")
     return content
 
 

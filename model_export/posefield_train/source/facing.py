@@ -114,7 +114,6 @@ def _measured(
 
 
 def _verify(evidence: Evidence | None, degrees: float, origin: str) -> None:
-    """Raise FacingError if clips contradict a facing."""
     if evidence is None:
         return
     deviations = np.abs(_difference(evidence.angles, degrees))

@@ -72,7 +72,6 @@ Tracks = Mapping[tuple[int, str], Track]
 
 
 def _read_tracks(document: GltfDocument, animation: Any) -> Tracks:
-    """Return the curves of an animation; MotionFileError for those that break the format."""
     tracks: dict[tuple[int, str], Track] = {}
     keys = 0
     for channel in animation.channels:
@@ -274,7 +273,6 @@ def _animated_tree(document: GltfDocument, animated: set[int]) -> GltfJoints:
 
 
 def _changing(curves: Tracks) -> set[int]:
-    """Return the nodes whose transforms change over time."""
     return {
         node
         for (node, path), track in curves.items()
@@ -311,7 +309,6 @@ def _plain(
 
 
 def _sampled(document: GltfDocument, node: int, tracks: Tracks, times: Floats) -> Transform:
-    """Return the transforms (F, ...) of a node."""
     still = gltf_rig.node_transform(document, node)
     turns, translations, scales = (
         tracks[node, path].at(times) if (node, path) in tracks else np.tile(rest, (len(times), 1))

@@ -206,7 +206,6 @@ def _as_stated(file: MotionFile, source: Source, other_files: Collection[MotionF
 
 
 def _bone_length(file: MotionFile) -> float:
-    """Return the total length of a file's bones, in its unit."""
     return float(np.linalg.norm(file.skeleton.offsets[1:], axis=-1).sum())
 
 

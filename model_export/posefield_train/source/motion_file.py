@@ -198,7 +198,6 @@ def sample_times(keys: Floats, rate: float | None) -> tuple[Floats, float, str]:
 
 
 def _refuse_uneven(keys: Floats) -> None:
-    """Raise UnevenKeys for keys that are uneven or lack frames."""
     spacing = np.diff(keys)
     step = float(np.median(spacing))
     if np.all(np.abs(spacing - step) <= EVEN * step):

@@ -40,7 +40,6 @@ class MotionFormat:
 
 
 def _read_acclaim(file: FileLocation, options: ReadOptions) -> MotionFile:
-    """Return the motion of an AMC file with the ASF file beside it."""
     skeletons = [name for name in data_folder.names_beside(file) if _suffix(name) == ".asf"]
     stem = PurePosixPath(file.name).stem.lower()
     matching = [name for name in skeletons if stem.startswith(PurePosixPath(name).stem.lower())]

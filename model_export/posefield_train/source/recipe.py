@@ -7,7 +7,7 @@ keys, missing units, duplicate names. Its sections are in `recipe_sections`.
 import json
 import re
 import tomllib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -119,7 +119,6 @@ def key_lines(text: str) -> dict[Key, int]:
 
 
 def _mistake(form: type[BaseModel], error: ErrorDetails) -> tuple[Key, str]:
-    """Return the key of a mistake and the message about it."""
     key: Key = tuple(
         component for component in error["loc"] if component not in (COLUMN_TAG, MEASURED)
     )
@@ -140,13 +139,11 @@ def _mistake(form: type[BaseModel], error: ErrorDetails) -> tuple[Key, str]:
 
 
 def _quote_input(value: Any) -> str:
-    """Return the given value for a message, cut to SHOWN characters."""
     text = repr(value)
     return f", found {text if len(text) <= SHOWN else f'{text[:SHOWN]}...'}"
 
 
 def _known_keys(form: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
-    """Return the keys that a table accepts, by the location of an error."""
     kinds = [form]
     for component in loc:
         if component in (COLUMN_TAG, MEASURED):
@@ -162,7 +159,6 @@ def _known_keys(form: type[BaseModel], loc: Sequence[str | int]) -> list[str]:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models that an annotation mentions."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for argument in get_args(annotation) for model in _models(argument)]
@@ -272,18 +268,14 @@ class Recipe(RecipePart):
 
     @model_validator(mode="after")
     def _check_sections(self) -> "Recipe":
+        names = [control.name for control in self.controls]
         check_skeleton(self.skeleton, self.roles)
-        check_label_sets(self.clips, self.kriging)
-        check_label_names(self.controls, self.kriging)
-        check_presets(self.presets, self.controls, self.kriging)
+        check_labels(self.clips, self.kriging, names)
+        check_presets(self.presets, names, self.kriging)
         for index, control in enumerate(self.controls):
             if isinstance(control, ControlMeasured):
-                auto = control.auto
-                arguments = auto, self.motion, self.clips.landmarks, self.leg_ends(auto)
-                for key, fault in measurement_faults(*arguments):
-                    raise KeyFault(f"{fault} (control {control.name})", "controls", index, *key)
-        check_event(self.event, self.size, self.clips.landmarks)
-        check_landmarks(self.clips.landmarks)
+                check_measurement(self, index, control)
+        check_moments(self.event, self.size, self.clips.landmarks)
         return self
 
 
@@ -373,8 +365,8 @@ def check_skeleton(skeleton: SkeletonSettings, roles: Collection[str]) -> None:
         )
 
 
-def check_label_sets(clips: Clips, kriging: Kriging) -> None:
-    """Raise KeyFault for a label set without a column, and for a column that no set uses."""
+def check_labels(clips: Clips, kriging: Kriging, controls: Sequence[str]) -> None:
+    """Raise KeyFault for label sets without a column or a name of their own, and unused columns."""
     if PERFORMER in clips.labels:
         raise KeyFault(
             "found 'performer', whose column is clips.performer", "clips", "labels", PERFORMER
@@ -397,33 +389,20 @@ def check_label_sets(clips: Clips, kriging: Kriging) -> None:
             f"found {unused[0]!r}, which kriging.label does not name, expected it there",
             *("clips", "labels", unused[0]),
         )
-
-
-def check_label_names(controls: Sequence[Control], kriging: Kriging) -> None:
-    """Raise KeyFault for a label set with the name of a control or of a request's parameter."""
-    names = [control.name for control in controls]
     for name in kriging.label:
-        if name in names:
-            raise KeyFault(
-                f"found {name!r}, which is a control, too, expected another name",
-                *("kriging", "label"),
-            )
-        if name in RESERVED - {PERFORMER}:
-            raise KeyFault(
-                f"found {name!r}, which is a parameter of requests, expected another name",
-                *("kriging", "label"),
-            )
+        if name in controls or name in RESERVED - {PERFORMER}:
+            meaning = "a control, too" if name in controls else "a parameter of requests"
+            fault = f"found {name!r}, which is {meaning}, expected another name"
+            raise KeyFault(fault, "kriging", "label")
 
 
-def check_presets(
-    presets: Mapping[str, Preset], controls: Sequence[Control], kriging: Kriging
-) -> None:
+def check_presets(presets: Mapping[str, Preset], controls: Sequence[str], kriging: Kriging) -> None:
     """Raise KeyFault for a preset with other controls, and for one with an unknown label set."""
-    names = [control.name for control in controls]
     for name, preset in presets.items():
-        if sorted(preset.values) != sorted(names):
+        if sorted(preset.values) != sorted(controls):
             listed = ", ".join(preset.values) or "nothing"
-            raise KeyFault(f"found {listed}, expected a value for each of {names}", "presets", name)
+            fault = f"found {listed}, expected a value for each of {controls}"
+            raise KeyFault(fault, "presets", name)
         for label_set, label in preset.labels.items():
             if label_set not in kriging.label:
                 raise KeyFault(
@@ -435,40 +414,39 @@ def check_presets(
                 )
 
 
-def measurement_faults(
-    auto: Auto, motion: Motion, landmarks: list[str], leg_ends: Sequence[str]
-) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the reasons for which a quantity cannot be measured, each with its key.
-
-    leg_ends: joints of a step or a leg, if the quantity is measured between two.
-    """
+def check_measurement(recipe: "Recipe", index: int, control: ControlMeasured) -> None:
+    """Raise KeyFault for a control whose quantity cannot be measured. index: of the control."""
+    auto, motion, landmarks = control.auto, recipe.motion, recipe.clips.landmarks
     quantity = auto.quantity
+
+    def refuse(fault: str, key: str) -> None:
+        raise KeyFault(f"{fault} (control {control.name})", "controls", index, "auto", key)
+
     if quantity in CYCLE_QUANTITIES and not motion.cyclic:
-        yield (
-            ("auto", "quantity"),
+        refuse(
             f"found {quantity!r} and motion.cyclic = false, expected a cycle: of a motion that "
             "ends elsewhere it depends on the cut",
+            "quantity",
         )
     if quantity in ("speed", "stride_length") and motion.root == "in_place":
-        yield (
-            ("auto", "quantity"),
+        refuse(
             f"found {quantity!r} and motion.root = 'in_place', expected one that travels",
+            "quantity",
         )
     if auto.at is not None and (fault := _moment_fault(auto.at, landmarks)):
-        yield ("auto", "at"), fault
-    if quantity == "step_length" and len(leg_ends) != 2:
-        found = f"found none and motion.feet {motion.feet}, expected two feet"
-        yield ("auto", "joints"), found
-    if quantity == "leg_length" and len(leg_ends) != 2:
-        yield (
-            ("auto", "joints"),
+        refuse(fault, "at")
+    if quantity == "step_length" and len(recipe.leg_ends(auto)) != 2:
+        refuse(f"found none and motion.feet {motion.feet}, expected two feet", "joints")
+    if quantity == "leg_length" and len(recipe.leg_ends(auto)) != 2:
+        refuse(
             "found none, and not both roles leftUpperLeg and leftFoot; expected the upper end "
             "of a leg and its lower",
+            "joints",
         )
 
 
-def check_event(event: Event | None, size: Size, landmarks: list[str]) -> None:
-    """Raise KeyFault for an unknown moment of the event, and for its budget without an event."""
+def check_moments(event: Event | None, size: Size, landmarks: list[str]) -> None:
+    """Raise KeyFault for an unknown moment, a budget without event, and a landmark named as one."""
     if event is None:
         if size.effector_budget_cm is not None:
             raise KeyFault(
@@ -478,10 +456,6 @@ def check_event(event: Event | None, size: Size, landmarks: list[str]) -> None:
             )
     elif fault := _moment_fault(event.at, landmarks):
         raise KeyFault(fault, "event", "at")
-
-
-def check_landmarks(landmarks: Sequence[str]) -> None:
-    """Raise KeyFault for a landmark with the name of a moment that is found in the motion."""
     for index, name in enumerate(landmarks):
         if name in TIME_NAMES:
             raise KeyFault(
@@ -492,10 +466,8 @@ def check_landmarks(landmarks: Sequence[str]) -> None:
 
 
 def _moment_fault(at: str, landmarks: list[str]) -> str | None:
-    """Return the fault of an unknown moment; None for a known one."""
-    moments_known = (*TIME_NAMES, *landmarks)
-    if at in moments_known:
+    moments = (*TIME_NAMES, *landmarks)
+    if at in moments:
         return None
-    moments = ", ".join(map(repr, TIME_NAMES))
-    expected = f"expected {moments} or a column of clips.landmarks {landmarks}"
-    return f"found {at!r}{did_you_mean(at, moments_known)}, {expected}"
+    expected = f"expected {', '.join(map(repr, TIME_NAMES))} or a column of clips.landmarks"
+    return f"found {at!r}{did_you_mean(at, moments)}, {expected} {landmarks}"

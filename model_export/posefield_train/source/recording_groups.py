@@ -229,9 +229,9 @@ def _continuations(motions: Motions) -> Iterator[ClipPair]:
         steady = _rms(steps - step) < STEADY * pace
         same = _rms(starts[:, 0] - last) < SAME
         follows = _rms(starts[:, 0] - last - step) < FOLLOWS * pace
-        for number in np.flatnonzero(steady & (same | follows)):
-            if able[number] != first:
-                yield ClipPair(first, able[number], "continues")
+        for index in np.flatnonzero(steady & (same | follows)):
+            if able[index] != first:
+                yield ClipPair(first, able[index], "continues")
 
 
 def _rms(moves: Annotated[Floats, "*clips joints 3"]) -> Annotated[Floats, "*clips"]:
@@ -249,9 +249,9 @@ def find_recordings(
     3), m, of each clip as captured. joints: their names.
     """
     pairs = find_pairs(motions, mirrored_joints(joints))
-    pairs_of_files = [pair for pair in pairs if files[pair.first] != files[pair.second]]
-    recordings = connected(files, pairs_of_files)
-    return recordings, [*_pair_notes(names, pairs_of_files), *_file_notes(files)]
+    across_files = [pair for pair in pairs if files[pair.first] != files[pair.second]]
+    recordings = connected(files, across_files)
+    return recordings, [*_pair_notes(names, across_files), *_file_notes(files)]
 
 
 def connected(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
@@ -276,7 +276,6 @@ STATE_RECORDINGS = "clips.recording states recordings"
 
 
 def _pair_notes(names: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
-    """Return a note for each relation of clips of different files."""
     notes = []
     for relation in ("mirrors", "shares frames with", "continues"):
         related = [pair for pair in pairs if pair.relation == relation]
@@ -293,7 +292,6 @@ def _pair_notes(names: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
 
 
 def _file_notes(files: Sequence[str]) -> list[str]:
-    """Return the note on clips that were cut from one file."""
     _, counts = np.unique(files, return_counts=True)
     if counts.max() == 1 or len(counts) == 1:
         return []

@@ -134,7 +134,6 @@ def _stretches(clip: Clip) -> Annotated[Floats, "frames joints"]:
 
 
 def _likely_cause(clip: Clip, joint: int, limit: float) -> str:
-    """Return the likely cause of a joint's stretch, and what to do about it."""
     stretches = _stretches(clip)
     joints = clip.skeleton
     beyond = stretches.max(axis=0) > limit

@@ -219,8 +219,8 @@ class SkeletonKind:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Return the joints that no role and no chain has."""
-        joints_used = self.joints.kept
-        return tuple(name for at, name in enumerate(self.skeleton.names) if at not in joints_used)
+        used = self.joints.kept
+        return tuple(name for at, name in enumerate(self.skeleton.names) if at not in used)
 
 
 @dataclass(frozen=True)
@@ -269,12 +269,11 @@ def unify(clips: Sequence[Clip], stated: StatedRoles) -> UnifiedClips:
 
 
 def _find_kinds(clips: Sequence[Clip], stated: StatedRoles) -> list[SkeletonKind]:
-    """Return the kinds of skeletons in the order of their first clips."""
     groups: dict[tuple[tuple[str, ...], tuple[int, ...]], list[int]] = {}
     for at, clip in enumerate(clips):
         groups.setdefault((clip.skeleton.names, clip.skeleton.parents), []).append(at)
-    names_of_files = {name for names, _ in groups for name in names}
-    unknown = sorted({name for names in stated.values() for name in names} - names_of_files)
+    file_joints = {name for names, _ in groups for name in names}
+    unknown = sorted({name for names in stated.values() for name in names} - file_joints)
     if unknown:
         raise TopologyError(f"skeleton.roles: no file has joint {', '.join(map(repr, unknown))}")
     kinds = []
@@ -436,7 +435,6 @@ def _kind_notes(clips: Sequence[Clip], files: Sequence[str], unified: UnifiedCli
 
 
 def _named(left_out: Sequence[str]) -> str:
-    """Return the joints that are left out as a part of a sentence."""
     more = len(left_out) - MOST_NAMED
     listed = ", ".join(left_out[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
     return f", without {listed}" if left_out else ""
@@ -451,7 +449,6 @@ def _distances_to(clip: Clip, positions: Floats) -> Floats:
 
 
 def _lack_notes(files: Sequence[str], unified: UnifiedClips) -> list[str]:
-    """Return the note on roles that some skeletons have and others lack."""
     everyone = {role for kind in unified.kinds for role in kind.joints.limbs}
     notes = []
     for role in LIMB_ROLES:

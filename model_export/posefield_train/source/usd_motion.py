@@ -215,7 +215,6 @@ def _chosen(opened: SkelStage, options: ReadOptions) -> tuple[SkelMotion, list[s
 
 
 def _animations(opened: SkelStage, animations: list[Any], requested: str | None) -> list[Any]:
-    """Return the animation with a path, name or number from 1, or all."""
     if requested is None:
         return animations
     paths = [str(prim.GetPath()) for prim in animations]
@@ -231,13 +230,11 @@ def _animations(opened: SkelStage, animations: list[Any], requested: str | None)
 
 
 def _moves(opened: SkelStage, animation: Any) -> bool:
-    """Return whether an animation has samples over time."""
     query = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
     return bool(query) and len(query.GetJointTransformTimeSamples()) > 1
 
 
 def _bound_animation(opened: SkelStage, skeleton: Any) -> Any:
-    """Return the path of the animation that a skeleton is bound to, or None."""
     query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(skeleton))
     animation = query.GetAnimQuery() if query else None
     return animation.GetPrim().GetPath() if animation else None
