@@ -11,7 +11,7 @@ from scipy.optimize import check_grad
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import Hyper, LabelKernel
 from posefield_train import training
-from posefield_train.kriging import sample_points, thinning, universal_kriging
+from posefield_train.kriging import kriging_bank, sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.kriging_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
@@ -141,7 +141,7 @@ def test_the_graph_weights_names_and_mixtures_as_the_reference_does(laid, rng):
         fields[name] = universal_kriging.solve(hyper, laid, rng.normal(size=(COUNT, size)))
     bank = KrigingBank(low, high, SETS, fields.pop("pose"), fields, 0.04)
     points = mixtures(rng, 40)
-    points[20:, 2:] = np.hstack(thinning.random_labels(rng, SETS, 20))
+    points[20:, 2:] = np.hstack(kriging_bank.random_labels(rng, SETS, 20))
     controls = 0.5 * (points[:, :2] * (high - low) + high + low)
 
     def build(net, controls, *_):

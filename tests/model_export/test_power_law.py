@@ -8,7 +8,7 @@ from running import bank_values, outputs
 from test_graph_labels import HIGH, LOW, asked, labelled_bank, mixed
 
 from posefield.kriging.kriging_model import Hyper
-from posefield_train.kriging import kriging_bank, thinning
+from posefield_train.kriging import kriging_bank
 from posefield_train.kriging.kriging_bank import PowerLaw
 from posefield_train.kriging.sample_points import SamplePoints
 
@@ -87,8 +87,8 @@ COLUMNS = (15, 5)
 
 def levelled(law):
     """A bank of performers and two coarser levels, with a power law for its duration."""
-    own = thinning.sort_samples(replace(labelled_bank(drifts=(0,)), power_law=law))
-    data = thinning.thinning_data(own)
+    own = kriging_bank.sort_samples(replace(labelled_bank(drifts=(0,)), power_law=law))
+    data = kriging_bank.thinning_data(own)
     pairs = zip(COLUMNS, RANKS[1:], strict=True)
     return replace(own, coarse=tuple(data.weights(n, rank, 0.1) for n, rank in pairs))
 

@@ -12,7 +12,7 @@ from posefield.motion import quat
 from posefield.motion.quat import CHARTS
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
-from posefield_train.kriging import thinning, universal_kriging
+from posefield_train.kriging import kriging_bank, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
 from posefield_train.onnx_graph import LevelTables
 from posefield_train.tensor import decoder_graph, hosvd
@@ -102,8 +102,8 @@ LEVELS = ((5, 4), (15, 3), (20, 3), (SAMPLES, 6))
 
 def coarse_bank():
     """A bank of coarser levels that ask some samples, and all of them."""
-    own = thinning.sort_samples(bank())
-    lesson = thinning.thinning_data(own)
+    own = kriging_bank.sort_samples(bank())
+    lesson = kriging_bank.thinning_data(own)
     weights = tuple(lesson.weights(columns, rank, 0.1) for columns, rank in LEVELS)
     return replace(own, coarse=weights)
 

@@ -20,7 +20,7 @@ from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, Leve
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_card import MAX_LISTED_VALUES
 from posefield_train.jobs import single_threaded
-from posefield_train.kriging import sample_points, thinning
+from posefield_train.kriging import kriging_bank, sample_points
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.source import clip_table
@@ -132,7 +132,7 @@ def _add_parent_errors(level: Level, finest: Level) -> Level:
 def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> LevelBuilder:
     adaptable, extended = reopened.adaptable, adapted.extended
     parents, moment = adaptable.skeleton.parents, _event_frame(reopened.card)
-    bank = thinning.sort_samples(adapted.model.bank)
+    bank = kriging_bank.sort_samples(adapted.model.bank)
     offsets = adapted.model.proportions.numpy(adapted.model.bank.sample_values("offsets"))
     points = truncation_error.positions(extended.tensor, extended.tensor.values, parents, offsets)
     pose = adapted.model.bank.pose.samples
@@ -151,7 +151,7 @@ def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> Level
         TruncationReference(extended.tensor, parents, offsets, weights, moment, points),
         exam(TEST_INPUTS),
         exam(FINALS),
-        thinning.thinning_data(bank),
+        kriging_bank.thinning_data(bank),
     )
 
 

@@ -17,9 +17,9 @@ from posefield_train.graph import truncation_cost
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.graph.truncation_cost import ParetoFront, RankTriple
-from posefield_train.kriging import thinning, universal_kriging
+from posefield_train.kriging import kriging_bank, universal_kriging
+from posefield_train.kriging.kriging_bank import ThinningData
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.thinning import ThinningData
 from posefield_train.source.recipe_sections import Detail
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.decoder import LevelSize, build_blend
@@ -112,7 +112,7 @@ def level_test_against(
 ) -> LevelTest:
     """Return a test with outputs of a model before truncation."""
     bank = model.bank
-    points, d = thinning.random_points(bank, 1.0, questions), len(bank.low)
+    points, d = kriging_bank.random_points(bank, 1.0, questions), len(bank.low)
     controls = (points[:, :d] * (bank.high - bank.low) + bank.high + bank.low) / 2.0
     labels = points[:, d:]
     rng = np.random.Generator(np.random.PCG64(len(points)))
@@ -278,7 +278,7 @@ def build_levels(trained: TrainedModel) -> tuple[FloatModel, tuple[Level, ...]]:
 
 def level_builder(trained: TrainedModel) -> LevelBuilder:
     """Return the inputs of the construction of levels for a trained model."""
-    recipe, bank = trained.recipe, thinning.sort_samples(trained.model.bank)
+    recipe, bank = trained.recipe, kriging_bank.sort_samples(trained.model.bank)
     return LevelBuilder(
         trained.full,
         replace(trained.model, bank=bank),
@@ -286,7 +286,7 @@ def level_builder(trained: TrainedModel) -> LevelBuilder:
         truncation_error.truncation_reference(recipe, trained.examples, trained.tensor),
         level_test(trained, TEST_INPUTS),
         level_test(trained, FINALS),
-        thinning.thinning_data(bank),
+        kriging_bank.thinning_data(bank),
     )
 
 

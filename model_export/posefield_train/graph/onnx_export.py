@@ -17,7 +17,7 @@ from posefield_train.graph import levels, trained_card
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import single_threaded
-from posefield_train.kriging import thinning, universal_kriging
+from posefield_train.kriging import kriging_bank, universal_kriging
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -87,7 +87,7 @@ def _draw_inputs(
     """
     low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
     points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
-    weights = thinning.random_labels(rng, model.bank.labels, BATCH)
+    weights = kriging_bank.random_labels(rng, model.bank.labels, BATCH)
     labels = np.hstack([np.zeros((BATCH, 0)), *weights])
     durations = model.durations(points, labels)
     times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
