@@ -111,7 +111,7 @@ def _missed(precisions: Sequence[float]) -> float:
     return 100.0 * (1.0 - float(np.mean(precisions)))
 
 
-def _spans(matches: Sequence[family_search.Match]) -> list[Span]:
+def _spans(matches: Sequence[motion_features.Match]) -> list[Span]:
     return [match.span for match in matches]
 
 

@@ -46,7 +46,8 @@ class Asked:
 
         def run() -> object:
             state = self.state(frames)
-            corrected = self.corrector.solve(self.corrector.predict(state), [next(target)])
+            predicted = self.corrector.predict(state)
+            (corrected,) = self.corrector.solve_all([(predicted, [next(target)])])
             return corrected.poses(state.frames)
 
         return run

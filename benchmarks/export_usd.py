@@ -20,10 +20,10 @@ from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, record, table
 from timing import in_turn
 
-from posefield.encode import character, crate_template, layers, usd_clip, usd_library
+from posefield.encode import character, crate_template, extent, layers, usd_clip, usd_library
 from posefield.encode.character import CharacterRig
+from posefield.encode.conventions import METRES
 from posefield.encode.crate_template import LayerBuilder, LayerContent
-from posefield.encode.formats import METRES
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -118,8 +118,13 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
     )
     milliseconds = {name: 1e3 * seconds / CLIPS for name, seconds in timings.items()}
     warned = milliseconds["warned"] / milliseconds["whole"]
+    clip = answers[0].clip
+    low, high = extent.pose_independent_box(
+        clip.skeleton, clip.translations[0], clip.root_path
+    ).tolist()
     entries = [
-        usd_library.library_entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)
+        usd_library.LibraryEntry(f"clip {i}", f"clips/{i}.usdc", len(clip), clip.rate, low, high)
+        for i in range(100)
     ]
     some = list(itertools.islice(itertools.cycle(entries), ENTRIES))
     stage = in_turn({"stage": lambda: _stage(answers[0], some)}, rounds=1, repeats=1)["stage"]

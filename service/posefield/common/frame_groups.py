@@ -45,8 +45,8 @@ class FrameGroups:
 
     def split(self, values: Annotated[Numbers, "frames ..."]) -> list[Numbers]:
         """Return the part of values (N, ...) of each motion."""
-        ends = self.starts + self.counts
-        return [values[a:b] for a, b in zip(self.starts.tolist(), ends.tolist(), strict=True)]
+        stops = self.starts + self.counts
+        return [values[a:b] for a, b in zip(self.starts.tolist(), stops.tolist(), strict=True)]
 
     def sums(self, values: Annotated[Floats, "frames ..."]) -> Annotated[Floats, "motions ..."]:
         """Return the sums (M, ...) over the frames of each motion, none of which is empty."""

@@ -68,8 +68,8 @@ def folder_source(path: Path) -> list[ModelFile]:
     """Return the model files in a folder, and in its folders with versions of one model each."""
     patterns = ("", "*/", "*/*/")
     paths = [file for deep in patterns for file in sorted(path.glob(f"{deep}*{MODEL_SUFFIX}"))]
-    named = [(file, parse_model_path(file.relative_to(path).as_posix())) for file in paths]
-    files = [_model_file(file, *name) for file, name in named if name]
+    names = [(file, parse_model_path(file.relative_to(path).as_posix())) for file in paths]
+    files = [_model_file(file, *name) for file, name in names if name]
     if not files:
         raise ModelError(path, f"no {MODEL_SUFFIX} file in this folder")
     return files
