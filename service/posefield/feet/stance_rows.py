@@ -264,7 +264,6 @@ def _swing_frames(swings: Runs, feet: FootRows) -> Mask:
 
 
 def _walks(swings: Runs, feet: FootRows) -> Annotated[Booleans, "runs"]:
-    """Return whether the motion walks during each whole swing."""
     run, frames = swings.frames()
     walking = feet.walking[feet.rows.flat(swings.rows[run], frames)]
     return FrameGroups(swings.lengths).every(walking)

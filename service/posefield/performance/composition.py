@@ -80,7 +80,6 @@ def perform(script: Script, frame_limit: int) -> PerformanceAnswer:
 
 
 def _held_joints(timeline: Timeline, clip: Clip) -> tuple[HeldJoint, ...]:
-    """Return the targets within a performance."""
     joints = []
     for target in timeline.targets:
         begin, end = ((frame - timeline.begin) / RATE for frame in (target.begin, target.end))

@@ -342,7 +342,6 @@ def _envelope(count: int, ramp: float) -> Frames:
 
 
 def _limb(body: HeldBody, name: str | None) -> Limb | None:
-    """Return the limb that ends at a joint; None for no joint."""
     if name is None:
         return None
     if name not in body.names:

@@ -1,7 +1,7 @@
 """Feet at joins, and facts about joins: how far poses are apart, and how fast they change.
 
 No blend keeps the place of a foot that stands on both sides of a cut, at two places. So contacts
-are changed around the cut, and `feet.footsteps` plans the feet over the whole performance. A join
+are changed around the cut, and `feet.body_plans` plans the feet over the whole performance. A join
 is judged once, when its feet are placed: before that its peak is not known.
 """
 
@@ -239,7 +239,6 @@ def add_steps(
 
 
 def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames feet 3"]:
-    """Return the paths of the joints that contact."""
     tips = [leg.tip for leg in character.legs]
     poses = limbs.evaluate_joints(
         character.parents, character.bones, tips, passage.rotations, passage.roots
@@ -287,6 +286,5 @@ def _swing(contacts: Annotated[Floats, "frames feet"], step: JoinStep) -> None:
 
 
 def _left(contacts: Sequence[float] | Floats) -> int:
-    """Return the number of frames until a foot stands."""
     standing = np.asarray(contacts) > STANDING
     return int(np.argmax(standing)) if standing.any() else len(standing)

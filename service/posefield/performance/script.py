@@ -273,7 +273,6 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
 
 
 def _model(index: int, segment: Segment, find: Callable[[str], Synthesizer]) -> Synthesizer | None:
-    """Return the model of a segment; None for a hold."""
     if isinstance(segment, Hold):
         return None
     with errors_under("segments", index):

@@ -231,7 +231,6 @@ def _standing_leg(
 
 
 def _below(parents: tuple[int, ...], leg: Limb) -> Indices:
-    """Return the joints of a leg."""
     return np.flatnonzero(skeleton.descendant_matrix(parents)[leg.upper])
 
 

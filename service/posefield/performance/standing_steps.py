@@ -99,14 +99,12 @@ def add_standing_ends(
 
 
 def _part(passage: Passage, rows: slice) -> Passage:
-    """Return some frames of a passage, which may be in the other order."""
     return Passage(
         passage.rotations[rows], passage.roots[rows], passage.contacts[rows], passage.sigmas[rows]
     )
 
 
 def _replaced(passage: Passage, rows: slice, step: Passage) -> Passage:
-    """Return a passage with the frames of a step."""
     rotations, roots, contacts = (
         passage.rotations.copy(),
         passage.roots.copy(),

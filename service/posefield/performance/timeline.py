@@ -111,7 +111,6 @@ class Timeline:
         self.exits = range(self.begin, self.begin + 1)
 
     def _usual(self, passage: Passage) -> float:
-        """Return the usual largest acceleration of the next segment, m/s²."""
         if self.captured:
             return self.captured[len(self.spans)]
         return join_quality.usual_acceleration(self.character.body, [passage])

@@ -291,7 +291,6 @@ def _path(
 
 
 def _around(request: WalkRequest, begin: FloorMotion, radii: Radii) -> FloorPath:
-    """Return a path around the obstacles; InvalidField if none is found."""
     goal = _destination(request)
     for share in DETOUR_SHARES:
         clearance = share * radii.larger
@@ -308,7 +307,6 @@ def _around(request: WalkRequest, begin: FloorMotion, radii: Radii) -> FloorPath
 
 
 def _destination(request: WalkRequest) -> Destination:
-    """Return where a walk leads."""
     if request.to is None:
         end = request.end or FloorMotion()
         return Destination("end", end.shift, end.turn)
