@@ -12,7 +12,7 @@ import posefield
 from posefield.common.errors import InvalidField
 from posefield.http import request
 from posefield.http.access import access_control
-from posefield.http.api import contract, settings
+from posefield.http.api import settings
 from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
 
@@ -61,43 +61,6 @@ def test_kubernetes_knows_every_field(kind, objects):
     assert_valid(objects[kind])
 
 
-def test_all_of_them_mean_the_same_pods(objects, pod):
-    labels, spec = pod["metadata"]["labels"], objects["Deployment"]["spec"]
-    spread = [each["labelSelector"] for each in pod["spec"]["topologySpreadConstraints"]]
-    chosen = [
-        spec["selector"]["matchLabels"],
-        objects["Service"]["spec"]["selector"],
-        objects["PodDisruptionBudget"]["spec"]["selector"]["matchLabels"],
-        objects["NetworkPolicy"]["spec"]["podSelector"]["matchLabels"],
-        *(each["matchLabels"] for each in spread),
-    ]
-    assert all(each == chosen[0] for each in chosen)
-    assert labels.items() >= chosen[0].items()
-    # A new version has to be within the selector of the old one.
-    assert "app.kubernetes.io/version" not in chosen[0]
-    export = yaml.safe_load((DEPLOY / "export-job.yaml").read_text())
-    assert not export["spec"]["template"]["metadata"]["labels"].items() >= chosen[0].items()
-
-
-def test_they_name_each_other(objects, pod):
-    target = objects["HorizontalPodAutoscaler"]["spec"]["scaleTargetRef"]
-    own = objects["Deployment"]
-    assert target == {
-        "apiVersion": own["apiVersion"],
-        "kind": own["kind"],
-        "name": own["metadata"]["name"],
-    }
-    assert pod["spec"]["serviceAccountName"] == objects["ServiceAccount"]["metadata"]["name"]
-    # Else every rollout would undo what the autoscaler has done.
-    assert "replicas" not in own["spec"]
-
-
-def test_one_may_go_while_the_rest_answer(objects):
-    least = objects["HorizontalPodAutoscaler"]["spec"]["minReplicas"]
-    assert least > objects["PodDisruptionBudget"]["spec"]["maxUnavailable"] == 1
-    assert objects["Deployment"]["spec"]["strategy"]["rollingUpdate"]["maxUnavailable"] == 0
-
-
 def test_the_port_is_one(objects, container):
     (port,) = container["ports"]
     assert str(port["containerPort"]) == environment(container)["POSEFIELD_PORT"]
@@ -108,16 +71,6 @@ def test_the_port_is_one(objects, container):
     (rule,) = objects["NetworkPolicy"]["spec"]["ingress"]
     named = [*(probe["port"] for probe in probes), service_port["targetPort"]]
     assert {*named, *(each["port"] for each in rule["ports"])} == {port["name"]}
-
-
-def test_probes_ask_what_the_contract_has(container):
-    paths = {o.path for o in contract.load_contract().operations if o.method == "GET"}
-    asked = {
-        name: container[f"{name}Probe"]["httpGet"]["path"] for name in ("liveness", "readiness")
-    }
-    assert asked == {"liveness": "/livez", "readiness": "/readyz"}
-    assert container["startupProbe"]["httpGet"]["path"] == "/readyz"
-    assert set(asked.values()) <= paths
 
 
 def test_variables_are_settings(container):
@@ -166,13 +119,6 @@ def test_pods_may_use_the_names_of_the_service(host, objects, container):
         limits.check(scope | {"headers": [(b"host", b"evil.example")]})
 
 
-def test_what_is_counted_can_be_read(pod, container):
-    told = pod["metadata"]["annotations"]
-    assert told["prometheus.io/port"] == environment(container)["POSEFIELD_PORT"]
-    (operation,) = (o for o in contract.load_contract().operations if o.id == "getMetrics")
-    assert told["prometheus.io/path"] == operation.path
-
-
 def test_a_pod_may_do_little(pod, container):
     user = re.search(r"^USER (\d+):(\d+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
     context, own = pod["spec"]["securityContext"], container["securityContext"]
@@ -186,14 +132,6 @@ def test_a_pod_may_do_little(pod, container):
     assert container["args"] == ["/models"]
     volumes = {volume["name"] for volume in pod["spec"]["volumes"]}
     assert {each["name"] for each in container["volumeMounts"]} == volumes
-
-
-def test_nobody_is_let_in_or_out_unasked(objects):
-    policy = objects["NetworkPolicy"]["spec"]
-    assert policy["policyTypes"] == ["Ingress", "Egress"]
-    assert policy["egress"] == []
-    # An empty selector, or none, would be everybody.
-    assert all(all(peer.values()) for rule in policy["ingress"] for peer in rule["from"])
 
 
 def test_the_image_is_of_this_version(pod, container):
