@@ -113,13 +113,11 @@ def _write_report(
 ) -> None:
     # matplotlib takes a second to import, and only the report needs it.
     from posefield_train.report import levels_of_detail, training_report
-    from posefield_train.report.training_report import TrainingStep
 
     progress("measuring levels of detail")
     levels = levels_of_detail.time_levels(exported)
     progress("drawing the report")
-    steps = [TrainingStep(name, seconds) for name, seconds in progress.finished]
-    rendered = training_report.render(trained, exported, levels, steps)
+    rendered = training_report.render(trained, exported, levels, progress.finished)
     atomic_files.write(rendered.html, path)
     atomic_files.write(rendered.json, path.with_suffix(".json"))
 

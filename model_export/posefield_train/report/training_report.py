@@ -62,12 +62,8 @@ TERMS_SECTION = Section(
 )
 
 
-@dataclass(frozen=True)
-class TrainingStep:
-    """A step of the training and its duration, s."""
-
-    name: str
-    seconds: float
+TrainingStep = tuple[str, float]
+"""Name of a step of the training and its duration, s."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +94,7 @@ def render(
         tensor.warp_section(trained),
         provenance_section(exported, steps),
     )
-    key_values = key_figures(exported, sum(step.seconds for step in steps))
+    key_values = key_figures(exported, sum(seconds for _, seconds in steps))
     page = Page(
         "training report", card.name, card.description, key_values, [*sections, TERMS_SECTION]
     )
@@ -130,7 +126,7 @@ def provenance_section(exported: ExportedModel, steps: Sequence[TrainingStep]) -
         "durations_s": card.durations,
         "provenance": dict(source),
         "diagnostics": dict(card.diagnostics),
-        "steps": [{"step": step.name, "seconds": step.seconds} for step in steps],
+        "steps": [{"step": name, "seconds": seconds} for name, seconds in steps],
     }
     versions = ", ".join(f"{name} {version}" for name, version in source["versions"].items())
     sources = (
@@ -141,8 +137,8 @@ def provenance_section(exported: ExportedModel, steps: Sequence[TrainingStep]) -
         ("versions", versions),
     )
     notes = tuple((note,) for note in card.diagnostics["notes"] or ["none"])
-    total = ("total", f"{sum(step.seconds for step in steps):.2f}")
-    times = (*((step.name, f"{step.seconds:.2f}") for step in steps), total)
+    total = ("total", f"{sum(seconds for _, seconds in steps):.2f}")
+    times = (*((name, f"{seconds:.2f}") for name, seconds in steps), total)
     tables = (
         Table("Sources", ("entry", "value"), sources),
         Table("Notes on the data", ("note",), notes),

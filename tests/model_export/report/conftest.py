@@ -8,9 +8,7 @@ import pytest
 @pytest.fixture(scope="session")
 def steps():
     """Training steps with their times."""
-    from posefield_train.report.training_report import TrainingStep
-
-    return (TrainingStep("reading <recipe>", 0.25), TrainingStep("fitting the fields", 1.5))
+    return ("reading <recipe>", 0.25), ("fitting the fields", 1.5)
 
 
 @pytest.fixture(scope="session")

@@ -36,7 +36,7 @@ def test_the_numbers_are_those_of_the_card(facts, exported, trained, steps):
     about, card = facts["about"], exported.card
     assert about["provenance"] == card.provenance and about["diagnostics"] == card.diagnostics
     assert about["bytes"] == len(exported.content)
-    assert about["steps"] == [{"step": s.name, "seconds": s.seconds} for s in steps]
+    assert about["steps"] == [{"step": name, "seconds": seconds} for name, seconds in steps]
     assert facts["sizes"]["chosen"]["ranks"] == list(card.levels[0].ranks)
     explained = {name: own["explained"] for name, own in facts["fields"].items()}
     assert explained == pytest.approx(trained.explained, rel=DIGITS)
