@@ -138,10 +138,6 @@ class ConstraintSolver:
             self._correctors[level] = gauss_newton.build_corrector(self._session, level)
         return self._correctors[level]
 
-    def measured(self, question: ValidatedQuestion, motion: ConstrainedMotion) -> dict[str, float]:
-        """Return the measured controls of a motion."""
-        return self.corrector(question.level).measured(motion)
-
     def poses(
         self, requests: Sequence[tuple[ValidatedQuestion, ConstrainedMotion, Frames, Trust]]
     ) -> list[PoseAnswer[np.float64]]:

@@ -83,19 +83,6 @@ class JointChain:
         return vectors, turned, positions
 
 
-def chain_to(
-    joint: int, parents: tuple[int, ...], bones: Bones, reduced: ReducedTensor
-) -> JointChain:
-    """Return the chain that ends with a joint; bones (J, 3), m."""
-    chain = [joint]
-    while chain[0]:
-        chain.insert(0, parents[chain[0]])
-    numbers = [0, 1, 2, *(3 + 3 * link + axis for link in chain for axis in range(3))]
-    mean, directions = reduced.mean[numbers], reduced.directions[:, numbers]
-    turns, chart = quat.to_matrix(reduced.rotations[chain]), CHARTS[reduced.chart]
-    return JointChain(bones[chain], turns, mean, directions, chart)
-
-
 CYCLE_VARIABLES = 4
 """Variables of a cycle in addition to the reduced motion: logarithm of the duration; travel to the
 left and ahead, m; change of heading, rad.
@@ -124,7 +111,17 @@ class MotionVariables:
     def chain(self, joint: int) -> JointChain:
         """Return the chain from the root to a joint, cached."""
         if joint not in self._chains:
-            self._chains[joint] = chain_to(joint, self.parents, self.bones, self.reduced)
+            links = [joint]
+            while links[0]:
+                links.insert(0, self.parents[links[0]])
+            numbers = [0, 1, 2, *(3 + 3 * link + axis for link in links for axis in range(3))]
+            self._chains[joint] = JointChain(
+                self.bones[links],
+                quat.to_matrix(self.reduced.rotations[links]),
+                self.reduced.mean[numbers],
+                self.reduced.directions[:, numbers],
+                CHARTS[self.reduced.chart],
+            )
         return self._chains[joint]
 
     @property

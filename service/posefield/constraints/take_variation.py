@@ -21,7 +21,7 @@ from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import reduced_motion
 from posefield.inference.session import Session
 from posefield.kriging import kriging_model, random_field
-from posefield.kriging.random_field import ConditionalField
+from posefield.kriging.random_field import ConditionalField, Seeds
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
 from posefield.question.motion_question import MotionQuestion
@@ -76,7 +76,7 @@ class TakeVariation:
         self._eventful_times = eventful_times
         self._field_cached = lru_cache(FIELD_CACHE)(self._field)
         self._deviations_cached = ValueCache[_SeedPoint, Values](DEVIATION_CACHE)
-        self._detail_cached = lru_cache(DETAIL_CACHE)(self._detail)
+        self._detail_cached = lru_cache(DETAIL_CACHE)(self.details)
 
     def vary(
         self,
@@ -131,23 +131,27 @@ class TakeVariation:
         They are uncorrelated, each with the variance of sigma: `change_coefficients` correlates
         them. labels (N, p) and seeds (N,): one of each path; zero for seeds of zero.
         """
-        modes = self._session.card.levels[0].ranks[2]
-        return self._deviations_along(controls, labels, seeds)[..., :modes]
+        limited = np.asarray(self._session.bounds.limit(controls), np.float64)
+        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        names = np.broadcast_to(labels[:, None], (*points.shape[:2], labels.shape[1]))
+        points = np.concatenate([points, names], axis=-1)
+        values = np.zeros((*points.shape[:2], self._count))
+        varied = np.flatnonzero(seeds)
+        for first in range(0, len(varied), FIELDS_TOGETHER):
+            cancellation.check()
+            some = varied[first : first + FIELDS_TOGETHER]
+            fields = random_field.simulate(self._session.kriging_weights, seeds[some], self._count)
+            values[some] = self._root_of_sill * fields.evaluate(points[some])
+        return values[..., : self._session.card.levels[0].ranks[2]]
 
-    def details(
-        self, seeds: Annotated[Indices, "paths"]
-    ) -> Annotated[Floats, "paths frames freedoms"]:
-        """Return the details (N, T, r1) of seeds (N,), at the finest level."""
+    def details(self, seeds: Seeds) -> Annotated[Floats, "*seeds frames freedoms"]:
+        """Return the details (..., T, r1) of seeds (...,), at the finest level."""
         card = self._session.card
         return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seeds)
 
     def detail(self, corrector: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
         """Return the detail (T, r1) of a seed."""
         return self._detail_cached(seed)[:, : len(corrector.reduced.directions)]
-
-    def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
-        card = self._session.card
-        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seed)
 
     def deviations(
         self, controls: PointControls, labels: PointLabels, seeds: Annotated[Indices, "points"]
@@ -166,29 +170,6 @@ class TakeVariation:
         keys = [(int(seeds[row]), rows[row].tobytes()) for row in varied]
         if keys:
             values[varied] = self._deviations_cached.find_all(keys, self._deviations)
-        return values
-
-    def _deviations_along(
-        self,
-        controls: Annotated[Floats, "paths points controls"],
-        labels: Annotated[Floats, "paths labels"],
-        seeds: Annotated[Indices, "paths"],
-    ) -> Annotated[Floats, "paths points values"]:
-        """Return the deviations (N, B, m) of takes along paths of controls (N, B, d).
-
-        labels (N, p) and seeds (N,): one of each path. As `deviations`, for many points of a seed.
-        """
-        limited = np.asarray(self._session.bounds.limit(controls), np.float64)
-        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
-        names = np.broadcast_to(labels[:, None], (*points.shape[:2], labels.shape[1]))
-        points = np.concatenate([points, names], axis=-1)
-        values = np.zeros((*points.shape[:2], self._count))
-        varied = np.flatnonzero(seeds)
-        for first in range(0, len(varied), FIELDS_TOGETHER):
-            cancellation.check()
-            some = varied[first : first + FIELDS_TOGETHER]
-            fields = random_field.simulate(self._session.kriging_weights, seeds[some], self._count)
-            values[some] = self._root_of_sill * fields.evaluate(points[some])
         return values
 
     def _deviations(self, seed_points: Sequence[_SeedPoint]) -> list[Values]:

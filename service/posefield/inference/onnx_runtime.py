@@ -6,7 +6,6 @@ program's calls, never of a request.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Protocol
 
 import numpy as np
@@ -56,14 +55,6 @@ class Graph(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class _Part:
-    """An onnxruntime session and the inputs that it has."""
-
-    session: Any
-    inputs: tuple[str, ...]
-
-
 class GraphParts:
     """Sessions on parts of one file's graph.
 
@@ -73,7 +64,7 @@ class GraphParts:
     def __init__(self, content: bytes, source: str) -> None:
         """Take a checked file; source: its name in errors."""
         self._content, self._source = content, source
-        self._parts: dict[tuple[tuple[str, ...], int], _Part] = {}
+        self._parts: dict[tuple[tuple[str, ...], int], tuple[Any, tuple[str, ...]]] = {}
 
     def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
         """Return values as `Graph.run` does."""
@@ -81,16 +72,17 @@ class GraphParts:
         graph_part = self._parts.get(key)
         if graph_part is None:
             graph_part = self._parts[key] = self._open(*key)
-        inputs = {name: feed[name] for name in graph_part.inputs if name in feed}
-        outputs: list[Any] = graph_part.session.run(key[0], inputs)
+        session, names = graph_part
+        outputs: list[Any] = session.run(key[0], {n: feed[n] for n in names if n in feed})
         return outputs
 
-    def _open(self, values: tuple[str, ...], level: int) -> _Part:
+    def _open(self, values: tuple[str, ...], level: int) -> tuple[Any, tuple[str, ...]]:
+        """Return an onnxruntime session and the inputs that it has."""
         content = onnx_file.select_outputs(onnx_file.fix_level(self._content, level), *values)
         session = open_session(content, self._source)
         # Inputs with a default are not among the others.
         ports = [*session.get_inputs(), *session.get_overridable_initializers()]
-        return _Part(session, tuple(port.name for port in ports))
+        return session, tuple(port.name for port in ports)
 
 
 TRIED_CLIPS, TRIED_TIMES = 16, 5

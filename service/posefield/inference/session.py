@@ -15,7 +15,7 @@ from posefield.inference.onnx_runtime import CONTACTS, LABELS, Graph, GraphParts
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
-from posefield.model_file import answer_bounds, checked_file
+from posefield.model_file import checked_file
 from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import ROW_VALUES, ModelCard, shape_rows
 
@@ -137,7 +137,7 @@ class Session:
     @cached_property
     def bounds(self) -> AnswerBounds:
         """Bounds of the answers outside the sampled ranges."""
-        return answer_bounds.of_card(self.card)
+        return AnswerBounds(*self.card.sampled_ranges, self.card.durations)
 
     def _run_unbounded(
         self,

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from posefield.common.units import Booleans, Floats, Singles
-from posefield.model_file.model_card import Control, ModelCard
+from posefield.model_file.model_card import Control
 
 MARGIN = 0.25
 """Margin of controls, as a share of the sampled range, and of durations, as a share of the captured
@@ -86,11 +86,6 @@ class AnswerBounds:
         shortest, longest = np.array(self.duration_limits, durations.dtype)
         low, high = np.minimum(shortest, nearest), np.maximum(longest, nearest)
         return np.clip(durations, low, high)
-
-
-def of_card(card: ModelCard) -> AnswerBounds:
-    """Return the bounds of a model's answers."""
-    return AnswerBounds(*card.sampled_ranges, card.durations)
 
 
 def limit_control(control: Control, value: float) -> float:

@@ -13,11 +13,9 @@ from msgspec import structs
 
 from posefield.common import cancellation
 from posefield.common.errors import QueryError
-from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.targets import NO_CONSTRAINTS
-from posefield.inference.onnx_runtime import CURVES
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import Strides
 from posefield.motion.clip import assemble
@@ -135,7 +133,7 @@ def _predict(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
         timed = _attempt(group, set_times, durations)
         for batch in _batches(timed):
             cancellation.check()
-            rows = predict_frames(
+            rows = poses.predict_frames(
                 model, [draft.validated for draft in batch], [draft.times for draft in batch]
             )
             for draft, row in zip(batch, rows, strict=True):
@@ -148,11 +146,13 @@ def _set_prediction(model: Synthesizer, draft: ClipDraft, row: OutputRow) -> Non
     trust = model.trust(draft.question, question, float(length), float(sigma))
     if model.measures:
         motion = model.solver.solve(question, NO_CONSTRAINTS)
-        trust = structs.replace(trust, measured=model.solver.measured(question, motion))
+        trust = structs.replace(
+            trust, measured=model.solver.corrector(question.level).measured(motion)
+        )
     draft.answer = PoseAnswer(draft.times, rotations, root, offsets, trust, *curves)
     _set_strides(model, draft, trust.duration)
     if draft.stands:
-        (plan_row,) = predict_frames(model, [question], [draft.plan_times])
+        (plan_row,) = poses.predict_frames(model, [question], [draft.plan_times])
         draft.plan_poses = plan_row[0].astype(np.float64), plan_row[1].astype(np.float64)
 
 
@@ -260,33 +260,6 @@ def _durations(model: Synthesizer, questions: Sequence[ValidatedQuestion]) -> li
     return seconds
 
 
-def predict_frames(
-    model: Synthesizer, questions: Sequence[ValidatedQuestion], times: Sequence[Floats]
-) -> list[OutputRow]:
-    """Return the graph's outputs for clips of one level at the times of each (F,), in one call."""
-    padded = np.empty((len(times), max(map(len, times))))
-    for row, frames in zip(padded, times, strict=True):
-        row[: len(frames)], row[len(frames) :] = frames, frames[-1]
-    names = poses.pose_outputs(model.session.card)
-    outputs = model.session.run(
-        np.concatenate([question.point for question in questions]),
-        padded,
-        *names,
-        labels=np.concatenate([question.labels for question in questions]),
-        level=questions[0].level,
-    )
-    return [
-        tuple(
-            output[row, : len(frames)] if name in _PER_FRAME else output[row]
-            for name, output in zip(names, outputs, strict=True)
-        )
-        for row, frames in enumerate(times)
-    ]
-
-
-_PER_FRAME = ("rotations", "root_position", CURVES)
-
-
 def is_exact(model: Synthesizer, level: int) -> bool:
     """Return whether clips that share a call get the bytes that they get alone.
 
@@ -300,11 +273,11 @@ def is_exact(model: Synthesizer, level: int) -> bool:
             sample.append(model.question(question))
         times = [np.linspace(0.0, card.durations[0], 2 + row) for row in range(len(sample))]
         alone = [_durations(model, [question])[0] for question in sample]
-        rows = predict_frames(model, sample, times)
+        rows = poses.predict_frames(model, sample, times)
         model.exact_clip_levels[level] = alone == _durations(model, sample) and all(
             np.array_equal(a, b)
             for question, frames, row in zip(sample, times, rows, strict=True)
-            for a, b in zip(predict_frames(model, [question], [frames])[0], row, strict=True)
+            for a, b in zip(poses.predict_frames(model, [question], [frames])[0], row, strict=True)
         )
     return model.exact_clip_levels[level]
 

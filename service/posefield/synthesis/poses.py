@@ -32,6 +32,8 @@ def pose_outputs(card: ModelCard) -> tuple[str, ...]:
     return (*POSE_OUTPUTS, CURVES) if card.curves else POSE_OUTPUTS
 
 
+_PER_FRAME = ("rotations", "root_position", CURVES)
+
 SAMPLE_SIZE = 17
 """Number of questions that show whether a row depends on its batch: odd, and more than a kernel's
 rows.
@@ -110,18 +112,44 @@ def run_batch(model: Synthesizer, batch: Sequence[PreparedPoseQuestion]) -> list
     One call of the graph. Where `is_batch_exact` is true, a question's bytes do not depend on the
     others in the call.
     """
-    first = batch[0].validated
-    if len(batch) == 1 and len(batch[0].when) == 1:
+    questions = [prepared.validated for prepared in batch]
+    times = [prepared.graph_times for prepared in batch]
+    if len(batch) == 1 and len(times[0]) == 1:
         # A matrix product with one row sums in another order, so a single question is duplicated.
-        arrays = (first.point, first.labels, batch[0].graph_times[None])
-        points, labels, when = (array.repeat(2, axis=0) for array in arrays)
-    else:
-        points = np.concatenate([prepared.validated.point for prepared in batch])
-        labels = np.concatenate([prepared.validated.labels for prepared in batch])
-        when = np.array([prepared.graph_times for prepared in batch])
+        return predict_frames(model, questions * 2, times * 2)[:1]
+    return predict_frames(model, questions, times)
+
+
+def predict_frames(
+    model: Synthesizer, questions: Sequence[ValidatedQuestion], times: Sequence[Floats]
+) -> list[OutputRow]:
+    """Return the graph's outputs for questions of one level at the times of each (F,), s.
+
+    One call of the graph, in which shorter questions are padded.
+    """
+    longest = max(map(len, times))
+    padded = [
+        frames if len(frames) == longest else np.pad(frames, (0, longest - len(frames)), "edge")
+        for frames in times
+    ]
     names = pose_outputs(model.session.card)
-    answers = model.session.run(points, when, *names, labels=labels, level=first.level)
-    return [tuple(answer[row] for answer in answers) for row in range(len(batch))]
+    outputs = model.session.run(
+        np.concatenate([question.point for question in questions]),
+        np.array(padded),
+        *names,
+        labels=np.concatenate([question.labels for question in questions]),
+        level=questions[0].level,
+    )
+    rows = [tuple(output[row] for output in outputs) for row in range(len(times))]
+    return [
+        row
+        if len(frames) == longest
+        else tuple(
+            values[: len(frames)] if name in _PER_FRAME else values
+            for name, values in zip(names, row, strict=True)
+        )
+        for row, frames in zip(rows, times, strict=True)
+    ]
 
 
 def build_answer(

@@ -155,7 +155,7 @@ class Synthesizer(NamedModel):
         self, question: MotionQuestion, validated: ValidatedQuestion, motion: ConstrainedMotion
     ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
-        measured = self.solver.measured(validated, motion)
+        measured = self.solver.corrector(validated.level).measured(motion)
         controls, reached = split_results(motion.results, len(question.targets))
         deviations = self._deviations(validated, measured, controls)
         validated = replace(validated, deviations=deviations)

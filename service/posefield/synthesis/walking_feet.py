@@ -51,10 +51,6 @@ class WalkerTakes:
     variety: float
     detail: bool
 
-    def facts(self) -> dict[str, Any]:
-        """Return the facts about the takes, as plain values."""
-        return {"seed": self.take, "variety": self.variety, "detail": self.detail}
-
 
 @dataclass(frozen=True)
 class _Deviations:
@@ -156,7 +152,9 @@ def _relative_poses(
     strides = stride.strides(model.session, plan.controls[pair], labels, level)
     corrector = model.solver.corrector(level)
     rows = np.searchsorted(deviations.chosen, pair[0])
-    posed = [np.empty((len(phases), *shape)) for shape in _shapes(model.session.card)]
+    card = model.session.card
+    shapes = ((len(card.skeleton), 4), (3,), (len(card.curves),))
+    posed = [np.empty((len(phases), *shape)) for shape in shapes]
     for batch in stride.batches(len(phases)):
         cancellation.check()
         times = (phases[batch] * strides.durations[batch])[:, None]
@@ -180,11 +178,6 @@ def _relative_poses(
     rotations, roots, values = posed
     relative = stride.relative_poses(strides, phases, rotations, roots)
     return replace(relative, curves=values) if values.shape[1] else relative
-
-
-def _shapes(card: ModelCard) -> list[tuple[int, ...]]:
-    """Return the shapes of rotations, root position and curves of one pose."""
-    return [(len(card.skeleton), 4), (3,), (len(card.curves),)]
 
 
 def _poses(
@@ -220,7 +213,11 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     crowd = walking_crowd.build_crowd(model, gait, order, make)
     facts: dict[str, Any] = {"feet_stand": standing}
     if takes is not None:
-        facts["take"] = takes.facts()
+        facts["take"] = {
+            "seed": takes.take,
+            "variety": takes.variety,
+            "detail": takes.detail,
+        }
     if order.detail and not model.session.card.making.detail:
         facts["warnings"] = [NO_DETAIL]
     return replace(crowd, facts={**crowd.facts, **facts})
