@@ -19,7 +19,7 @@ from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import UNEVEN, Interval
 from posefield.motion import quat
 from posefield.question.results import StanceResult
-from posefield.retarget.role_map import SIDES, Body, PosedBody, moved, posed
+from posefield.retarget.role_map import SIDES, Body, PosedBody
 
 FADE = 0.1
 """Time over which a correction settles before the first stance and after the last, s."""
@@ -69,25 +69,18 @@ class SourceFeet:
         return floors - self.heights
 
 
-def contact_roles(source: Body, rig: Body) -> tuple[str, str]:
-    """Return the roles of the joints that stand: toes where both bodies have them, or feet."""
+def feet_of(
+    motion: PosedBody, rig: Body, rate: float, stance_results: Sequence[StanceResult] | None
+) -> SourceFeet:
+    """Return the feet of a motion in proportion to a rig: toes where both have them, or ankles.
+
+    rate: frames a second. stance_results: stances of the feet; None to detect them.
+    """
+    source = motion.body
     both = {side + "Toes" for side in SIDES} <= source.joints.keys() & rig.joints.keys()
     left, right = (side + ("Toes" if both else "Foot") for side in SIDES)
-    return left, right
-
-
-def feet_of(
-    paths: Annotated[Floats, "frames feet 3"],
-    rate: float,
-    roles: tuple[str, str],
-    names: tuple[str, str],
-    stance_results: Sequence[StanceResult] | None,
-) -> SourceFeet:
-    """Return the feet of a motion.
-
-    paths: of the joints that contact, in proportion to the rig. names: of these joints.
-    stance_results: their stances; None to detect them.
-    """
+    joints = [source.joints[left], source.joints[right]]
+    names, paths = [source.names[joint] for joint in joints], motion.positions[:, joints]
     rows = frame_groups.FrameRows(
         frame_groups.of_lengths([paths, paths]), np.full(2, rate), np.zeros(2, bool)
     )
@@ -107,7 +100,7 @@ def feet_of(
         stance_rows.statistics(index, foot @ UP, rate, down).height
         for index, (foot, down) in enumerate(zip(feet, standing, strict=True))
     ]
-    return SourceFeet(roles, paths, tuple(runs.by_row(2)), np.array(heights))
+    return SourceFeet((left, right), paths, tuple(runs.by_row(2)), np.array(heights))
 
 
 def _stances(
@@ -227,9 +220,7 @@ def plant(
     heights, _ = soles
     copied = _at(rig, feet.roles)
     target_heights = feet.paths @ UP + heights - feet.heights
-    rig = moved(
-        rig, _pelvis_height(target_heights - copied @ UP, feet.standing, rate)[:, None] * UP
-    )
+    rig = rig.moved(_pelvis_height(target_heights - copied @ UP, feet.standing, rate)[:, None] * UP)
     copied = _at(rig, feet.roles)
     paths = plan_paths(feet, copied, heights, rate)
     depths = sole_depths(rig, soles, feet.floors, paths, paths - copied)
@@ -255,7 +246,7 @@ def plant(
     shift = -lowered[:, None] * UP
     for (leg, poses), target in zip(legs, targets, strict=True):
         turn_limb(rotations, leg, poses, shift, target)
-    planted = posed(rig.body, rotations, rig.roots + shift)
+    planted = PosedBody.of_rotations(rig.body, rotations, rig.roots + shift)
     still = np.zeros(paths.shape)
     depths = sole_depths(planted, soles, feet.floors, _at(planted, feet.roles), still)
     return planted, rig, depths, lowered

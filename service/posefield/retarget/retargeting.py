@@ -150,7 +150,7 @@ def meet_goals(rig: PosedBody, goals: Sequence[HandGoal], rate: float) -> PosedB
             shift += _shares(times - goal_times, goal, goals_of_role)[:, None] * offset
         limb, poses = rig.limb(roles)
         planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + shift)
-    return role_map.posed(rig.body, rotations, rig.roots)
+    return PosedBody.of_rotations(rig.body, rotations, rig.roots)
 
 
 def _at(path: RootPath, frames: Annotated[Floats, "places"]) -> Annotated[Floats, "places 3"]:
@@ -221,11 +221,11 @@ def retarget(
     motion = copied_pose.with_upright_rest(motion)
     scale = body.leg_length / source.leg_length
     motion = _scaled(motion, scale, scale if travel == "scaled" else 1.0)
-    feet = _feet(motion, body, clip, stances)
+    feet = planted_legs.feet_of(motion, body, clip.rate, stances)
     soles, higher, heights_and_heels = _ground(motion, body, feet, scale)
     rotations = copied_pose.copy_orientations(motion.body, body, motion.orientations, soles)
-    still = role_map.posed(body, rotations, np.zeros((len(rotations), 3)))
-    copied = role_map.moved(still, _hips(motion) + higher * UP - _hips(still))
+    still = PosedBody.of_rotations(body, rotations, np.zeros((len(rotations), 3)))
+    copied = still.moved(_hips(motion) + higher * UP - _hips(still))
     # A character of the same bones has the motion as it is.
     bones = motion.body.leg_bones, body.leg_bones
     limited = len(bones[0]) != len(bones[1]) or not np.allclose(*bones, rtol=0.0, atol=SAME_BONE)
@@ -274,17 +274,6 @@ def _hips(rig: PosedBody) -> RootPath:
     """Return the path (F, 3), m, of the middle between both hips."""
     left, right = (rig.of_role(side + "UpperLeg") for side in SIDES)
     return 0.5 * (left + right)
-
-
-def _feet(
-    motion: PosedBody, body: Body, clip: Clip, stances: Sequence[StanceResult] | None
-) -> SourceFeet:
-    """Return the feet of a motion in the rig's proportion."""
-    roles = planted_legs.contact_roles(motion.body, body)
-    left, right = (motion.body.joints[role] for role in roles)
-    names = clip.skeleton.names[left], clip.skeleton.names[right]
-    paths = motion.positions[:, [left, right]]
-    return planted_legs.feet_of(paths, clip.rate, roles, names, stances)
 
 
 def _ground(

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -155,6 +155,18 @@ class PosedBody:
     positions: Annotated[Floats, "frames joints 3"]
     orientations: Annotated[Floats, "frames joints 4"]
 
+    @classmethod
+    def of_rotations(cls, body: Body, rotations: Rotations, roots: RootPath) -> Self:
+        """Return poses with the positions and orientations of their joints."""
+        translations = skeleton.translations(body.bones, roots)
+        world = skeleton.forward_kinematics(body.parents, rotations, translations)
+        return cls(body, rotations, roots, *world)
+
+    def moved(self, shift: RootPath) -> Self:
+        """Return poses whose root is moved by (F, 3), m."""
+        positions = self.positions + shift[:, None]
+        return replace(self, roots=self.roots + shift, positions=positions)
+
     def of_role(self, role: str) -> RootPath:
         """Return the positions (F, 3), m, of the joint of a role."""
         return self.positions[:, self.body.joints[role]]
@@ -171,19 +183,3 @@ class PosedBody:
         return limb, LimbPoses(
             joints, parents, bones, limb_positions, self.orientations[:, list(joints)]
         )
-
-
-def posed(body: Body, rotations: Rotations, roots: RootPath) -> PosedBody:
-    """Return poses with the positions and orientations of their joints."""
-    translations = skeleton.translations(body.bones, roots)
-    return PosedBody(
-        body,
-        rotations,
-        roots,
-        *skeleton.forward_kinematics(body.parents, rotations, translations),
-    )
-
-
-def moved(rig: PosedBody, shift: RootPath) -> PosedBody:
-    """Return poses whose root is moved by (F, 3), m."""
-    return replace(rig, roots=rig.roots + shift, positions=rig.positions + shift[:, None])
