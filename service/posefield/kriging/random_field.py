@@ -158,20 +158,20 @@ class ConditionalField:
     """Random deviations (m) from a kriging prediction: one smooth function of the point.
 
     Their mean over seeds is zero and their variance is the kriging variance, in sills. errors (n,
-    m): values of the field at the samples with their nuggets. own (m,): nugget of the new
+    m): values of the field at the samples with their nuggets. nugget (m,): that of the new
     observation, equal at all points. Fields of many seeds have axes of the seeds before.
     """
 
     field: RandomField
     weights: KrigingWeights
     errors: Annotated[Floats, "*seeds samples values"]
-    own: Annotated[Floats, "*seeds values"]
+    nugget: Annotated[Floats, "*seeds values"]
 
     def evaluate(self, points: SeedPoints) -> SeedValues:
         """Return the deviations (..., B, m) at points (..., B, d + p)."""
         weights = self.weights.weights(points.reshape(-1, points.shape[-1]))
         kriged = weights.reshape(*points.shape[:-1], -1) @ self.errors
-        values = self.field.evaluate(points) - kriged + self.own[..., None, :]
+        values = self.field.evaluate(points) - kriged + self.nugget[..., None, :]
         return np.asarray(np.round(values, VALUE_DECIMALS))
 
     def evaluate_each(
@@ -184,7 +184,7 @@ class ConditionalField:
         """
         rows = points[:, None]
         kriged = self.weights.weights(rows) @ self.errors
-        values = self.field.evaluate(rows) - kriged + self.own
+        values = self.field.evaluate(rows) - kriged + self.nugget
         return np.asarray(np.round(values[:, 0], VALUE_DECIMALS))
 
 

@@ -45,16 +45,16 @@ def typical_row(points: Annotated[Floats, "clips values"], costs: PerClip) -> in
 class Neighbourhood:
     """Surroundings of captured clips in the space of open values.
 
-    places (n, k): of the clips. sets: columns in which a point has to be near a clip, each with the
+    points (n, k): of the clips. sets: columns in which a point has to be near a clip, each with the
     radius of that.
     """
 
-    places: Annotated[Floats, "clips values"]
+    points: Annotated[Floats, "clips values"]
     sets: tuple[tuple[Indices, float], ...]
 
     def contains(self, point: Values) -> bool:
         """Return whether a point (k,) is near a captured clip, jointly and in each value."""
-        differences = self.places - point
+        differences = self.points - point
         return all(
             np.linalg.norm(differences[:, columns], axis=1).min() <= radius
             for columns, radius in self.sets
@@ -73,7 +73,7 @@ class Neighbourhood:
 
 
 def neighbourhood(points: Annotated[Floats, "clips values"]) -> Neighbourhood:
-    """Return the surroundings of captured clips at places (n, k)."""
+    """Return the surroundings of captured clips at points (n, k)."""
     width = points.shape[1]
     columns = [np.arange(width), *(np.array([i]) for i in range(width if width > 1 else 0))]
     return Neighbourhood(points, tuple((column, _radius(points[:, column])) for column in columns))
