@@ -13,7 +13,7 @@ from asking import asker
 from cryptography.hazmat.primitives.asymmetric import rsa
 
 from posefield.common.errors import FileError, InvalidField
-from posefield.http.access import access_control
+from posefield.http.access import api_keys
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
@@ -29,14 +29,12 @@ SCOPES = {
 
 @pytest.fixture(scope="module")
 def issued():
-    return {name: access_control.generate_key() for name in SCOPES}
+    return {name: api_keys.generate_key() for name in SCOPES}
 
 
 @pytest.fixture(scope="module")
 def lines(issued):
-    return "\n".join(
-        access_control.key_line(name, SCOPES[name], key) for name, key in issued.items()
-    )
+    return "\n".join(api_keys.key_line(name, SCOPES[name], key) for name, key in issued.items())
 
 
 @pytest.fixture(scope="module")
@@ -232,4 +230,4 @@ def test_the_command_makes_a_key_whose_line_lets_it_in(loaded, tmp_path):
     assert names(answer) == ["walk"]
     told = subprocess.run([*command, "--json"], capture_output=True, text=True, check=True)
     made = json.loads(told.stdout)
-    assert access_control.parse_keys(made["line"], "KEYS").find(made["key"]).name == "blender"
+    assert api_keys.parse_keys(made["line"], "KEYS").find(made["key"]).name == "blender"

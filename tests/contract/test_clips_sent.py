@@ -15,7 +15,6 @@ from test_server import address, process
 from posefield.batch.clip_files import SENT_CLIPS
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.http import archive_operations
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 
@@ -25,15 +24,15 @@ MANY = 1000
 
 def counting(most=MANY):
     """An encoder of usdc that counts what it has made, and fails beyond so many."""
-    made = []
+    made, usdc = [], CLIP_ENCODERS["usdc"]
 
     def write(answers, convention):
         made.extend(answers)
         if len(made) > most:
             raise RuntimeError("out of everything")
-        return CLIP_ENCODERS["usdc"].write(answers, convention)
+        return usdc.write(answers, convention)
 
-    return dataclasses.replace(CLIP_ENCODERS["usdc"], write=write), made
+    return dataclasses.replace(usdc, write=write), made
 
 
 @pytest.fixture
@@ -41,7 +40,7 @@ def served(loaded, monkeypatch):
     """The application with one encoder in place of the others for many clips."""
 
     def serve(encoder):
-        monkeypatch.setattr(archive_operations, "CLIP_ENCODERS", {"usdc": encoder})
+        monkeypatch.setitem(CLIP_ENCODERS, "usdc", encoder)
         return create_app(loaded, Settings())
 
     return serve

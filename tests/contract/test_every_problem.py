@@ -7,7 +7,7 @@ import httpx
 import pytest
 from asking import Answer, asker
 
-from posefield.http.access import access_control
+from posefield.http.access import api_keys
 from posefield.http.api import contract, problems
 from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.api.settings import Settings
@@ -30,14 +30,12 @@ def answered(response):
     return Answer(response.status_code, dict(response.headers), response.content)
 
 
-KEY = access_control.generate_key()
+KEY = api_keys.generate_key()
 
 
 def with_key(**headers):
     """Provoke at a service with one key, which may not read metrics."""
-    closed = create_app(
-        ModelRegistry({}), Settings(keys=access_control.key_line("one", ["read:*"], KEY))
-    )
+    closed = create_app(ModelRegistry({}), Settings(keys=api_keys.key_line("one", ["read:*"], KEY)))
     return lambda app: answered(asker(closed)("GET", "/metrics", headers=headers))
 
 

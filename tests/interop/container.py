@@ -20,7 +20,7 @@ from image import Image
 from posefield import __version__
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.http import static_page
-from posefield.http.access import access_control
+from posefield.http.access import api_keys
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -108,7 +108,7 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
     models, temporary = _places(folder)
     model, content = trained.family()
     (models / "reaching.onnx").write_bytes(content)
-    port, key = str(running.ports(1)[0]), access_control.generate_key()
+    port, key = str(running.ports(1)[0]), api_keys.generate_key()
     told = {"POSEFIELD_PORT": port}
     health = built.config["Healthcheck"]["Test"][1:]
     command = [*built.config["Entrypoint"], *built.config["Cmd"]]
@@ -116,7 +116,7 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
         yield "healthy before it was started"
     if "POSEFIELD_KEYS" not in (said := _run(built, command, folder, **told)[1]):
         yield f"without keys it says {said!r}"
-    told["POSEFIELD_KEYS"] = access_control.key_line("somebody", ["read:*"], key)
+    told["POSEFIELD_KEYS"] = api_keys.key_line("somebody", ["read:*"], key)
     began = time.monotonic()
     with built.start(command, models, temporary, **told) as jail:
         line = jail.stdout.readline().decode() if jail.stdout else ""

@@ -11,7 +11,7 @@ import yaml
 import posefield
 from posefield.common.errors import InvalidField
 from posefield.http import request
-from posefield.http.access import access_control
+from posefield.http.access import access_control, api_keys
 from posefield.http.api import settings
 from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
@@ -89,9 +89,7 @@ def test_a_pod_that_goes_has_the_time_it_needs(pod, container):
 def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path):
     """As the service itself checks them before it listens; the address is the image's."""
     mounted = tmp_path / "keys"
-    mounted.write_text(
-        access_control.key_line("blender", ["read:*"], access_control.generate_key()) + "\n"
-    )
+    mounted.write_text(api_keys.key_line("blender", ["read:*"], api_keys.generate_key()) + "\n")
     given = environment(container) | {"POSEFIELD_HOST": "0.0.0.0"}
     assert given["POSEFIELD_KEYS_FILE"] == "/keys/keys"
     given["POSEFIELD_KEYS_FILE"] = str(mounted)

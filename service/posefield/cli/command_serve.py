@@ -72,11 +72,11 @@ def key(
     Prints the line for POSEFIELD_KEYS_FILE on standard output and the key on standard error. The
     key is not stored.
     """
-    from posefield.http.access import access_control
+    from posefield.http.access import api_keys
 
     scopes = [f"read:{one}" for one in model or ["*"]] + ["metrics"] * metrics
-    secret = access_control.generate_key()
-    line = access_control.key_line(name, scopes, secret)
+    secret = api_keys.generate_key()
+    line = api_keys.key_line(name, scopes, secret)
     if json:
         typer.echo(as_json({"key": secret, "line": line}))
         return

@@ -23,7 +23,8 @@ from starlette.types import Message, Receive, Scope, Send
 from posefield.characters.user_character import EMPTY, CharacterFolder
 from posefield.common.errors import InvalidField
 from posefield.http import metrics, responses
-from posefield.http.access.access_control import AccessPolicy, Principal
+from posefield.http.access.access_control import AccessPolicy
+from posefield.http.access.api_keys import Principal
 from posefield.http.api.problems import (
     BAD_BODY,
     BODY_TOO_LARGE,

@@ -20,7 +20,8 @@ from starlette.types import Receive, Scope, Send
 from posefield.common.errors import QueryError, UnknownFormat, did_you_mean
 from posefield.http import metrics, negotiation, responses, telemetry
 from posefield.http.access import access_control
-from posefield.http.access.access_control import EVERYONE, AuditedRequest
+from posefield.http.access.access_control import AuditedRequest
+from posefield.http.access.api_keys import EVERYONE
 from posefield.http.api import problems
 from posefield.http.api.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestError
 from posefield.http.request import Service, ServiceRequest

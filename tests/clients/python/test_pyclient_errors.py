@@ -11,7 +11,7 @@ from posefield_client.errors import Problem, Unexpected
 from posefield_client.generated import CONTRACT
 from scripted import Pause, answer, chunked
 
-from posefield.http.access import access_control
+from posefield.http.access import api_keys
 from posefield.http.api import problems
 from posefield.http.api.problems import PROBLEM_KINDS
 
@@ -106,8 +106,8 @@ def test_the_service_itself_is_understood(ask, kind, address, controls):
 
 @pytest.mark.system
 def test_a_service_that_wants_keys(models):
-    key, other = access_control.generate_key(), access_control.generate_key()
-    told = access_control.key_line("one", ["read:walk"], key)
+    key, other = api_keys.generate_key(), api_keys.generate_key()
+    told = api_keys.key_line("one", ["read:walk"], key)
     with serving.process(models, POSEFIELD_KEYS=told) as child:
         place = serving.address(child)
         assert type(raised(place)) is errors.Unauthenticated

@@ -19,8 +19,8 @@ import jwt
 import msgspec
 
 from posefield.common.errors import FileError
-from posefield.http.access import access_control
-from posefield.http.access.access_control import InvalidCredentials, Principal
+from posefield.http.access import api_keys
+from posefield.http.access.api_keys import InvalidCredentials, Principal
 from posefield.http.api.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -149,7 +149,7 @@ class TokenVerifier:
         except _TOKEN_ERRORS as fault:
             reason = _REASONS.get(type(fault), "not a token that can be verified")
             raise InvalidCredentials(reason) from None
-        return access_control.from_scopes(name, _scopes(claims.get(self.settings.jwt_scopes)))
+        return api_keys.from_scopes(name, _scopes(claims.get(self.settings.jwt_scopes)))
 
     def _claims(self, token: str) -> Mapping[str, Any]:
         key = self.keys.find(jwt.get_unverified_header(token).get("kid"))

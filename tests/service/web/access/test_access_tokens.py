@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posefield.common.errors import FileError
-from posefield.http.access.access_control import InvalidCredentials
+from posefield.http.access.api_keys import InvalidCredentials
 from posefield.http.access.bearer_tokens import LATEST_TIME, KeySet, TokenVerifier
 from posefield.http.api.settings import Settings
 
