@@ -68,30 +68,6 @@ def test_kubernetes_knows_every_field(manifest):
     assert_valid(manifest)
 
 
-def test_pods_share_the_parts(manifest):
-    spec = manifest["spec"]
-    assert spec["completionMode"] == "Indexed"
-    assert f"--shard=$(JOB_COMPLETION_INDEX)/{spec['completions']}" in container(manifest)["args"]
-    assert spec["parallelism"] <= spec["completions"]
-    # What the API server asks for beyond the schema.
-    assert spec["template"]["spec"]["restartPolicy"] == "Never"
-    assert spec["backoffLimitPerIndex"] > 0
-    (rule, _) = spec["podFailurePolicy"]["rules"]
-    assert rule["onExitCodes"]["containerName"] == container(manifest)["name"]
-
-
-def test_a_pod_may_do_little(manifest):
-    pod, own = manifest["spec"]["template"]["spec"], container(manifest)["securityContext"]
-    assert pod["securityContext"]["runAsNonRoot"] and pod["securityContext"]["runAsUser"] == 10001
-    assert pod["automountServiceAccountToken"] is False
-    assert own["readOnlyRootFilesystem"] and not own["allowPrivilegeEscalation"]
-    assert own["capabilities"] == {"drop": ["ALL"]}
-    mounts = {one["mountPath"]: one.get("readOnly", False) for one in own_mounts(manifest)}
-    assert mounts == {"/input": True, "/tmp": False}
-    volumes = {volume["name"] for volume in pod["volumes"]}
-    assert {one["name"] for one in own_mounts(manifest)} == volumes
-
-
 def own_mounts(manifest):
     return container(manifest)["volumeMounts"]
 
@@ -133,19 +109,6 @@ def test_tasks_of_an_array_make_the_whole(model_path, queries, whole, tmp_path):
         assert done.returncode == 0, done.stderr
         assert ("manifest.jsonl" in content(made)) == (task == PARTS - 1)
     assert content(made) == whole
-
-
-@pytest.mark.system
-def test_a_task_alone_is_told_how_many_there_were(model_path, queries, tmp_path):
-    told = {"SLURM_ARRAY_TASK_ID": "1", "SLURM_ARRAY_TASK_MAX": "1", "PARTS": str(PARTS)}
-    done = slurm(model_path, queries, tmp_path / "made", "--chunk", CHUNK, **told)
-    assert done.returncode == 0, done.stderr
-    assert "clips of this part: 9, all finished; other parts are not" in done.stdout
-
-
-def test_an_array_needs_to_know_what_to_export():
-    done = slurm("model.onnx", SLURM_ARRAY_TASK_ID="0", SLURM_ARRAY_TASK_MAX="0")
-    assert (done.returncode, done.stderr.split()[0]) == (2, "usage:")
 
 
 def test_shellcheck_finds_nothing():

@@ -154,7 +154,7 @@ class Character:
 
 @dataclass(frozen=True)
 class Footsteps:
-    """Where and when one foot stands.
+    """Places and frames at which one foot stands.
 
     stances: frames. anchors: places (S, 3), m, in the coordinates of each stance's first frame.
     """

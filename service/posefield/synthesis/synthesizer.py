@@ -81,7 +81,7 @@ class Synthesizer(NamedModel):
 
     @cached_property
     def measures(self) -> bool:
-        """Whether a control is measured on the motion."""
+        """True if a control is measured on the motion."""
         return any(control.measure for control in self.session.card.controls)
 
     def constraints(

@@ -3,7 +3,6 @@
 The oracle is usd-core, which reads what the encoders wrote.
 """
 
-import io
 import json
 from itertools import pairwise
 
@@ -182,20 +181,3 @@ def test_the_stage_complies(stage):
     context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     assert [each.GetName() for each in context.Validate(stage)] == []
     assert stage.GetDefaultPrim().GetPath() == Sdf.Path("/Character")
-
-
-@pytest.mark.parametrize("name", ["usda", "usdc"])
-def test_the_metadata_of_usd_is_the_report(answer, name, tmp_path):
-    path = tmp_path / f"performance.{name}"
-    path.write_bytes(encoded(answer, name, "whole"))
-    found = plain(Sdf.Layer.FindOrOpen(str(path)).customLayerData["posefield"])
-    report = json.loads(json.dumps(answer.trust.document()))
-    assert without_empty(found) == without_empty(report)
-    assert report["joins"] and report["feet"]["stances"] and report["warnings"]
-
-
-def test_archives_and_json_have_the_report(answer):
-    report = json.loads(json.dumps(answer.trust.document()))
-    with np.load(io.BytesIO(encoded(answer, "npz", "whole"))) as found:
-        assert json.loads(str(found["trust"])) == report
-    assert json.loads(encoded(answer, "json", "whole"))["trust"] == report
