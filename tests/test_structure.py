@@ -12,14 +12,21 @@ ROOT = Path(__file__).parents[1]
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 
 BUDGETS = {
-    "service/posefield": 44_050,
-    "model_export/posefield_train": 25_950,
+    "service/posefield": 42_600,
+    "model_export/posefield_train": 25_620,
     "clients/python": 2_110,
     "clients/blender": 1_280,
     "clients/viewer/src": 8_190,
     "clients/typescript/src": 1_350,
 }
 """Most lines of each part, without generated ones: who needs more takes lines away elsewhere."""
+VAGUE = set(
+    "own found made said given asked told laid moved judge held missed every each apart seen "
+    "wanted least most known named place places others whom who kept taken part parts shown drawn "
+    "written usual beside ends whole begun way ahead bench rung shop".split()
+)
+MOST_VAGUE = 0.004
+"""Share of the bindings of what ships whose names say nothing of the thing."""
 GENERATED = {"generated.py", "client.py", "schema.ts"}
 MOST_TESTS = 0.755
 """Lines of Python under tests for each line that ships."""
@@ -116,3 +123,22 @@ def test_parts_keep_their_budgets_of_lines():
     assert {name: count for name, count in counts.items() if count > BUDGETS[name]} == {}
     shipped = sum(counts[distribution] for distribution in DISTRIBUTIONS)
     assert 0.5 < lines("tests") / shipped <= MOST_TESTS
+
+
+def bindings(file):
+    """Names that a module binds: variables, fields and parameters."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+        elif isinstance(node, ast.arg):
+            yield node.arg
+
+
+def test_values_are_named_by_the_thing():
+    files = [file for distribution in DISTRIBUTIONS for file in (ROOT / distribution).rglob("*.py")]
+    names = {file: [name for name in bindings(file) if name != "self"] for file in files}
+    vague = {str(file): VAGUE & {*names[file]} for file in files if VAGUE & {*names[file]}}
+    total = sum(map(len, names.values()))
+    count = sum(name in VAGUE for listed in names.values() for name in listed)
+    assert total > 20_000
+    assert 0 < count <= MOST_VAGUE * total, vague

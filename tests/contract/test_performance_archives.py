@@ -81,23 +81,6 @@ def test_a_script_at_fault_is_named(ask, scripts, status):
     assert_refused(answer, status, f"/scripts/1{pointer}", words[0] if words else "")
 
 
-WRONG = {
-    "no such layout": (asked("glb", [FIRST], layout="segments"), 422, "/layout"),
-    "a path for a name": (asked("usdc", [{**FIRST, "name": "../up"}]), 400, "/scripts/0/name"),
-    "a name twice": (
-        asked("usdc", [{**FIRST, "name": "Performance-000001"}, FIRST]),
-        422,
-        "/scripts/1/name",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_a_body_that_is_none_is_refused(name, ask):
-    body, status, pointer = WRONG[name]
-    assert_refused(ask("POST", f"{BATCH}.tar", json=body), status, pointer)
-
-
 def test_counts_are_limited_before_any_work(loaded):
     limits = Settings(performances_limit=3, performances_segments=4, clips_body_limit=2000)
     small = asker(create_app(loaded, limits))

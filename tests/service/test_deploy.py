@@ -68,10 +68,6 @@ def test_kubernetes_knows_every_field(manifest):
     assert_valid(manifest)
 
 
-def own_mounts(manifest):
-    return container(manifest)["volumeMounts"]
-
-
 def test_what_the_pods_run_makes_the_whole(manifest, model_path, queries, whole, tmp_path):
     """Their very arguments, the index put in as the kubelet does, the places those of here."""
     own = container(manifest)

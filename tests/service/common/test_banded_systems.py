@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefield.common import banded_systems
+from posefield.feet import smooth_change
 
 
 def system(rng, size):
@@ -22,7 +22,7 @@ def solve(bands, goal, known=None, values=None):
     known = np.zeros(len(goal), bool) if known is None else known
     values = np.zeros(len(goal)) if values is None else values
     sides = (goal[None, :, None], known[:, None], values[None, :, None])
-    return banded_systems.solve(bands[:, :, None], *sides)[0, :, 0]
+    return smooth_change.solve(bands[:, :, None], *sides)[0, :, 0]
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 8, 17, 64, 301])
@@ -31,7 +31,7 @@ def test_the_solution_is_that_of_the_dense_system(rng, size):
     goal = rng.normal(size=size)
     found = solve(bands, goal)
     assert found == pytest.approx(np.linalg.solve(matrix, goal), rel=1e-8, abs=1e-9)
-    product = banded_systems.product(bands[:, :, None], found[None, :, None])
+    product = smooth_change.product(bands[:, :, None], found[None, :, None])
     assert product[0, :, 0] == pytest.approx(goal, abs=1e-8)
     wrong = bands.copy()
     wrong[0] *= 1.001
@@ -60,7 +60,7 @@ def test_systems_have_the_same_bytes_alone_and_beside_larger_ones(rng):
         bands[:, :size, place], goal[:, :size, place] = own, right
         known[:size, place] = False
         sides = (right[:, :, None], np.zeros((size, 1), bool), np.zeros((2, size, 1)))
-        alone.append(banded_systems.solve(own[:, :, None], *sides)[:, :, 0])
-    found = banded_systems.solve(bands, goal, known, nothing)
+        alone.append(smooth_change.solve(own[:, :, None], *sides)[:, :, 0])
+    found = smooth_change.solve(bands, goal, known, nothing)
     for place, (size, own) in enumerate(zip(sizes, alone, strict=True)):
         assert np.array_equal(found[:, :size, place], own)
