@@ -99,8 +99,8 @@ PYTHONS = {path.parent.name[-4:]: path for path in wheels.ROOT.glob(".venv-3.*/b
 @pytest.mark.parametrize("version", ["3.11", "3.12", "3.13"])
 def test_a_newcomers_pages_run_under_each_python(version, dist, shipped_address, folder, tmp_path):
     """With the packages that these pages name, and no extra."""
-    if version not in PYTHONS:
-        pytest.skip(f"no environment of .ci/pythons with Python {version}")
+    if version not in PYTHONS or version == "{}.{}".format(*sys.version_info):
+        pytest.skip(f"tried above, or no environment of .ci/pythons with Python {version}")
     packages = ("posefield[train]", "posefield-client")
     programs = wheels.install(dist, tmp_path, PYTHONS[version] / "python", *packages)
     for page in ("README.md", "docs/quickstart.md"):

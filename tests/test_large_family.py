@@ -53,7 +53,7 @@ def test_a_large_family_is_trained_served_explained_and_adapted(posefield, folde
     assert code == 0
     weights = [clip["weight"] for clip in json.loads(out)["nearest"]]
     assert sum(weights) == pytest.approx(1.0, abs=1e-6)
-    bank = model_reconstruction.load(path).known.model.bank
+    bank = model_reconstruction.load(path).adaptable.model.bank
     points = bank.points(np.array([[0.9, 20.0, 1.2]]), np.zeros((1, 3)))
     expected = bank.pose.weights(points) @ bank.pose.values
     assert np.abs(bank.pose.predict(points) - expected).max() < 1e-6

@@ -52,7 +52,7 @@ def test_smallest_tensor_keeps_the_threshold_and_is_not_wasteful(over, made):
 
 
 def test_every_size_says_what_it_costs(measured, made):
-    named = {size.asked: size for size in measured.sizes}
+    named = {size.threshold: size for size in measured.sizes}
     assert set(named) == {
         *measurement.THRESHOLDS,
         *(f"the paper's {'×'.join(map(str, ranks))}" for ranks in measurement.PAPER_RANKS),

@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 import pytest
-import serving
 from posefield_client import errors
 from posefield_client.errors import Problem
 
@@ -42,19 +41,6 @@ def test_every_example_runs(address, tmp_path, monkeypatch, capsys):
     assert "bytes" in said
     assert "turn" in said
     assert "no answer" not in said
-
-
-def test_the_example_of_the_whole_projects_readme_runs(model_path, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    given = [e for e in examples(ROOT / "README.md") if "from posefield_client import" in e]
-    (example,) = given
-    assert "http://127.0.0.1:8000" in example
-    with serving.process(model_path) as child:
-        names = {}
-        told = example.replace("http://127.0.0.1:8000", serving.address(child))
-        exec(compile(told, "README.md", "exec"), names)
-        names["client"].close()
-    assert Path("reach.usdc").read_bytes().startswith(b"PXR-USDC")
 
 
 def test_the_table_says_what_is_asked_again():
