@@ -88,6 +88,16 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture(scope="session")
+def dist(tmp_path_factory) -> Path:
+    """Return a folder with the wheels and sdists of this checkout."""
+    import wheels
+
+    folder: Path = tmp_path_factory.mktemp("dist")
+    wheels.build(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
 def models_trained():
     """Return the module `fixture_models`, which imports the training packages."""
     import fixture_models

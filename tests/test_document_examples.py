@@ -42,13 +42,6 @@ def folder(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def dist(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("dist")
-    wheels.build(folder)
-    return folder
-
-
-@pytest.fixture(scope="module")
 def programs(dist, tmp_path_factory):
     """Return the folder of programs of an environment with the packages that the pages install."""
     packages = ("posefield[evaluate,parquet]", "posefield-client")

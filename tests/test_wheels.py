@@ -20,14 +20,6 @@ TABLES = ("cmu_walk/strides.csv", "hdm05_reach/returns.csv", "hdm05_kick/clips.c
 pytestmark = pytest.mark.system
 
 
-@pytest.fixture(scope="module")
-def dist(tmp_path_factory):
-    """Folder with the wheels and sdists."""
-    folder = tmp_path_factory.mktemp("dist")
-    wheels.build(folder)
-    return folder
-
-
 def run(*words, cwd, code=0):
     done = subprocess.run(
         [str(word) for word in words], cwd=cwd, capture_output=True, text=True, check=False
