@@ -89,9 +89,9 @@ def typescript_text(text: str) -> Iterator[tuple[int, str]]:
 def comment_openings(text: str) -> Iterator[tuple[int, str]]:
     """Yield the first word of comments that begin with a question."""
     for line, comment in typescript_text(text):
-        if opening := OPENING.match(comment.lstrip("/* ")):
-            if comment.lstrip().startswith("/"):
-                yield line, opening[0]
+        opening = OPENING.match(comment.lstrip("/* "))
+        if opening and comment.startswith("/"):
+            yield line, opening[0]
 
 
 def openings(text: str) -> Iterator[tuple[int, str]]:

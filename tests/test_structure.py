@@ -1,6 +1,7 @@
 """Tests of the structure of both distributions: folders, their arrows, and names of modules."""
 
 import ast
+import re
 from collections import defaultdict
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
@@ -142,3 +143,31 @@ def test_values_are_named_by_the_thing():
     count = sum(name in VAGUE for listed in names.values() for name in listed)
     assert total > 20_000
     assert 0 < count <= MOST_VAGUE * total, vague
+
+
+# A description begins a sentence: `name: text`, `name (F, 3), m: text` or `one, other: text`.
+DESCRIBED = re.compile(
+    r"(?:(?<=\. )|(?<=\.\n)|(?<=\n\n))((?:[a-z_]\w*(?: \([^)]*\))?, )*[a-z_]\w*(?: \([^)]*\))?): "
+)
+
+
+def undeclared(tree):
+    """Names that docstrings of data classes describe, which are no fields or methods of theirs."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ClassDef) or node.bases:
+            continue
+        fields = {item.target.id for item in node.body if isinstance(item, ast.AnnAssign)}
+        fields |= {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+        if any("dataclass" in ast.unparse(decorator) for decorator in node.decorator_list):
+            for match in DESCRIBED.finditer(ast.get_docstring(node) or ""):
+                names = {name.strip() for name in re.sub(r"\([^)]*\)", "", match[1]).split(",")}
+                yield from (f"{node.name}: {name}" for name in names - fields)
+
+
+def test_docstrings_of_data_classes_describe_their_fields():
+    files = [file for folder in DISTRIBUTIONS for file in (ROOT / folder).rglob("*.py")]
+    assert [name for file in files for name in undeclared(ast.parse(file.read_text()))] == []
+    # Negative control: a field that was renamed.
+    text = '"""A clip.\n\n    speed: m/s. pace (F,): s."""'
+    planted = f"@dataclass\nclass Clip:\n    {text}\n    speed: float\n"
+    assert list(undeclared(ast.parse(planted))) == ["Clip: pace"]

@@ -7,29 +7,28 @@ a checksum. Results are pickles, of which only arrays and data classes of both p
 file with anything else, which could run code, is refused.
 """
 
+import hashlib
+import io
+import pickle
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from importlib.resources import files
 from itertools import chain, islice
+from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, Protocol
 
 import joblib
 from threadpoolctl import threadpool_limits
 
-if TYPE_CHECKING:
-    from distributed import Client
-import hashlib
-import io
-import pickle
-from dataclasses import is_dataclass
-from functools import cache
-from importlib.metadata import version
-from importlib.resources import files
-from pathlib import Path
-
 from posefield.common import atomic_files
 from posefield.common.errors import FileError
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 _LOCK = RLock()
 
@@ -61,7 +60,7 @@ class Jobs(Protocol):
         arguments: Iterable[Arguments],
         shared: Arguments = (),
     ) -> Iterator[Any]:
-        """Yield the results of ``function(*shared, *own)``, in the order in which jobs finish.
+        """Yield the results of ``function(*shared, *job)``, in the order in which jobs finish.
 
         arguments: of each job, read as jobs are started. shared: first arguments of all jobs, for
         large ones. The first exception of a job ends the iteration.

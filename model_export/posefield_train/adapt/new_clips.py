@@ -221,7 +221,7 @@ def _example(
 ) -> tuple[Example, list[str], float]:
     """Return the example of a row, notes on it, and the stretch of its bones, m.
 
-    whole: all frames of its file.
+    uncut: all frames of its file.
     """
     card = reopened.card
     cut, last = ingest.cut_frames(uncut, row)

@@ -1,8 +1,11 @@
 """Output of commands: files, the summaries that are printed, and progress on standard error."""
 
+import time
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 import typer
 
@@ -11,10 +14,6 @@ from posefield.console.output import as_json
 
 if TYPE_CHECKING:
     from posefield_train.graph.onnx_export import ExportedModel
-import time
-from itertools import pairwise
-from types import TracebackType
-from typing import Self
 
 MAX_NOTES = 12
 """Notes that a summary shows; the model file holds all of them."""

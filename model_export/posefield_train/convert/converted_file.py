@@ -44,8 +44,8 @@ class BlenderProgram:
 def find(program: Path | None) -> BlenderProgram:
     """Return the given Blender, or that of the PATH.
 
-    given: the program, or a Python that has the module bpy. Raises FileError if it is neither, or
-    older than LEAST_VERSION.
+    program: Blender itself, or a Python that has the module bpy. Raises FileError if it is neither,
+    or older than LEAST_VERSION.
     """
     command_path = shutil.which("blender") if program is None else str(program)
     if command_path is None:

@@ -28,7 +28,7 @@ class Ends:
 def match_ends(distances: Floats) -> Ends:
     """Return the best match that ends at each frame of the corpus.
 
-    apart (L, F): distances of the query's frames from the corpus's; inf between two recordings.
+    distances (L, F): of the query's frames from the corpus's; inf between two recordings.
     """
     length, frames = distances.shape
     starts = np.arange(frames)
@@ -61,9 +61,9 @@ def _take_better(
 def align(distances: Floats) -> Indices:
     """Return for each frame of the query (L,) the frame of a clip (F,) that is most like it.
 
-    apart (L, F): distances. The first frames are alike, and the last ones; steps are those of a
-    match. A frame of the query that a step leaves out shares the frame after. Raises ValueError
-    for a clip that lasts less than half as long as the query, or more than twice.
+    distances (L, F): of their frames. The first frames are alike, and the last ones; steps are
+    those of a match. A frame of the query that a step leaves out shares the frame after. Raises
+    ValueError for a clip that lasts less than half as long as the query, or more than twice.
     """
     length, frames = distances.shape
     costs = np.full((length, frames), np.inf)

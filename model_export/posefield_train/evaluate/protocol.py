@@ -326,7 +326,7 @@ def merge(
 def in_order(results: Sequence[Any], values: Callable[[Any], Sequence[Any]]) -> list[Any]:
     """Return a value of each clip in the order of the clips; empty where some have none.
 
-    parts: each with `clips`, indices of which `values` are.
+    results: each with `clips`, the indices of its values.
     """
     order = np.argsort([clip for result in results for clip in result.clips])
     listed = [value for result in results for value in values(result)]

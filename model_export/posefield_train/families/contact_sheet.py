@@ -140,7 +140,7 @@ def render(
 
 
 def _shown(one: OfferedFamily, recordings: Mapping[str, Recording]) -> dict[str, Any]:
-    """Return a family as the page names its facts. headings: of best and worst clips."""
+    """Return a family as the page names its facts."""
     rows = one.family.rows
     best, worst = rows[:BEST], rows[max(BEST, len(rows) - WORST) :]
     example = one.family.example or rows[0]
@@ -156,7 +156,7 @@ def _shown(one: OfferedFamily, recordings: Mapping[str, Recording]) -> dict[str,
 
 
 def _clip(number: int, row: FamilyRow, recordings: Mapping[str, Recording]) -> dict[str, Any]:
-    """Return a clip of the page. key: as posefield review --drop names it."""
+    """Return a clip of the page, whose key is that of `posefield review --drop`."""
     recording = recordings[row.file]
     start, end = row.first_frame / recording.rate, row.last_frame / recording.rate
     return {

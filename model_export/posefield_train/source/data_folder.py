@@ -222,7 +222,7 @@ def recipe_file(argument: Path, data: Path | None) -> Path:
 def find_table(folder: Path, name: str, recipe_folder: Path | None = None) -> FileLocation:
     """Return the table of clips in a data folder, else beside the recipe, else the shipped one.
 
-    beside: folder of the recipe. Raises RecipeError, as `data_folder.find`, if none exists.
+    recipe_folder: folder of the recipe. Raises RecipeError, as `data_folder.find`, if none exists.
     """
     try:
         return find(folder, name)

@@ -75,8 +75,8 @@ def ingest(
 ) -> tuple[list[Example], list[str]]:
     """Return the examples of a recipe, and notes on assumptions and corrections.
 
-    known: files that were read before, which are not read again. Raises RecipeError for an invalid
-    row, MotionFileError for a file that cannot be read.
+    files_read: files that were read before, which are not read again. Raises RecipeError for an
+    invalid row, MotionFileError for a file that cannot be read.
     """
     notes = list[str]()
     rows = clip_table.read(recipe, folder, notes)

@@ -272,7 +272,7 @@ def perform_at_level(
 ) -> tuple[PerformanceAnswer, int]:
     """Return a performance and its level: the coarsest that the view allows.
 
-    view: None for the level of the script. most: largest number of frames. Raises QueryError as
+    view: None for the level of the script. frames: the largest number. Raises QueryError as
     `composition.perform`, and for a script that has a level beside a view or a character around the
     camera.
     """

@@ -64,7 +64,7 @@ class RunOutcome:
     """Result of a run.
 
     rows: of the shard. done: how many of them are finished. facts: of the whole export if it is
-    complete. before: true if it was complete when this run began.
+    complete. already_complete: true if it was when this run began.
     """
 
     rows: int

@@ -38,7 +38,8 @@ OPEN_COST = 4
 class JointTarget:
     """Target position of a joint.
 
-    moment: rule that determines the moment. place: (3,), m. time: s, None for a moment without one.
+    moment: rule that determines the moment. position: (3,), m. time: s, None for a moment without
+    one.
     """
 
     name: str

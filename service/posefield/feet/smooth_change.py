@@ -50,7 +50,7 @@ def solve(
 ) -> Sides:
     """Return the solutions (C, U, R) of positive definite systems.
 
-    known: unknowns whose values (C, U, R) are given; their equations are left out.
+    fixed: unknowns whose values (C, U, R) are given; their equations are left out.
     """
     fixed_values = np.where(fixed, values, 0.0)
     right = np.where(fixed, fixed_values, goal - product(bands, fixed_values))
@@ -263,7 +263,7 @@ def _known(
 
 @dataclass(frozen=True)
 class _System:
-    """Systems of the unknowns of paths. turned: the cycle of each, its turn left out for heights.
+    """Systems of the unknowns of paths.
 
     bands: (3, U, R). goal: (C, U, R): the columns are real and imaginary parts.
     """

@@ -36,7 +36,7 @@ OUT_OF_MEMORY = ("bad_alloc", "Failed to allocate memory")
 class TrialLimits:
     """Limits on opening one file.
 
-    cpu: CPU time, s. wall: wall time, s. memory: bytes beyond those of the process. tried: digests
+    cpu: CPU time, s. wall: wall time, s. memory: bytes beyond those of the process. passed: digests
     of files that have passed already. A model of 110 kB takes 0.02 s and 10 MB.
     """
 

@@ -32,7 +32,7 @@ class Field(NamedTuple):
     """One field of a message.
 
     number: field number. kind: wire type. value: the number of a varint, else 0. content: the bytes
-    of any other field. whole: the bytes of the field with key and length.
+    of any other field. encoded: the bytes of the field with key and length.
     """
 
     number: int

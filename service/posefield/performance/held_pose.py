@@ -1,4 +1,4 @@
-"""Held poses: a motion comes to rest (`come_to_rest`), and its last pose is kept (`hold_passage`).
+"""Held poses: `come_to_rest` slows a motion to a stop, and `hold_passage` keeps its last pose.
 
 The body sways a little, the head may turn to a point, and one joint, such as the hand, stays
 exactly where it is. The hold ends in the pose in which it began.
@@ -199,7 +199,7 @@ def waves(
 
 
 REST_FRAMES = 16
-"""Frames in which a motion comes to rest; they show the last half as many frames of it."""
+"""Frames of coming to rest. They show the last half as many frames of the motion, slowed down."""
 RAMP = 1.0
 """Time in which sway grows and fades, s. A shorter hold sways less."""
 LOOK_RAMP = 0.5

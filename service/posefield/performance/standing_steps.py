@@ -76,7 +76,7 @@ def add_standing_ends(
 ) -> Passage:
     """Return a walk of F frames whose first and last ones are its opening and closing steps.
 
-    places, headings, phases: (F,), of the plan of the walk.
+    origins, headings, phases: (F,), of the plan of the walk.
     """
     count = len(walked)
     if steps.opening:

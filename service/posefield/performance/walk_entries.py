@@ -36,8 +36,8 @@ def walk_passage(
 ) -> Passage:
     """Return the motion of a plan, at a level of detail; take: None for the prediction.
 
-    contacts: probabilities of the contacts of `walking_feet.foot_contacts`, in their order. Phases
-    are those of the plan, wrapped.
+    Its contacts are probabilities of `walking_feet.foot_contacts`, in their order; its phases are
+    those of the plan, wrapped.
     """
     phases = plan.phases % 1.0
     done = plan.walker.strides(plan.controls, level)
