@@ -47,12 +47,32 @@ def test_no_detail_is_stored_where_none_is_missing(stroll, models_trained):
     assert models_trained.exported("stroll").card.making.detail == b""
 
 
-def test_motions_without_cycle_have_no_statistics_of_takes(trained, models_trained):
+def test_motions_without_cycle_have_the_duration_of_repeats_alone(trained, models_trained):
     found = onnx_export.estimate(trained)
-    assert found == onnx_export.TakeStatistics()
+    assert found == onnx_export.TakeStatistics(duration=onnx_export.repeat_duration(trained))
     card = models_trained.exported("reaching").card
     assert found.on_card(card) == card
     assert "detail" not in card.diagnostics
+
+
+@pytest.mark.parametrize("apart", [0.0, 10.0])
+def test_durations_vary_as_those_of_repeats_and_not_as_those_of_other_controls(trained, apart):
+    count = len(trained.examples)
+    rng = np.random.Generator(np.random.PCG64(3))
+    logarithms = rng.normal(0.0, 0.2, count)
+    points = apart * np.arange(count)[:, None] * np.ones((1, trained.samples.points.shape[1]))
+    known = replace(
+        trained,
+        samples=replace(trained.samples, points=points),
+        aligned=replace(trained.aligned, durations=np.exp(logarithms)),
+        residuals={"duration": np.full((count, 1), 0.3)},
+    )
+    expected = 0.3 if apart else logarithms.std(ddof=1)
+    assert onnx_export.repeat_duration(known) == pytest.approx(expected, rel=0.02)
+
+
+def test_cycles_have_no_duration_of_repeats(stroll):
+    assert onnx_export.repeat_duration(stroll) == 0.0
 
 
 def test_the_card_says_what_is_sampled(smooth, models_trained):

@@ -194,7 +194,7 @@ def _card(
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
         kriging=trained_card.plain_parameters(bank.pose.hyper),
-        # The statistics of takes are in the parent's bases, which the new clips change.
+        # The root and the detail are in the parent's bases, which the new clips change.
         making=replace(
             reopened.card.making,
             fields=fields_settings,

@@ -17,7 +17,7 @@ from posefield_train.graph import levels, trained_card
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import single_threaded
-from posefield_train.kriging import kriging_bank, universal_kriging
+from posefield_train.kriging import kriging_bank, sample_points, universal_kriging
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -124,6 +124,8 @@ MAX_HARMONICS = 30
 """Harmonics of the detail. Thirty reach 97 % of a walk's acceleration."""
 DRAWS, ROUNDS = 2, 3
 """Draws of each clip and rounds of the search for the gain."""
+REPEAT_LAG = 0.1
+"""Distance of controls, root mean square in half-ranges, at which repeats count less (Gaussian)."""
 JITTER = 1e-9
 """Added to a covariance that clips of one duration or without turns make singular."""
 
@@ -150,27 +152,57 @@ class DetailFit:
 
 @dataclass(frozen=True)
 class TakeStatistics:
-    """Statistics of the takes of a model. root: `take_root`. detail: None for none."""
+    """Statistics of the takes of a model.
+
+    root: `take_root`. detail: None for none. duration: `repeat_duration`.
+    """
 
     root: tuple[tuple[float, ...], ...] = ()
     detail: DetailFit | None = None
+    duration: float = 0.0
 
     def on_card(self, card: ModelCard) -> ModelCard:
-        """Return the card with the statistics; unchanged for a motion without cycle."""
-        if not self.root:
-            return card
+        """Return the card with the statistics."""
         stored = reduced_motion.to_bytes(self.detail.deviations) if self.detail else b""
         facts = {"detail": self.detail.facts} if self.detail else {}
         return replace(
             card,
-            making=replace(card.making, take_root=self.root, detail=stored),
+            making=replace(
+                card.making, take_root=self.root, detail=stored, repeat_duration=self.duration
+            ),
             diagnostics={**card.diagnostics, **facts},
         )
 
 
 def estimate(trained: TrainedModel) -> TakeStatistics:
     """Return the statistics of a trained model."""
-    return TakeStatistics(take_root(trained), fit_detail(trained))
+    return TakeStatistics(take_root(trained), fit_detail(trained), repeat_duration(trained))
+
+
+def repeat_duration(trained: TrainedModel) -> float:
+    """Return the standard deviation of the logarithm of the duration of repeats; 0 for a cycle.
+
+    It is a semivariance at small lags (Matheron 1963): half the squared differences of clips of one
+    performer in other recordings, weighted by the likeness of their controls. The left-out
+    residuals, which also have the errors of the prediction, count as one more pair, and are its
+    upper limit.
+    """
+    if "travel" in trained.residuals:
+        return 0.0
+    clips, samples = trained.listed, trained.samples
+    recordings = sample_points.recording_numbers(trained.examples)
+    labels = np.array(samples.label_indices).reshape(-1, len(recordings))
+    first, second = (clips[side] for side in np.triu_indices(len(clips), 1))
+    repeats = (labels[:, first] == labels[:, second]).all(axis=0)
+    repeats &= recordings[first] != recordings[second]
+    first, second = first[repeats], second[repeats]
+    points, logarithms = samples.points[:, : samples.controls], np.log(trained.aligned.durations)
+    lags = np.square(points[first] - points[second]).mean(axis=1)
+    weights = np.exp(-0.5 * lags / REPEAT_LAG**2)
+    halves = 0.5 * np.square(logarithms[first] - logarithms[second])
+    largest = float(np.mean(np.square(trained.residuals["duration"])))
+    variance = (weights @ halves + largest) / (weights.sum() + 1.0)
+    return rounded(np.sqrt(min(variance, largest)))
 
 
 def take_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:

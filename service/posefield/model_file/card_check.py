@@ -23,6 +23,8 @@ MAX_LENGTH = 1e3
 HALF_BYTES = 2
 """Bytes of a number in half precision."""
 CYCLE_VARIABLES = 4
+MAX_SPREAD = 10.0
+"""Largest standard deviation of the logarithm of a duration."""
 """Rows and columns of a cycle's `beside`: logarithm of the duration, and travel."""
 MAX_SHOWN = 60
 """Largest number of characters of a value in a message."""
@@ -244,7 +246,10 @@ def _check_training_parameters(card: ModelCard) -> None:
 
 
 def _check_take_statistics(card: ModelCard) -> None:
-    """Check what takes of a cycle are drawn from; other motions, and older files, have none."""
+    """Check the statistics that takes are drawn from."""
+    spread = card.making.repeat_duration
+    right = spread <= (0.0 if card.cyclic else MAX_SPREAD)
+    _expect(right, "making.repeat_duration", spread, f"at most {MAX_SPREAD:g}, and 0 for a cycle")
     root, stored = card.making.take_root, card.making.detail
     freedoms, _, modes = card.levels[0].ranks
     _expect(len(root) in (0, len(card.beside)), "making.take_root", len(root), "0 or 4 rows")

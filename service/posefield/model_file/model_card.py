@@ -200,8 +200,10 @@ class TrainingParameters:
     facing: degrees from the root's +z in the files to the body's facing, to the left; None for
     motions without one. take_root (4, r3 + 4): of a cycle, last rows of a root of the covariance of
     the errors of the coefficients, of the duration's logarithm and of the travel, for a sigma of
-    one metre. detail: of a cycle, deviations that no control predicts (`reduced_motion`). chart: of
-    the numbers of rotations (`quat`).
+    one metre. detail: of a cycle, deviations that no control predicts (`reduced_motion`).
+    repeat_duration: standard deviation of the logarithm of the duration of repeats of one performer
+    at equal controls; 0 for cycles, and in files of earlier versions. chart: of the numbers of
+    rotations (`quat`).
     """
 
     fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)
@@ -212,6 +214,7 @@ class TrainingParameters:
     facing: Number | None = 0.0
     take_root: tuple[tuple[Number, ...], ...] = ()
     detail: bytes = b""
+    repeat_duration: NonNegative = 0.0
     chart: ChartName = "rotation_vector"
 
 

@@ -83,6 +83,11 @@ def test_another_format_is_refused_before_anything_else_is_read(found):
     assert refusal({"posefield.format": found.encode()}) == expected
 
 
+def test_a_cycle_with_the_duration_of_repeats_is_refused():
+    expected = "its card's making.repeat_duration is 0.1, expected at most 10, and 0 for a cycle"
+    assert refusal(changed(["making", "repeat_duration"], 0.1)) == expected
+
+
 def test_entries_of_other_producers_are_ignored():
     others = {"author": b"not JSON", "x.posefield.note": b"free text"}
     assert checked_file.decode_card(WRITTEN | others).name == "reaching"
