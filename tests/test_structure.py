@@ -13,8 +13,8 @@ ROOT = Path(__file__).parents[1]
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 
 BUDGETS = {
-    "service/posefield": 42_600,
-    "model_export/posefield_train": 25_620,
+    "service/posefield": 45_000,
+    "model_export/posefield_train": 26_900,
     "clients/python": 2_110,
     "clients/blender": 1_280,
     "clients/viewer/src": 8_190,

@@ -8,6 +8,7 @@ from posefield.console.registration import MAKE, register
 from posefield_train.cli import (
     command_adapt,
     command_discover,
+    command_doctor,
     command_evaluate,
     command_probe,
     command_sample,
@@ -20,6 +21,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "convert": (command_sample.convert, command_sample.CONVERT_EXAMPLES),
     "discover": (command_discover.discover, command_discover.EXAMPLES),
     "review": (command_discover.review, command_discover.REVIEW_EXAMPLES),
+    "doctor": (command_doctor.doctor, command_doctor.EXAMPLES),
     "sample": (
         command_sample.sample,
         ["sample reaching -o reaching", "sample reaching --truth -c turn=20 -o truth.bvh"],

@@ -1,0 +1,272 @@
+"""Faults of reference motions of a robot: limits, speeds, feet, seams, jumps, outliers."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from posefield.common.units import Booleans, Floats
+from posefield.motion.contact_detection import ContactThresholds, detect_contacts
+from posefield.robots.robot import Robot, velocities
+from posefield.robots.robot_motion import RobotMotion
+
+LIMIT_TOLERANCE = np.radians(0.1)
+"""Angle beyond a limit that rounding explains."""
+SUNK, FLOATING, SKATING = 0.002, 0.02, 0.05
+"""Depth of a sole below the floor, m, height of the lowest sole above it, m, and mean speed of a
+standing foot, m/s, from which each is told."""
+CONTACTS = ContactThresholds(height=0.012, grown_height=0.02)
+"""Thresholds of contacts: robots lift their feet by a few centimetres."""
+JUMP, JUMP_RATIO = np.radians(5.0), 8.0
+"""Change of an angle's step from one frame to the next that is told as a jump: so large, and so
+many times its 90th percentile in the motion."""
+SEAM_RATIO = 3.0
+"""Step from the last frame to the first over the largest of the motion at which a seam is told."""
+OUTLIER = 6.5
+"""Residual of a joint, in standard deviations, at which a motion is told as an outlier."""
+FEWEST_COMPARED, COMPONENTS, ROUNDS = 12, 8, 5
+"""Motions from which on they are compared; components at most, and rounds, of the regression."""
+LEAST_DEVIATION = np.radians(0.3)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of a motion.
+
+    kind: "limit", "sunk", "floating", "skating", "jump", "seam" or "outlier". where: joint or foot.
+    frame: in which it is worst. value: in `unit`. frames: in which it is.
+    """
+
+    kind: str
+    where: str
+    frame: int
+    value: float
+    unit: str
+    frames: int = 1
+
+    @property
+    def text(self) -> str:
+        """Return the finding as a sentence without its end."""
+        count = f", {self.frames} frames" if self.frames > 1 else ""
+        size = f"{self.value:.3g} {self.unit}"
+        return f"{self.where} {SENTENCES[self.kind]} {size} (frame {self.frame}{count})"
+
+
+SENTENCES = {
+    "limit": "is beyond its limit by",
+    "sunk": "sinks below the floor by",
+    "floating": "and all other soles are above the floor by",
+    "skating": "slides while it stands, at",
+    "jump": "jumps: its step changes by",
+    "seam": "steps from the last frame to the first by",
+    "outlier": "is unlike what the other motions lead to expect, by",
+}
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A motion's facts and faults.
+
+    speeds, accelerations: largest of each hinge, rad/s and rad/s². contacts (F, K): which of the
+    robot's feet stand; empty without a robot. heights (F, K): of their lowest points, m.
+    """
+
+    motion: RobotMotion
+    speeds: Annotated[Floats, "hinges"]
+    accelerations: Annotated[Floats, "hinges"]
+    findings: tuple[Finding, ...]
+    contacts: Annotated[Booleans, "frames feet"]
+    heights: Annotated[Floats, "frames feet"]
+
+    def facts(self) -> dict[str, Any]:
+        """Return what the command prints, as plain values."""
+        motion = self.motion
+        fastest = int(np.argmax(self.speeds))
+        return {
+            "file": motion.source,
+            "format": motion.format,
+            "frames": len(motion),
+            "rate": motion.rate,
+            "seconds": round(motion.duration, 6),
+            "joints": list(motion.hinges) or motion.angles.shape[1],
+            "loops": motion.loops,
+            "evidence": dict(motion.evidence),
+            "largest_speed": {
+                "joint": joint_name(motion, fastest),
+                "rad_s": round(float(self.speeds[fastest]), 4),
+            },
+            "largest_acceleration_rad_s2": round(float(self.accelerations.max()), 2),
+            "findings": [asdict(finding) for finding in self.findings],
+        }
+
+
+def joint_name(motion: RobotMotion, hinge: int) -> str:
+    """Return the name of a hinge, or its number from 1 where the motion has no names."""
+    return motion.hinges[hinge] if motion.hinges else f"joint {hinge + 1}"
+
+
+def diagnose(motion: RobotMotion, robot: Robot | None) -> Diagnosis:
+    """Return the facts and faults of a motion whose hinges are those of the robot, if given."""
+    steps = np.diff(motion.angles, axis=0)
+    speeds = np.abs(steps).max(axis=0) * motion.rate
+    changes = np.abs(np.diff(steps, axis=0)) if len(steps) > 1 else np.zeros((1, len(speeds)))
+    findings = [*_jumps(motion, changes), *_seam(motion, steps)]
+    contacts, heights = np.empty((len(motion), 0), bool), np.empty((len(motion), 0))
+    if robot:
+        findings = [*_beyond_limits(motion, robot), *findings]
+        if robot.feet:
+            contacts, heights, of_feet = _feet(motion, robot)
+            findings += of_feet
+    accelerations = changes.max(axis=0) * motion.rate**2
+    return Diagnosis(motion, speeds, accelerations, tuple(findings), contacts, heights)
+
+
+def _beyond_limits(motion: RobotMotion, robot: Robot) -> list[Finding]:
+    excess = np.maximum(robot.ranges[:, 0] - motion.angles, motion.angles - robot.ranges[:, 1])
+    return [
+        Finding(
+            "limit",
+            robot.hinges[hinge],
+            int(np.argmax(excess[:, hinge])),
+            float(np.degrees(excess[:, hinge].max())),
+            "degrees",
+            int((excess[:, hinge] > LIMIT_TOLERANCE).sum()),
+        )
+        for hinge in range(len(robot.hinges))
+        if excess[:, hinge].max() > LIMIT_TOLERANCE
+    ]
+
+
+def _jumps(motion: RobotMotion, changes: Annotated[Floats, "frames hinges"]) -> list[Finding]:
+    usual = (
+        np.percentile(changes, 90.0, axis=0) if len(changes) > 20 else np.zeros(changes.shape[1])
+    )
+    jumping = (changes > JUMP) & (changes > JUMP_RATIO * usual)
+    return [
+        Finding(
+            "jump",
+            joint_name(motion, hinge),
+            int(np.argmax(changes[:, hinge])) + 1,
+            float(np.degrees(changes[:, hinge].max())),
+            "degrees",
+            int(jumping[:, hinge].sum()),
+        )
+        for hinge in np.flatnonzero(jumping.any(axis=0)).tolist()
+    ]
+
+
+def _seam(motion: RobotMotion, steps: Annotated[Floats, "frames hinges"]) -> list[Finding]:
+    """Return the worst step from the last frame to the first of a motion that repeats."""
+    if not motion.loops:
+        return []
+    gaps = np.abs(motion.angles[0] - motion.angles[-1])
+    usual = np.maximum(np.abs(steps).max(axis=0), LIMIT_TOLERANCE)
+    hinge = int(np.argmax(gaps / usual))
+    if gaps[hinge] < SEAM_RATIO * usual[hinge]:
+        return []
+    name, degrees = joint_name(motion, hinge), float(np.degrees(gaps[hinge]))
+    return [Finding("seam", name, len(motion) - 1, degrees, "degrees")]
+
+
+def _feet(motion: RobotMotion, robot: Robot) -> tuple[Booleans, Floats, list[Finding]]:
+    """Return contacts and heights (F, K) of the feet, and their faults.
+
+    A foot stands where it is low and slow. A standing foot slides by the slowest of its points, so
+    that one that rolls does not.
+    """
+    soles = robot.foot_points(*motion.body_poses(robot))
+    heights = np.stack([points[..., 2].min(axis=1) for points in soles], axis=1)
+    findings = []
+    contacts = np.zeros(heights.shape, bool)
+    for foot, points in enumerate(soles):
+        name = robot.bodies[robot.feet[foot].body]
+        middle = points.mean(axis=1)
+        path = np.stack([middle[:, 0], heights[:, foot], middle[:, 1]], axis=-1)
+        contacts[:, foot] = detect_contacts(path, motion.rate, cyclic=False, thresholds=CONTACTS)
+        findings += _of_foot(motion, name, points, heights[:, foot], contacts[:, foot])
+    lowest = heights.min(axis=1)
+    standing = contacts.any(axis=1)
+    above = np.where(standing, lowest, 0.0)
+    if above.max() > FLOATING:
+        frame = int(np.argmax(above))
+        name = robot.bodies[robot.feet[int(np.argmin(heights[frame]))].body]
+        count = int((above > FLOATING).sum())
+        findings.append(Finding("floating", name, frame, 100 * float(above[frame]), "cm", count))
+    return contacts, heights, findings
+
+
+def _of_foot(
+    motion: RobotMotion, name: str, points: Floats, heights: Floats, contacts: Booleans
+) -> list[Finding]:
+    findings = []
+    if heights.min() < -SUNK:
+        frame, count = int(np.argmin(heights)), int((heights < -SUNK).sum())
+        findings.append(Finding("sunk", name, frame, -100 * float(heights.min()), "cm", count))
+    if contacts.any():
+        speeds = np.linalg.norm(velocities(points, motion.rate)[..., :2], axis=-1).min(axis=1)
+        mean = float(speeds[contacts].mean())
+        if mean > SKATING:
+            frame = int(np.argmax(np.where(contacts, speeds, 0.0)))
+            count = int(contacts.sum())
+            findings.append(Finding("skating", name, frame, 100 * mean, "cm/s", count))
+    return findings
+
+
+def outliers(motions: Sequence[RobotMotion]) -> dict[int, Finding]:
+    """Return a finding for each motion that breaks what the others have in common, by its index.
+
+    How far each joint turns and how fast is predicted from the other joints of the same motion, by
+    a regression over all motions in which odd ones count little. The residual is told in standard
+    deviations. Fewer than a dozen motions, or other joints, are not compared.
+    """
+    if len(motions) < FEWEST_COMPARED or len({motion.angles.shape[1] for motion in motions}) > 1:
+        return {}
+    features = np.array([_features(motion) for motion in motions])
+    residuals = np.stack(
+        [_residuals(features, hinge) for hinge in range(features.shape[1])], axis=-1
+    )
+    return {
+        index: Finding(
+            "outlier",
+            joint_name(motions[index], int(np.argmax(residuals[index]))),
+            0,
+            float(residuals[index].max()),
+            "standard deviations",
+        )
+        for index in np.flatnonzero(residuals.max(axis=1) > OUTLIER).tolist()
+    }
+
+
+def _features(motion: RobotMotion) -> Annotated[Floats, "hinges features"]:
+    """Return what is compared of each angle: its mean and spread, rad, and its speeds, rad/s."""
+    speeds = np.abs(velocities(motion.angles, motion.rate))
+    pace = 0.1 * np.sqrt((speeds**2).mean(axis=0)), 0.1 * speeds.max(axis=0)
+    return np.stack([motion.angles.mean(axis=0), motion.angles.std(axis=0), *pace], axis=-1)
+
+
+def _residuals(
+    features: Annotated[Floats, "motions hinges features"], hinge: int
+) -> Annotated[Floats, "motions"]:
+    """Return the largest residual of a hinge's features in each motion, in standard deviations."""
+    count = len(features)
+    others = np.delete(features, hinge, axis=1).reshape(count, -1)
+    others -= np.median(others, axis=0)
+    # An odd motion must not become a component of its own.
+    limits = 3.0 * _deviations(others)
+    others = np.clip(others, -limits, limits)
+    left, _, _ = np.linalg.svd(others - others.mean(axis=0), full_matrices=False)
+    components = left[:, : min(count // 6, COMPONENTS)]
+    terms = np.hstack([np.ones((count, 1)), components * np.sqrt(count)])
+    values, weights = features[:, hinge], np.ones(count)
+    for _ in range(ROUNDS):
+        normal = terms.T @ (weights[:, None] * terms) + 1e-4 * count * np.eye(terms.shape[1])
+        residuals = values - terms @ np.linalg.solve(normal, terms.T @ (weights[:, None] * values))
+        scores = (np.abs(residuals) / _deviations(residuals)).max(axis=1)
+        weights = 1.0 / np.maximum(1.0, 0.5 * scores) ** 2
+    return np.asarray(scores)
+
+
+def _deviations(values: Floats) -> Floats:
+    """Return standard deviations that outliers do not change, at least that of rounding."""
+    return 1.4826 * np.median(np.abs(values), axis=0) + LEAST_DEVIATION

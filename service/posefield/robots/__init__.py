@@ -1,0 +1,1 @@
+"""Robots: bodies and hinges, and their reference motions in the files of other programs."""

@@ -1,0 +1,319 @@
+"""Readers of reference motions, one for each layout of fields."""
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import quat
+from posefield.robots.file_conventions import File, tell_order, tell_quaternions, wxyz
+from posefield.robots.robot_motion import RobotMotion
+
+NAMED, UNNAMED = "names in the file", "order of the robot's file"
+WXYZ, XYZW = "wxyz: the format's", "xyzw: the format's"
+
+
+def from_rows(file: File) -> RobotMotion:
+    """Return the motion of rows of a CSV file: base position, quaternion, joint angles."""
+    rows = file.array("rows", None, None)
+    if rows.shape[1] < 8:
+        raise file.error(
+            f"found {rows.shape[1]} columns, expected 3 of the base's position, 4 of its "
+            "quaternion, and one for each joint"
+        )
+    path, angles = rows[:, :3], rows[:, 7:]
+    rotations, told = tell_quaternions(file, path, rows[:, 3:7], angles)
+    rate, rate_told = file.rate(None, " (Unitree's files have 30)")
+    name = "unitree.csv" if np.array_equal(rotations[:, 0], rows[:, 6]) else "qpos.csv"
+    evidence = {"quaternions": told, "rate": rate_told, "joints": UNNAMED}
+    return RobotMotion(file.source, name, path, rotations, angles, rate, evidence=evidence)
+
+
+def from_tracking(file: File) -> RobotMotion:
+    """Return the motion of poses of all bodies and unnamed joints, in either order."""
+    angles = file.array("joint_pos", None, None)
+    bodies = file.array("body_pos_w", len(angles), None, 3)
+    turns = file.array("body_quat_w", len(angles), bodies.shape[1], 4)[:, 0]
+    rate, rate_told = file.rate(_number(file, "fps"), "")
+    ordered, told = tell_order(file, angles, bodies, turns)
+    name = "beyondmimic.npz" if told.startswith("breadth") else "mjlab.npz"
+    if file.conventions.order:
+        name = "beyondmimic.npz" if file.conventions.order == "breadth" else "mjlab.npz"
+    evidence = {"joints": told, "quaternions": WXYZ, "rate": rate_told}
+    return RobotMotion(
+        file.source, name, bodies[:, 0], turns, ordered, rate, evidence=evidence, bodies=bodies
+    )
+
+
+def _number(file: File, field: str) -> float | None:
+    return float(np.ravel(file.array(field, *([None] * np.ndim(file.content[field]))))[0])
+
+
+def from_holosoma(file: File) -> RobotMotion:
+    """Return the motion of MuJoCo's coordinates with names of joints and bodies."""
+    hinges, bodies = file.names("joint_names"), file.names("body_names")
+    columns = file.array("joint_pos", None, 7 + len(hinges))
+    rate, rate_told = file.rate(_number(file, "fps"), "")
+    evidence = {
+        "joints": NAMED,
+        "quaternions": WXYZ,
+        "rate": rate_told,
+    }
+    places = [place for place, name in enumerate(bodies) if name != "world"]
+    return RobotMotion(
+        file.source,
+        "holosoma.npz",
+        columns[:, :3],
+        columns[:, 3:7],
+        columns[:, 7:],
+        rate,
+        hinges,
+        evidence=evidence,
+        bodies=file.array("body_pos_w", len(columns), len(bodies), 3)[:, places],
+    )
+
+
+def from_isaaclab(file: File) -> RobotMotion:
+    """Return the motion of named joints and bodies, whose first is the base."""
+    hinges, bodies = file.names("dof_names"), file.names("body_names")
+    angles = file.array("dof_positions", None, len(hinges))
+    positions = file.array("body_positions", len(angles), len(bodies), 3)
+    rotations = file.array("body_rotations", len(angles), len(bodies), 4)
+    robot = file.conventions.robot
+    base = bodies.index(robot.bodies[0]) if robot and robot.bodies[0] in bodies else 0
+    rate, rate_told = file.rate(_number(file, "fps"), "")
+    evidence = {
+        "joints": NAMED,
+        "quaternions": WXYZ,
+        "rate": rate_told,
+    }
+    return RobotMotion(
+        file.source,
+        "isaaclab.npz",
+        positions[:, base],
+        rotations[:, base],
+        angles,
+        rate,
+        hinges,
+        evidence=evidence,
+        bodies=positions,
+    )
+
+
+PELVIS = ("pelvis_tx", "pelvis_tz", "pelvis_ty", "pelvis_tilt", "pelvis_list", "pelvis_rotation")
+"""Base of the first LocoMuJoCo: forward, left and upward path, then turns about y, x and z."""
+
+
+def from_loco_joints(file: File) -> RobotMotion:
+    """Return the motion of one field for each joint, as LocoMuJoCo's first files have."""
+    names = [name[2:] for name in file.content if name.startswith("q_")]
+    missing = [name for name in PELVIS if name not in names]
+    if missing:
+        raise file.error(f"found no field 'q_{missing[0]}' of the base")
+    columns = {name: file.array(f"q_{name}", None) for name in names}
+    hinges = tuple(name for name in names if name not in PELVIS)
+    path = np.stack([columns[name] for name in PELVIS[:3]], axis=-1)
+    robot = file.conventions.robot
+    if robot:
+        # The height is told from that of the robot's file.
+        path = path + robot.offsets[0]
+    turns = np.stack([columns[name] for name in PELVIS[3:]], axis=-1)
+    rate, rate_told = file.rate(None, " (LocoMuJoCo's first files have 500)")
+    evidence = {
+        "joints": NAMED,
+        "quaternions": "none: three angles",
+        "rate": rate_told,
+    }
+    return RobotMotion(
+        file.source,
+        "locomujoco.npz",
+        path,
+        quat.from_euler(turns, "YXZ"),
+        np.stack([columns[name] for name in hinges], axis=-1),
+        rate,
+        hinges,
+        evidence=evidence,
+    )
+
+
+def from_qpos(file: File) -> RobotMotion:
+    """Return the motion of MuJoCo's coordinates."""
+    columns = file.array("qpos", None, None)
+    hinges: tuple[str, ...] = ()
+    told = UNNAMED
+    if "joint_names" in file.content:
+        # The first joint of a trajectory is the free one of the base.
+        hinges, told = file.names("joint_names")[1:], NAMED
+    field = next((name for name in ("frequency", "fps") if name in file.content), None)
+    rate, rate_told = file.rate(_number(file, field) if field else None, "")
+    return RobotMotion(
+        file.source,
+        "locomujoco.npz" if "split_points" in file.content else "qpos.npz",
+        columns[:, :3],
+        columns[:, 3:7],
+        columns[:, 7:],
+        rate,
+        hinges,
+        evidence={"joints": told, "quaternions": "wxyz: MuJoCo's", "rate": rate_told},
+    )
+
+
+def from_kimodo(file: File) -> RobotMotion:
+    """Raise MotionFileError: the file holds no joint angles, and the message says which does."""
+    joints = file.array("posed_joints", None, None, 3).shape[1]
+    raise file.error(
+        f"holds positions of {joints} joints, no joint angles: expected the CSV file that Kimodo "
+        "writes beside it for a robot, or its BVH for a person"
+    )
+
+
+def from_gmr(file: File) -> RobotMotion:
+    """Return the motion of a retargeter's pickle."""
+    angles = file.array("dof_pos", None, None)
+    rate, rate_told = file.rate(_number(file, "fps"), "")
+    evidence = {
+        "joints": UNNAMED,
+        "quaternions": XYZW,
+        "rate": rate_told,
+    }
+    rotations = wxyz(file.array("root_rot", len(angles), 4), "xyzw")
+    path = file.array("root_pos", len(angles), 3)
+    return RobotMotion(file.source, "gmr.pkl", path, rotations, angles, rate, evidence=evidence)
+
+
+def from_mimickit(file: File) -> RobotMotion:
+    """Return the motion of rows of base position, rotation vector and joint angles."""
+    frames = file.array("frames", None, None)
+    if frames.shape[1] < 7:
+        raise file.error(
+            f"found {frames.shape[1]} numbers a frame, expected 6 of the base and more"
+        )
+    rate, rate_told = file.rate(_number(file, "fps"), "")
+    evidence = {
+        "joints": UNNAMED,
+        "quaternions": "none: rotation vectors",
+        "rate": rate_told,
+    }
+    return RobotMotion(
+        file.source,
+        "mimickit.pkl",
+        frames[:, :3],
+        quat.exp(frames[:, 3:6]),
+        frames[:, 6:],
+        rate,
+        loops=bool(file.content["loop_mode"]),
+        evidence=evidence,
+    )
+
+
+def from_asap(file: File) -> RobotMotion:
+    """Return the motion of a pickle with the base's quaternions and joint angles."""
+    angles = file.array("dof", None, None)
+    rate, rate_told = file.rate(_number(file, "fps"), "")
+    evidence = {
+        "joints": UNNAMED,
+        "quaternions": XYZW,
+        "rate": rate_told,
+    }
+    path = file.array("root_trans_offset", len(angles), 3)
+    rotations = wxyz(file.array("root_rot", len(angles), 4), "xyzw")
+    return RobotMotion(file.source, "asap.pkl", path, rotations, angles, rate, evidence=evidence)
+
+
+AWD_FIELDS = ("root_pos", "root_quat", "joints_pos")
+
+
+def _loops(file: File) -> bool:
+    return str(file.content.get("LoopMode", "")).casefold() == "wrap"
+
+
+def _frame_rate(file: File) -> tuple[float, str]:
+    duration = _number(file, "FrameDuration")
+    field = _number(file, "FPS") if "FPS" in file.content else None
+    return file.rate(field or (1.0 / duration if duration else None), "")
+
+
+def from_awd(file: File) -> RobotMotion:
+    """Return the motion of rows whose layout the file states, with names of joints."""
+    rows, hinges = file.array("Frames", None, None), file.names("Joints")
+    (starts,), (sizes,) = file.content["Frame_offset"], file.content["Frame_size"]
+    parts = {}
+    for name, size in zip(AWD_FIELDS, (3, 4, len(hinges)), strict=True):
+        if sizes.get(name) != size or starts.get(name, -1) + size > rows.shape[1]:
+            raise file.error(
+                f"Frame_size and Frame_offset of {name!r} are {sizes.get(name)} and "
+                f"{starts.get(name)}, expected {size} numbers within the {rows.shape[1]} of a frame"
+            )
+        parts[name] = rows[:, starts[name] : starts[name] + size]
+    rate, rate_told = _frame_rate(file)
+    evidence = {
+        "joints": NAMED,
+        "quaternions": XYZW,
+        "rate": rate_told,
+    }
+    return RobotMotion(
+        file.source,
+        "awd.json",
+        parts["root_pos"],
+        wxyz(parts["root_quat"], "xyzw"),
+        parts["joints_pos"],
+        rate,
+        hinges,
+        loops=_loops(file),
+        evidence=evidence,
+    )
+
+
+DIFFERENCES = 0.9
+"""Least correlation of columns of velocities with the differences of columns of angles."""
+
+
+def _are_velocities(angles: Floats, speeds: Floats) -> bool:
+    steps, means = np.diff(angles, axis=0), 0.5 * (speeds[1:] + speeds[:-1])
+    if not (steps.any() and means.any()):
+        return False
+    return bool(np.corrcoef(steps.ravel(), means.ravel())[0, 1] > DIFFERENCES)
+
+
+def from_amp(file: File) -> RobotMotion:
+    """Return the motion of rows of text: with a quaternion, or with TienKung's three angles."""
+    rows = file.array("Frames", None, None)
+    rate, rate_told = _frame_rate(file)
+    half = rows.shape[1] // 2
+    evidence = {"joints": UNNAMED, "rate": rate_told}
+    if rows.shape[1] % 2 == 0 and half > 7:
+        if _are_velocities(rows[:, 6:half], rows[:, half + 6 :]):
+            evidence["quaternions"] = "none: roll, pitch and yaw, as velocities follow in each row"
+            turns = quat.from_euler(rows[:, [5, 4, 3]], "ZYX")
+            angles = rows[:, 6:half]
+            return RobotMotion(
+                file.source,
+                "tienkung.txt",
+                rows[:, :3],
+                turns,
+                angles,
+                rate,
+                loops=_loops(file),
+                evidence=evidence,
+            )
+        count = next((n for n in range(half, 6, -1) if _are_leading(rows, n)), None)
+        if count:
+            raise file.error(
+                f"holds the angles of {count} joints and their velocities, but no base: expected "
+                "the file of whole poses (TienKung calls it motion_visualization)"
+            )
+    path, angles = rows[:, :3], rows[:, 7:]
+    rotations, evidence["quaternions"] = tell_quaternions(file, path, rows[:, 3:7], angles)
+    return RobotMotion(
+        file.source,
+        "amp.txt",
+        path,
+        rotations,
+        angles,
+        rate,
+        loops=_loops(file),
+        evidence=evidence,
+    )
+
+
+def _are_leading(rows: Floats, count: int) -> bool:
+    """Return whether rows begin with angles of some joints and their velocities."""
+    return _are_velocities(rows[:, :count], rows[:, count : 2 * count])

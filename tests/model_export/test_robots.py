@@ -1,0 +1,302 @@
+"""Tests of robots and of the doctor of their reference motions."""
+
+import json
+import os
+import pickle
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from posefield.common.errors import MotionFileError
+from posefield.motion import quat
+from posefield.robots import robot_formats
+from posefield.robots.file_conventions import Conventions
+from posefield.robots.robot_motion import RobotMotion
+from posefield_train.robots import doctor, robot_file
+
+# A biped whose left leg branches before its right, with a hinge beside its body's origin, a body
+# with two hinges, and a neck behind both legs: its orders depth first and breadth first differ.
+LEG = """<body name="{side}_hip" pos="0 {y} -0.1" quat="0.9 0.1 0 0">
+  <joint name="{side}_hip_roll" axis="1 0 0" range="-0.6 0.6"/>
+  <joint name="{side}_hip_pitch" axis="0 1 0" pos="0.02 0 0.01" range="-1.2 1.2"/>
+  <geom type="sphere" size="0.03"/>
+  <body name="{side}_shin" pos="0 0 -0.3">
+    <joint name="{side}_knee" axis="0 1 0" range="-0.1 1.5"/><geom type="sphere" size="0.03"/>
+    <body name="{side}_foot" pos="0 0 -0.3"><joint name="{side}_ankle" axis="0 1 0" range="-1 1"/>
+      <geom type="box" size="0.08 0.04 0.02"/></body></body></body>"""
+BIPED = f"""<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
+<geom type="plane" size="5 5 0.1"/><body name="pelvis" pos="0 0 0.72"><freejoint/>
+<geom type="box" size="0.1 0.1 0.1"/>{LEG.format(side="left", y=0.1)}
+{LEG.format(side="right", y=-0.1)}
+<body name="neck" pos="0 0 0.2"><joint name="neck_yaw" axis="0 0 1"/>
+<geom type="sphere" size="0.05"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("robot") / "biped.xml"
+    path.write_text(BIPED)
+    return path
+
+
+@pytest.fixture(scope="module")
+def robot(file):
+    return robot_file.read(file)
+
+
+def motion_of(robot, frames=60, seed=0, rate=50.0, turn=0.8):
+    """A robot that turns and moves smoothly in the air."""
+    times = np.arange(frames) / rate
+    draws = np.random.default_rng(seed)
+    middles = np.array([np.mean(np.clip(limits, -1, 1)) for limits in robot.ranges])
+    sizes, phases = draws.uniform(0.05, 0.2, (2, len(robot.hinges)))
+    angles = middles + sizes * np.sin(2 * np.pi * times[:, None] + 9 * phases)
+    path = np.stack([0.5 * times, 0.1 * np.sin(times), 1.0 + 0.01 * np.sin(5 * times)], axis=-1)
+    leaning = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), 0.1 + 0.02 * np.sin(times))
+    heading = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), turn * (1 + times))
+    rotations = quat.mul(heading, leaning)
+    return RobotMotion("made.csv", "qpos.csv", path, rotations, angles, rate, robot.hinges)
+
+
+def save(path, motion, robot, name):
+    target = path / f"motion{robot_formats.WRITTEN[name].suffix}"
+    target.write_bytes(robot_formats.WRITTEN[name].write(motion, robot))
+    return target
+
+
+def test_bodies_are_where_mujoco_puts_them(file, robot):
+    model = mujoco.MjModel.from_xml_path(str(file))
+    state = mujoco.MjData(model)
+    motion = motion_of(robot)
+    positions, rotations = motion.body_poses(robot)
+    for frame in range(0, len(motion), 7):
+        state.qpos[:] = np.concatenate(
+            [motion.base_path[frame], motion.base_rotations[frame], motion.angles[frame]]
+        )
+        mujoco.mj_kinematics(model, state)
+        np.testing.assert_allclose(positions[frame], state.xpos[1:], atol=1e-12)
+        alike = np.abs(np.einsum("bk,bk->b", rotations[frame], state.xquat[1:]))
+        np.testing.assert_allclose(alike, 1.0, atol=1e-12)
+    assert [robot.bodies[foot.body] for foot in robot.feet] == ["left_foot", "right_foot"]
+
+
+@pytest.mark.parametrize("name", robot_formats.WRITTEN)
+def test_a_format_is_recognised_and_gives_the_motion_back(name, robot, tmp_path):
+    motion = motion_of(robot)
+    # TienKung's and AMP's rows state no order of the quaternion: the robot stands in one alone.
+    stated = Conventions(robot, rate=50.0 if name.endswith(".csv") else None)
+    written = robot_formats.read(save(tmp_path, motion, robot, name), stated)
+    assert written.format == name
+    assert written.hinges == robot.hinges
+    assert written.rate == pytest.approx(50.0)
+    np.testing.assert_allclose(written.angles, motion.angles, atol=1e-6)
+    np.testing.assert_allclose(written.base_path, motion.base_path, atol=1e-6)
+    alike = np.abs(np.einsum("fk,fk->f", written.base_rotations, motion.base_rotations))
+    np.testing.assert_allclose(alike, 1.0, atol=1e-9)
+
+
+def test_an_order_of_joints_is_told_by_the_bodies_and_never_guessed(robot, tmp_path):
+    breadth = save(tmp_path, motion_of(robot), robot, "beyondmimic.npz")
+    told = robot_formats.read(breadth, Conventions(robot)).evidence["joints"]
+    assert told.startswith("breadth first: its bodies lie within")
+    assert "unknown" in robot_formats.read(breadth, Conventions()).evidence["joints"]
+    with np.load(breadth) as fields:
+        shuffled = {**fields, "joint_pos": fields["joint_pos"][:, ::-1]}
+    np.savez(breadth, **shuffled)
+    with pytest.raises(MotionFileError, match="in neither order"):
+        robot_formats.read(breadth, Conventions(robot))
+
+
+def test_quaternions_are_told_by_the_robot_that_stands_or_asked_for(robot, tmp_path):
+    turning = save(tmp_path, motion_of(robot), robot, "unitree.csv")
+    told = robot_formats.read(turning, Conventions(rate=50.0)).evidence["quaternions"]
+    assert told.startswith("xyzw: upright in all frames")
+    # Ahead, both readings are upright: one is the other turned by half a turn.
+    ahead = replace(motion_of(robot), base_rotations=np.tile([1.0, 0.0, 0.0, 0.0], (60, 1)))
+    straight = save(tmp_path, ahead, robot, "unitree.csv")
+    with pytest.raises(MotionFileError, match="say --quaternions"):
+        robot_formats.read(straight, Conventions(rate=50.0))
+    stated = Conventions(rate=50.0, quaternions="xyzw")
+    np.testing.assert_allclose(
+        robot_formats.read(straight, stated).base_rotations, ahead.base_rotations, atol=1e-8
+    )
+
+
+def standing(robot, frames=100):
+    """The robot on the floor, swaying its neck."""
+    motion = motion_of(robot, frames)
+    angles = np.zeros_like(motion.angles)
+    angles[:, -1] = 0.3 * np.sin(np.arange(frames) / 10)
+    path, upright = np.zeros((frames, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (frames, 1))
+    motion = replace(motion, base_path=path, base_rotations=upright, angles=angles)
+    soles = robot.foot_points(*motion.body_poses(robot))
+    path[:, 2] = -min(float(points[..., 2].min()) for points in soles)
+    return motion
+
+
+def changed(motion, hinge, change):
+    angles = motion.angles.copy()
+    change(angles[:, motion.hinges.index(hinge)])
+    return replace(motion, angles=angles)
+
+
+def raised(motion, height, sway=0.0):
+    path = motion.base_path + np.array([0.0, 0.0, height])
+    path[:, 1] += sway * np.arange(len(path)) / motion.rate
+    return replace(motion, base_path=path)
+
+
+def bent(angles):
+    angles[40:] -= 0.3
+
+
+def hit(angles):
+    angles[50] += 0.3
+
+
+FAULTS = {
+    "limit": (lambda motion: changed(motion, "left_knee", bent), "left_knee", 11.5),
+    "jump": (lambda motion: changed(motion, "neck_yaw", hit), "neck_yaw", 34.0),
+    "sunk": (lambda motion: raised(motion, -0.01), "left_foot", 1.0),
+    "floating": (lambda motion: raised(motion, 0.03), "left_foot", 3.0),
+    "skating": (lambda motion: raised(motion, 0.0, 0.1), "left_foot", 10.0),
+    "seam": (
+        lambda motion: replace(
+            changed(motion, "neck_yaw", lambda angles: angles.sort()), loops=True
+        ),
+        "neck_yaw",
+        34.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_planted_fault_is_told_with_its_joint_and_size(kind, robot):
+    sound = standing(robot)
+    assert not doctor.diagnose(sound, robot).findings
+    plant, where, size = FAULTS[kind]
+    findings = [each for each in doctor.diagnose(plant(sound), robot).findings if each.kind == kind]
+    assert where in {finding.where for finding in findings}
+    assert findings[0].value == pytest.approx(size, rel=0.05)
+
+
+def test_a_motion_unlike_the_others_is_found_and_no_other(robot):
+    motions = []
+    for index in range(20):
+        motion = motion_of(robot, 100)
+        scale = 0.5 + 0.05 * index
+        motions.append(replace(motion, angles=motion.angles * scale))
+    assert not doctor.outliers(motions)
+    motions[7] = changed(motions[7], "left_ankle", lambda angles: np.add(angles, 0.3, out=angles))
+    assert {index: found.where for index, found in doctor.outliers(motions).items()} == {
+        7: "left_ankle"
+    }
+
+
+class Hostile:
+    def __reduce__(self):
+        return os.mkdir, ("made-by-a-pickle",)
+
+
+def test_a_pickle_runs_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "motion.pkl"
+    path.write_bytes(pickle.dumps({"fps": 30, "root_pos": Hostile()}))
+    with pytest.raises(MotionFileError, match="mkdir, expected NumPy arrays"):
+        robot_formats.read(path, Conventions())
+    assert not (tmp_path / "made-by-a-pickle").exists()
+
+
+def with_nan(rows):
+    rows[3, 9] = np.nan
+
+
+def with_norm(rows):
+    rows[5, 3:7] *= 1.1
+
+
+BAD_ROWS = {
+    "joint angle 3 of frame 3 is nan": with_nan,
+    "quaternion of frame 5 has norm 1.1": with_norm,
+}
+
+
+@pytest.mark.parametrize("message", BAD_ROWS)
+def test_wrong_numbers_are_named_with_their_frame(message, robot, tmp_path):
+    path = save(tmp_path, motion_of(robot), robot, "qpos.csv")
+    rows = np.loadtxt(path, delimiter=",")
+    BAD_ROWS[message](rows)
+    np.savetxt(path, rows, delimiter=",")
+    with pytest.raises(MotionFileError, match=message):
+        robot_formats.read(path, Conventions(robot, rate=50.0))
+
+
+def test_a_file_of_another_robot_is_refused_with_both_counts(robot, tmp_path):
+    path = save(tmp_path, motion_of(robot), robot, "qpos.csv")
+    np.savetxt(path, np.loadtxt(path, delimiter=",")[:, :-2], delimiter=",")
+    with pytest.raises(MotionFileError, match="found 7 joint angles a frame, expected the 9"):
+        robot_formats.read(path, Conventions(robot, rate=50.0))
+    named = save(tmp_path, motion_of(robot), robot, "isaaclab.npz")
+    with np.load(named) as fields:
+        other = np.array([*fields["dof_names"][:-1], "neck_jaw"])
+        np.savez(named, **{**fields, "dof_names": other})
+    with pytest.raises(MotionFileError, match=r"'neck_jaw' is none of biped\.xml \(did you mean"):
+        robot_formats.read(named, Conventions(robot))
+
+
+BAD_ROBOTS = {
+    "'left_knee' is a slide joint": ('name="left_knee"', 'name="left_knee" type="slide"'),
+    "Error opening file .*gone.stl": (
+        "<worldbody>",
+        '<asset><mesh name="gone" file="gone.stl"/></asset><worldbody>',
+    ),
+}
+
+
+@pytest.mark.parametrize("message", BAD_ROBOTS)
+def test_a_robot_that_cannot_be_read_is_refused_with_the_reason(message, tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(BIPED.replace(*BAD_ROBOTS[message]))
+    with pytest.raises(MotionFileError, match=message):
+        robot_file.read(path)
+
+
+def test_a_urdf_file_floats(tmp_path):
+    path = tmp_path / "robot.urdf"
+    mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    path.write_text(
+        f'<robot name="one"><link name="base">{mass}</inertial></link><link name="arm">{mass}'
+        '</inertial></link><joint name="elbow" type="revolute"><parent link="base"/>'
+        '<child link="arm"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint></robot>'
+    )
+    robot = robot_file.read(path)
+    assert robot.bodies == ("base", "arm")
+    assert robot.hinges == ("elbow",)
+    np.testing.assert_allclose(robot.ranges, [[-1.0, 2.0]])
+
+
+def test_the_command_tells_converts_and_draws(robot, file, tmp_path, posefield):
+    sound = save(tmp_path, standing(robot), robot, "awd.json")
+    output, drawn = tmp_path / "converted", tmp_path / "picture.png"
+    words = ["doctor", sound, "--robot", file, "--to", "mjlab.npz", "-o", output]
+    code, out, _ = posefield(*words, "--picture", drawn, "--json")
+    (facts,) = json.loads(out)["motions"]
+    assert (code, facts["format"], facts["frames"], facts["findings"]) == (0, "awd.json", 100, [])
+    assert drawn.read_bytes().startswith(b"\x89PNG")
+    mjlab = robot_formats.read(output / "motion.npz", Conventions(robot))
+    np.testing.assert_allclose(mjlab.angles, standing(robot).angles, atol=1e-9)
+    code, _, errors = posefield(*words)
+    assert code and "exists already" in errors
+
+
+def test_the_command_names_a_file_that_cannot_be_read(robot, file, tmp_path, posefield):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("1,2,three\n")
+    sound = save(tmp_path, standing(robot), robot, "awd.json")
+    code, out, errors = posefield("doctor", broken, sound, "--robot", file)
+    assert code == 1
+    assert "line 1: found '1,2,three', expected numbers" in errors.replace("\n", " ")
+    assert "no faults" in out
