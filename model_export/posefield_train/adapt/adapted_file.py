@@ -14,7 +14,13 @@ from posefield.model_file.model_card import PERFORMER, Control, LabelSet, Level,
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
-from posefield_train.graph import levels, onnx_export, trained_card, truncation_cost
+from posefield_train.graph import (
+    captured_hinges,
+    levels,
+    onnx_export,
+    trained_card,
+    truncation_cost,
+)
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, LevelTest
 from posefield_train.graph.onnx_export import ExportedModel
@@ -205,6 +211,7 @@ def _card(
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
         contacts=adapted.contacts.statistics if adapted.contacts else (),
+        hinges=captured_hinges.widened(old.hinges, clips),
     )
 
 

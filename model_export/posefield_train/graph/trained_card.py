@@ -27,7 +27,7 @@ from posefield.model_file.model_card import (
 )
 from posefield.motion.clip import Clip
 from posefield_train.align import phase_alignment
-from posefield_train.graph import truncation_cost
+from posefield_train.graph import captured_hinges, truncation_cost
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.kriging.kriging_bank import EVENT
@@ -147,6 +147,7 @@ def build_card(
     recipe, examples, listed = trained.recipe, trained.examples, trained.listed
     durations = trained.aligned.durations
     listed_examples = [examples[clip] for clip in listed]
+    roles = _roles(recipe, trained)
     return ModelCard(
         name=recipe.name,
         description=recipe.description,
@@ -166,7 +167,7 @@ def build_card(
         provenance=_provenance(recipe, examples),
         sources=tuple(example.row.source for example in listed_examples),
         kriging=plain_parameters(trained.pose.hyper),
-        roles=_roles(recipe, trained),
+        roles=roles,
         left_out=tuple(map(rounded, np.sqrt(trained.left_out_errors[listed]))),
         event=truncation_error.event(recipe, examples),
         beside=_covariance_root(trained),
@@ -178,6 +179,7 @@ def build_card(
         curves=trained.tensor.curves,
         contacts=trained.contacts.statistics if trained.contacts else (),
         captured_acceleration=captured_acceleration(examples),
+        hinges=captured_hinges.measure_hinges(examples, roles),
     )
 
 

@@ -9,6 +9,8 @@ from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sized
 from itertools import pairwise
 
+import numpy as np
+
 from posefield.kriging.kriging_model import COVARIANCE_MODELS
 from posefield.model_file.model_card import ROW_VALUES, ModelCard
 from posefield.motion.joint_roles import ROLES
@@ -31,6 +33,7 @@ MAX_SHOWN = 60
 
 MAX_CURVES = 1_000
 """Largest number of curves; a face has about fifty."""
+UNIT_TOLERANCE = 1e-3
 ANY_SIZE = -1
 """A size that the card does not determine."""
 REQUIRED_VALUES = ("coefficients", "frame")
@@ -58,6 +61,7 @@ def check(card: ModelCard) -> None:
     _check_curves(card)
     _check_contacts(card)
     _check_accelerations(card)
+    _check_hinges(card)
 
 
 def check_graph(
@@ -319,6 +323,20 @@ def _check_accelerations(card: ModelCard) -> None:
             acceleration.p99,
             f"at least the median, {acceleration.median:g}",
         )
+
+
+def _check_hinges(card: ModelCard) -> None:
+    _expect_joints(tuple(hinge.joint for hinge in card.hinges), "hinges", card)
+    for index, hinge in enumerate(card.hinges):
+        path, axis, bone = f"hinges[{index}]", np.array(hinge.axis), np.array(hinge.bone)
+        for name, direction in (("reference", np.array(hinge.reference)), ("axis", axis)):
+            size = float(np.linalg.norm(direction))
+            _expect(abs(size - 1.0) <= UNIT_TOLERANCE, f"{path}.{name}", size, "a length of 1")
+        across = float(np.linalg.norm(bone - (bone @ axis) * axis))
+        _expect(across >= 0.5, f"{path}.bone", list(bone), "a direction across the axis")
+        for low, high in zip(hinge.low, hinge.high, strict=True):
+            right = -np.pi <= low <= high <= np.pi
+            _expect(right, path, [low, high], "angles in order, from -pi to pi")
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:

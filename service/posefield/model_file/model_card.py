@@ -30,6 +30,7 @@ from posefield.kriging.kriging_model import Hyper
 from posefield.motion import measures
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.curves import Curve
+from posefield.motion.hinges import Hinge
 from posefield.motion.measures import Measure
 from posefield.motion.quat import ChartName
 from posefield.motion.skeleton import Skeleton
@@ -123,7 +124,7 @@ def shape_rows(output: str, rows: Singles, questions: int, joints: int) -> Any:
 
 FORMAT = 5
 PREFIX = "posefield."
-OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration")
+OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration", "hinges")
 """Entries that a file lacks where they are empty, or None."""
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
@@ -240,7 +241,8 @@ class ModelCard:
     the ground or a thing, in the order of the graph's output `contacts`, whose values are the
     probabilities of their contacts; the file has neither without them. captured_acceleration: of
     the clips of the training, with which joins of performances are compared; None in files of
-    earlier versions.
+    earlier versions. hinges: limits of knees and elbows, not sent to clients; empty without roles
+    and in files of earlier versions, whose joints have no limits.
     """
 
     name: Slug
@@ -271,6 +273,7 @@ class ModelCard:
     curves: tuple[Curve, ...] = ()
     contacts: tuple[FootContact, ...] = ()
     captured_acceleration: CapturedAcceleration | None = None
+    hinges: tuple[Hinge, ...] = ()
 
     @property
     def clip_labels(self) -> Floats:
@@ -326,11 +329,12 @@ def dump(card: ModelCard) -> dict[str, str]:
 
 
 def plain_values(card: ModelCard) -> dict[str, Any]:
-    """Return the card as numbers, texts, lists and dicts, without `making`.
+    """Return the card as numbers, texts, lists and dicts, without `making` and `hinges`.
 
     The label set of performers is given in keys of its own, too, as in requests.
     """
     plain = _plain_fields(card)
+    plain.pop("hinges")
     for preset in plain["presets"]:
         preset["performer"] = preset["labels"].pop(PERFORMER, None)
     return {**plain, "performers": list(card.performers), "moved_by": list(card.moved_by)}

@@ -1,0 +1,219 @@
+"""Limits of knees and elbows: each joint turns about one axis, within the range of its captures.
+
+A rotation r exp(a flexion) s is a turn from the straight limb r about the hinge's axis a, and a
+swing s off the hinge, whose two angles are those of its gnomonic projection: about the bone below
+the joint, as a forearm twists, and sideways.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from posefield.common.bounded_types import Index, Number
+from posefield.common.units import Booleans, Floats, Vectors
+from posefield.motion import quat
+
+FREE, MOST = np.radians(1.0), np.radians(3.0)
+"""Angles beyond the captured range up to which a rotation stays as it is, and which it never
+exceeds, rad."""
+
+LEAST_BEND = 0.03
+"""Mean sine of the bend of a limb from which its axis is known."""
+DECIMALS = 5
+RANGE = "low", "high"
+
+Triple = tuple[Number, Number, Number]
+HingeRotations = Annotated[Floats, "*poses hinges 4"]
+Angles = Annotated[Floats, "*poses hinges 3"]
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """Axis and captured angles of a knee or an elbow.
+
+    joint: index. reference: local rotation of the straight limb. axis: of the flexion, in the
+    joint's frame, orthogonal to `bone`, the direction of the bone below the joint. low, high:
+    captured angles, rad, of flexion (positive where the limb bends), twist about the bone, and
+    sideways.
+    """
+
+    joint: Index
+    reference: tuple[Number, Number, Number, Number]
+    axis: Triple
+    bone: Triple
+    low: Triple
+    high: Triple
+
+
+@dataclass(frozen=True)
+class Hinges:
+    """Limits of H joints.
+
+    joints: index of each in a skeleton or a chain. frames: rows (H, 4, 4) that take a local
+    rotation to its components relative to the reference, along 1, axis, bone and their vector
+    product. axes (H, 3, 3): these three directions, in the joint's frame. low, high: captured
+    angles (H, 3), rad.
+    """
+
+    joints: tuple[int, ...]
+    frames: Annotated[Floats, "hinges 4 4"]
+    axes: Annotated[Floats, "hinges 3 3"]
+    low: Annotated[Floats, "hinges 3"]
+    high: Annotated[Floats, "hinges 3"]
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def of_chain(self, links: Sequence[int]) -> "Hinges":
+        """Return the hinges among some joints, with their places there as indices."""
+        kept = [row for row, joint in enumerate(self.joints) if joint in links]
+        places = tuple(links.index(self.joints[row]) for row in kept)
+        arrays = self.frames, self.axes, self.low, self.high
+        return Hinges(places, *(array[kept] for array in arrays))
+
+    def angles(self, rotations: Annotated[Floats, "*poses joints 4"]) -> Angles:
+        """Return the angles (..., H, 3), rad, of the hinges in local rotations (..., J, 4).
+
+        The flexion is the one nearest to the middle of its range.
+        """
+        return self._angles(self._components(rotations[..., list(self.joints), :]))
+
+    def within(
+        self, rotations: Annotated[Floats, "*poses joints 4"]
+    ) -> Annotated[Floats, "*poses joints 4"]:
+        """Return local rotations (..., J, 4) whose hinges are within their limits.
+
+        Angles beyond the captured range by up to FREE stay; larger ones approach MOST smoothly. The
+        same array where none is larger.
+        """
+        turns = rotations[..., list(self.joints), :]
+        angles = self._angles(self._components(turns))
+        beyond = self.beyond(angles)
+        if not beyond.any():
+            return rotations
+        limited = self._rotations(self.limit(angles), turns)
+        bounded = rotations.copy()
+        bounded[..., list(self.joints), :] = np.where(
+            beyond.any(axis=-1, keepdims=True), limited, turns
+        )
+        return bounded
+
+    def beyond(self, angles: Angles) -> Annotated[Booleans, "*poses hinges 3"]:
+        """Return which angles (..., H, 3) exceed the captured range by more than FREE."""
+        exceeds: Booleans = (angles < self.low - FREE) | (angles > self.high + FREE)
+        return exceeds
+
+    def limit(self, angles: Angles) -> Angles:
+        """Return angles (..., H, 3), rad, within the limits."""
+        within = np.clip(angles, self.low - FREE, self.high + FREE)
+        limited: Floats = within + (MOST - FREE) * np.tanh((angles - within) / (MOST - FREE))
+        return limited
+
+    def slopes(self, angles: Angles) -> Annotated[Floats, "*poses hinges 3 3"]:
+        """Return the matrices (..., H, 3, 3) by which limits scale small turns of the joints.
+
+        Both turns are in the joint's frame; to first order in the angles off the hinge.
+        """
+        within = np.clip(angles, self.low - FREE, self.high + FREE)
+        shares = 1.0 / np.square(np.cosh((angles - within) / (MOST - FREE)))
+        slopes: Floats = np.swapaxes(self.axes, -1, -2) @ (shares[..., None] * self.axes)
+        return slopes
+
+    def _components(self, turns: HingeRotations) -> HingeRotations:
+        # Not a matrix product, whose sums could go in another order for more poses.
+        frames, w, x, y, z = self.frames, *(turns[..., None, axis] for axis in range(4))
+        components: Floats = (
+            frames[..., 0] * w + frames[..., 1] * x + frames[..., 2] * y + frames[..., 3] * z
+        )
+        return components
+
+    def _angles(self, components: HingeRotations) -> Angles:
+        real, flexed, twisted, aside = (components[..., axis] for axis in range(4))
+        middle = 0.5 * (self.low + self.high)[:, 0]
+        flexion = 2.0 * np.arctan2(flexed, real)
+        flexion -= 2.0 * np.pi * np.round((flexion - middle) / (2.0 * np.pi))
+        size = np.hypot(real, flexed)
+        cosine, sine = real / np.maximum(size, 1e-12), flexed / np.maximum(size, 1e-12)
+        twist = 2.0 * np.arctan2(cosine * twisted + sine * aside, size)
+        sideways = 2.0 * np.arctan2(cosine * aside - sine * twisted, size)
+        return np.stack([flexion, twist, sideways], axis=-1)
+
+    def _rotations(self, angles: Angles, near: HingeRotations) -> HingeRotations:
+        """Return the rotations of angles, with the signs of the rotations `near`."""
+        half = 0.5 * angles
+        cosine, sine = np.cos(half[..., 0]), np.sin(half[..., 0])
+        twist, sideways = np.tan(half[..., 1]), np.tan(half[..., 2])
+        parts = (
+            cosine,
+            sine,
+            cosine * twist - sine * sideways,
+            cosine * sideways + sine * twist,
+        )
+        turns = sum(part[..., None] * self.frames[:, row] for row, part in enumerate(parts))
+        same = np.sum(turns * near, axis=-1, keepdims=True) >= 0.0
+        return quat.normalize(np.where(same, turns, -turns))
+
+
+def from_card(hinges: Sequence[Hinge]) -> Hinges:
+    """Return the limits of the hinges of a model card."""
+    axes = np.array([_axes(hinge) for hinge in hinges]).reshape(-1, 3, 3)
+    references = quat.normalize(np.array([h.reference for h in hinges]).reshape(-1, 1, 4))
+    turns = np.zeros((len(hinges), 4, 4))
+    turns[:, 0, 0], turns[:, 1:, 1:] = 1.0, axes
+    low, high = (np.array([getattr(h, end) for h in hinges]).reshape(-1, 3) for end in RANGE)
+    joints = tuple(hinge.joint for hinge in hinges)
+    return Hinges(joints, quat.mul(references, turns), axes, low, high)
+
+
+def _axes(hinge: Hinge) -> Annotated[Floats, "3 3"]:
+    """Return the directions of axis, bone and their vector product."""
+    # Numbers of a card are rounded.
+    axis, bone = _unit(np.array(hinge.axis)), np.array(hinge.bone)
+    bone = _unit(bone - (bone @ axis) * axis)
+    return np.stack([axis, bone, quat.cross(axis, bone)])
+
+
+def measure(
+    joint: int,
+    rotations: Annotated[Floats, "frames 4"],
+    above: Annotated[Floats, "frames 3"],
+    below: Annotated[Floats, "frames 3"],
+) -> Hinge | None:
+    """Return the hinge of a joint by its captured local rotations (F, 4).
+
+    above, below: offsets (F, 3), m, of the joint from its parent and of the next joint of the limb
+    from it. None for a limb that is straight in all frames, whose axis is unknown.
+    """
+    # The limb bends about the mean normal of its two bones, which a twist of the bone below turns
+    # but does not hide.
+    above, below = _unit(above), _unit(below)
+    before = quat.rotate(quat.conj(rotations), above)
+    normals = quat.cross(before, below)
+    bone, axis = _unit(below.mean(axis=0)), normals.mean(axis=0)
+    axis = axis - (axis @ bone) * bone
+    if np.linalg.norm(axis) < LEAST_BEND:
+        return None
+    axis = _unit(axis)
+    flexion = np.arctan2(normals @ axis, np.sum(before * below, axis=-1))
+    straight = quat.mul(rotations, quat.from_axis_angle(axis, -flexion))
+    reference = quat.mean(straight[:, None])[0]
+    nearest = float(flexion.mean())
+    unlimited = Hinge(
+        0, *map(rounded, (reference, axis, bone, [nearest, 0.0, 0.0], [nearest, 0.0, 0.0]))
+    )
+    angles = from_card([unlimited]).angles(rotations[:, None])[:, 0]
+    low, high = rounded(angles.min(axis=0)), rounded(angles.max(axis=0))
+    return replace(unlimited, joint=joint, low=low, high=high)
+
+
+def _unit(vectors: Vectors) -> Vectors:
+    units: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return units
+
+
+def rounded(numbers: Sequence[float] | Floats) -> Any:
+    """Return numbers as cards store them."""
+    # Adding zero takes the sign of a negative one away.
+    return tuple(round(float(number), DECIMALS) + 0.0 for number in numbers)
