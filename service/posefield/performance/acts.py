@@ -15,13 +15,14 @@ from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint import PositionConstraint
 from posefield.constraints.targets import NO_CONSTRAINTS, JointTarget, from_question
 from posefield.locomotion import floor_plane
-from posefield.model_file.model_card import ModelCard
-from posefield.performance import act_motion
+from posefield.model_file.model_card import Control, ModelCard
+from posefield.motion.measures import POSITION_AXES, Measure
+from posefield.performance import act_motion, joins
 from posefield.performance.act_motion import Act, StagedAct
 from posefield.performance.limb_targets import WorldTarget
-from posefield.performance.passage import RATE, FloorMotion
+from posefield.performance.passage import RATE, FloorMotion, scale_heights
 from posefield.performance.script import Script, Source
-from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
+from posefield.performance.timeline import VISIBLE, Span, Timeline, check_distance, choose_blend
 from posefield.performance.walk_steps import entries_of, entry_range, target_frames
 from posefield.question import motion_question, performance_question
 from posefield.question.motion_question import MotionQuestion, Target, replace
@@ -264,6 +265,7 @@ def stage_at_join(timeline: Timeline, script: Script, index: int) -> StagedAct:
         x, z = script.question.start.position
         heading = script.question.start.heading
         return StagedAct(index, *act_from(source.model, question, complex(z, x), heading, world))
+    question = _going_on(timeline, script, index, question)
     if not world:
         return StagedAct(index, act_motion.act_passage(source.model, question), None)
     rest = tuple(target for number, target in enumerate(question.targets) if number not in world)
@@ -271,6 +273,50 @@ def stage_at_join(timeline: Timeline, script: Script, index: int) -> StagedAct:
     entries = entry_range(len(free.passage), free.event)
     cut = timeline.find_cut(script.adapted(index, free.passage), entries)
     return StagedAct(index, act_at(source.model, question, cut.motion, world), cut.motion)
+
+
+def _going_on(
+    timeline: Timeline, script: Script, index: int, question: MotionQuestion
+) -> MotionQuestion:
+    """Return the question of an act with the first pose's controls of the pose it goes on from.
+
+    They are measured as in training, on the bones of the character, and kept within the captured
+    ranges. Controls that the script gives, as such or by a target of their joint, stay.
+    """
+    segment, source = act_of(script, index)
+    measures = _open_measures(segment, source.model.session.card)
+    if not measures:
+        return question
+    free = act_motion.act_passage(source.model, replace(question, targets=()))
+    exit_frame = timeline.exits[-1]
+    if len(timeline.exits) > 1:
+        entries = entry_range(len(free.passage), free.event)
+        exit_frame = timeline.find_cut(script.adapted(index, free.passage), entries).exit
+    pose = timeline.done.part(exit_frame, exit_frame + 1)
+    by = free.motion_to(complex(floor_plane.project(pose.roots[0])), pose.heading()).inverse()
+    points = by.place(joins.positions(script.character.body, pose, 0, 1)[0])
+    points = scale_heights(points, 1.0 / source.share)
+    controls = {
+        control.name: float(np.clip(point.mean(), control.minimum, control.maximum))
+        for control, measure in measures
+        for point in [points[list(measure.joints), POSITION_AXES[measure.quantity]]]
+    }
+    # The user is not told of controls that only the engine chose.
+    policy = question.extrapolate if segment.controls or segment.targets else "ok"
+    return replace(question, controls={**question.controls, **controls}, extrapolate=policy)
+
+
+def _open_measures(act: performance_question.Act, card: ModelCard) -> list[tuple[Control, Measure]]:
+    """Return the controls that are measured in the first pose and that an act leaves open."""
+    names, joints_of_targets = card.skeleton.names, {target.joint for target in act.targets}
+    return [
+        (control, control.measure)
+        for control in card.controls
+        if control.measure is not None
+        and control.measure.at == "start"
+        and control.name not in act.controls
+        and joints_of_targets.isdisjoint(names[joint] for joint in control.measure.joints)
+    ]
 
 
 def add_act(timeline: Timeline, script: Script, staged: StagedAct) -> None:
@@ -313,9 +359,17 @@ def _record(
     event = None if act.event is None or first + act.event <= begin else first + act.event
     _, results = split_results(trust.targets, len(segment.targets))
     # How far its limbs stay from targets is said of the character of the performance.
-    miss_warnings = synthesizer.miss_warnings(results)
+    unseen = [
+        *synthesizer.miss_warnings(results),
+        *(
+            deviation.sentence
+            for deviation in trust.deviations
+            if deviation.control not in segment.controls
+            or (deviation.unit == "m" and abs(deviation.given - deviation.asked) < VISIBLE)
+        ),
+    ]
     for sentence in trust.warnings:
-        if sentence not in miss_warnings:
+        if sentence not in unseen:
             timeline.warn(f"/segments/{index}", sentence)
     timeline.spans.append(
         Span(

@@ -23,7 +23,7 @@ from posefield.performance.act_motion import StagedAct
 from posefield.performance.join_quality import JoinFacts
 from posefield.performance.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
-from posefield.performance.timeline import Span, Timeline, from_poses, resample
+from posefield.performance.timeline import VISIBLE, Span, Timeline, from_poses, resample
 from posefield.performance.walk_plan import WalkPlan
 from posefield.question.performance_question import Act, Hold, Walk
 from posefield.question.performance_report import (
@@ -317,7 +317,7 @@ def _report(
     warnings = [
         ScriptWarning(pointer, f"stays {100.0 * miss:.1f} cm from its target: out of reach")
         for pointer, miss in misses.items()
-        if miss > MISS_TOLERANCE
+        if miss > VISIBLE
     ]
     return PerformanceReport(
         script.identities,

@@ -23,6 +23,10 @@ from posefield.question.results import ConstraintResult
 RESAMPLED_AT_ONCE = 4096
 """Frames that are resampled at a time, which takes some ten times their memory."""
 
+VISIBLE = 0.01
+"""Distance of a joint from its target, or of a measured control from its value, that a viewer sees,
+m: the width of a finger."""
+
 
 @dataclass(frozen=True)
 class Span:

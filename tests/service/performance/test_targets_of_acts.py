@@ -1,5 +1,7 @@
 """Targets of acts in performances: before the next join and hold, at moments, and in the report."""
 
+from dataclasses import replace
+
 import acting
 import msgspec
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.model_file.model_card import Event
+from posefield.motion.measures import Measure
 from posefield.performance import act_motion, composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
@@ -27,8 +30,17 @@ def find(models):
     own = reach.session.card.event
     library["free"] = acting.with_card(reach, event=None)
     library["early"] = acting.with_card(reach, event=Event(own.joint, 0.5))
+    library["standing"] = measured_at_start(reach)
     library["cmu_walk"] = model_registry.load([model_registry.SHIPPED_FOLDER]).find("cmu_walk")
     return ModelRegistry(library).find
+
+
+def measured_at_start(model):
+    """The model with the height of its hips measured in the first pose."""
+    control = model.session.card.control("hip_height")
+    measured = replace(control, measure=Measure("height", (0,), "start"))
+    controls = [measured if own is control else own for own in model.session.card.controls]
+    return acting.with_card(model, controls=tuple(controls))
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +116,22 @@ def test_the_report_tells_how_far_the_character_stays_from_a_target(find):
     (warning,) = [own for own in answer.trust.script_warnings if "target" in own.message]
     assert warning.pointer == "/segments/0/targets/0"
     assert warning.message == f"stays {100.0 * missed:.1f} cm from its target: out of reach"
+
+
+@pytest.mark.parametrize("height", [0.8, 1.0])
+def test_controls_of_the_first_pose_are_those_of_the_pose_that_an_act_goes_on_from(find, height):
+    first = {"kind": "act", "model": "standing", "controls": {"hip_height": height}}
+    then, hold = {"kind": "act", "model": "standing"}, {"kind": "hold", "seconds": 0.2}
+    answer = performed(find, first, hold, then)
+    begins, controls = answer.trust.segments[2].begins, answer.trust.segments[2].controls
+    met = answer.clip.root_path[round(60 * begins), 1]
+    assert controls["hip_height"] == pytest.approx(met, abs=0.01)
+    # A control that the script gives stays; one that is not measured there is typical.
+    given = performed(find, first, hold, {**then, "controls": {"hip_height": 0.6}}).trust
+    assert given.segments[2].controls["hip_height"] == 0.6
+    first, then = ({**act, "model": "reach"} for act in (first, then))
+    typical = performed(find, first, hold, then).trust.segments[2].controls["hip_height"]
+    assert abs(typical - met) > 0.1
 
 
 @pytest.mark.parametrize("joint", ["LeftHand", "RightHand"])
