@@ -26,6 +26,7 @@ from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle, Interval
 from posefield.motion import skeleton
 from posefield.motion.contact_detection import FootContact
+from posefield.motion.hinges import Hinge
 from posefield.question.floor import LEVEL_FLOOR, Floor
 
 # A foot that is led to two places that are farther apart does not stand on both, m.
@@ -240,12 +241,16 @@ class LimbChoice:
 
 
 def choose_limbs(
-    parents: tuple[int, ...], bones: Bones, feet: Sequence[int], exact_joints: Iterable[int]
+    parents: tuple[int, ...],
+    bones: Bones,
+    feet: Sequence[int],
+    exact_joints: Iterable[int],
+    hinges: Sequence[Hinge] = (),
 ) -> LimbChoice:
     """Return the legs of feet, and the limbs that keep the paths of joints with constraints.
 
     exact_joints: joints whose positions are exact. A leg with such a joint keeps its path; a joint
-    of the trunk keeps the root at its height.
+    of the trunk keeps the root at its height. hinges: of the skeleton, as far as known.
     """
     joints = set(exact_joints)
     legs: dict[int, Limb] = {}
@@ -253,7 +258,7 @@ def choose_limbs(
     kept_limbs: list[Limb] = []
     used: set[int] = set()
     for index, foot in enumerate(feet):
-        leg = limbs.find_limb(parents, bones, foot)
+        leg = limbs.find_limb(parents, bones, foot, hinges)
         chain = set() if leg is None else {leg.upper, leg.middle, leg.lower}
         if leg is None:
             left.append((foot, "is as predicted: no two bones lead to it"))
@@ -268,18 +273,22 @@ def choose_limbs(
         else:
             legs[index] = leg
         used |= chain
-    arms, fixed = _arms(parents, bones, joints, used)
+    arms, fixed = _arms(parents, bones, joints, used, hinges)
     character = Character(parents, bones, tuple(legs.values()), (*kept_limbs, *arms), fixed)
     return LimbChoice(character, tuple(legs), tuple(left))
 
 
 def _arms(
-    parents: tuple[int, ...], bones: Bones, joints: set[int], used: set[int]
+    parents: tuple[int, ...],
+    bones: Bones,
+    joints: set[int],
+    used: set[int],
+    hinges: Sequence[Hinge],
 ) -> tuple[list[Limb], bool]:
     """Return the limbs that keep the paths of joints, and whether a joint has none."""
     arms: list[Limb] = []
     for joint in sorted(joints):
-        limb = limbs.find_kept_limb(parents, bones, joint)
+        limb = limbs.find_kept_limb(parents, bones, joint, hinges)
         chain = set() if limb is None else {limb.upper, limb.middle, limb.lower}
         if limb is None or chain & used:
             if limb in arms or any(

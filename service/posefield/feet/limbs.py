@@ -12,6 +12,7 @@ from posefield.common import frame_groups
 from posefield.common.frame_groups import FrameGroups
 from posefield.common.units import Bones, Floats
 from posefield.motion import skeleton
+from posefield.motion.hinges import Hinge
 
 Points = Annotated[Floats, "frames 3"]
 Turns = Annotated[Floats, "frames 4"]
@@ -23,13 +24,15 @@ class Limb:
     """Joints of a limb: hip, knee, ankle and ball of a leg, or shoulder, elbow, wrist and tip.
 
     upper, middle, lower: indices; each is the parent of the next. tip: the joint that is placed;
-    `lower`, or a descendant of it that moves with it.
+    `lower`, or a descendant of it that moves with it. hinge: limits of the middle joint; None where
+    they are unknown.
     """
 
     upper: int
     middle: int
     lower: int
     tip: int
+    hinge: Hinge | None = None
 
 
 @dataclass(frozen=True)
@@ -87,17 +90,20 @@ class LimbPoses:
         return self.groups.means(values)[self.groups.group]
 
 
-def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
+def find_limb(
+    parents: Sequence[int], bones: Bones, tip: int, hinges: Sequence[Hinge] = ()
+) -> Limb | None:
     """Return the limb that ends at a joint; None if the chain above it has no two bones.
 
     The limb's end is the joint or its parent, as the ball of a foot has an ankle above it: the one
     whose two bones have lengths that are more alike. A limb does not begin at the root, whose
-    rotation would turn the whole character.
+    rotation would turn the whole character. hinges: of the skeleton, as far as known.
     """
+    hinge_of = {hinge.joint: hinge for hinge in hinges}
     chain = skeleton.joint_chain(tuple(parents), tip)[::-1]
     # The ankle is the tip's parent, or the tip itself. The joint above the hip exists in both.
     candidates = [
-        Limb(chain[first + 2], chain[first + 1], chain[first], tip)
+        Limb(chain[first + 2], chain[first + 1], chain[first], tip, hinge_of.get(chain[first + 1]))
         for first in (1, 0)
         if len(chain) > first + 3
     ]
@@ -109,12 +115,14 @@ def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
     return candidates[int(np.argmax(scores))] if max(scores, default=0.0) > 0.0 else None
 
 
-def find_kept_limb(parents: Sequence[int], bones: Bones, joint: int) -> Limb | None:
+def find_kept_limb(
+    parents: Sequence[int], bones: Bones, joint: int, hinges: Sequence[Hinge] = ()
+) -> Limb | None:
     """Return the limb by which a joint can be moved alone; None for a joint of the trunk.
 
     Less than half of the joints hang from such a limb.
     """
-    limb = find_limb(parents, bones, joint)
+    limb = find_limb(parents, bones, joint, hinges)
     if limb is None:
         return None
     below = skeleton.descendant_matrix(tuple(parents))[limb.upper].sum()

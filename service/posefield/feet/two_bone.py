@@ -1,8 +1,9 @@
 """Inverse kinematics of a limb of two bones, in closed form.
 
 The limb turns about its upper joint towards its target and bends in the plane in which it bent
-before (law of cosines). Each bone is turned by the shortest rotation from its old direction to the
-new one, so that no axes of joints are assumed. The end keeps its orientation.
+before (law of cosines). Where the limits of its middle joint are known, this bends about its hinge
+alone, within its captured range. Otherwise each bone is turned by the shortest rotation from its
+old direction to the new one, so that no axes of joints are assumed. The end keeps its orientation.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,8 @@ import numpy as np
 from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Booleans, Floats, Frames
 from posefield.feet.limbs import Limb, LimbPoses, Points, Turns, Values
-from posefield.motion import quat
+from posefield.motion import hinges, quat
+from posefield.motion.hinges import FREE, Hinge
 
 # A limb is not stretched beyond this share of its length; from 5 mm before it on it resists.
 REACH, SOFTNESS = 0.995, 0.005
@@ -47,10 +49,24 @@ class LimbTurns:
 
 def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
     """Return the distance (F,), m, up to which the end of a limb follows its target exactly."""
-    length = poses.length(limb.middle) + poses.length(limb.lower)
+    _, length = distances(poses, limb)
     source = np.linalg.norm(poses.position(limb.lower) - poses.position(limb.upper), axis=-1)
     reach: Values = np.maximum(source, REACH * length - SOFTNESS)
     return reach
+
+
+def distances(poses: LimbPoses, limb: Limb) -> tuple[Values, Values]:
+    """Return the smallest and the largest distance of a limb's ends, m: (1,), or (F,) for groups.
+
+    The middle joint is within the captured range of its hinge; without one, it bends by any angle.
+    """
+    above, below = poses.length(limb.middle), poses.length(limb.lower)
+    if limb.hinge is None:
+        return np.abs(above - below), above + below
+    squares, products = np.square(above) + np.square(below), 2.0 * above * below
+    bends = np.clip([limb.hinge.high[0] + FREE, limb.hinge.low[0] - FREE], 0.0, np.pi)
+    shortest, longest = (np.sqrt(squares + np.cos(bend) * products) for bend in bends)
+    return shortest, longest
 
 
 def soften(
@@ -74,11 +90,11 @@ def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points
     shift: movement (F, 3), m, of the upper joint from its place in the poses. target: (F,
     3), m; it is approached along its direction if it is out of reach.
     """
-    above, below = poses.length(limb.middle), poses.length(limb.lower)
+    shortest, longest = distances(poses, limb)
     offset = target - poses.position(limb.upper) - shift
     distance = np.linalg.norm(offset, axis=-1)
-    soft = soften(distance, firm_reach(poses, limb), above + below)
-    within = np.clip(soft, 1.001 * np.abs(above - below) + 1e-6, above + below)
+    soft = soften(distance, firm_reach(poses, limb), longest)
+    within = np.maximum(soft, 1.001 * shortest + 1e-6)
     end: Points = offset * (within / np.maximum(distance, 1e-9))[..., None]
     return end
 
@@ -88,6 +104,8 @@ def solve(poses: LimbPoses, limb: Limb, end: Points) -> LimbTurns:
 
     end: vectors (F, 3), m, from the limb's upper joint. The end's orientation is kept.
     """
+    if limb.hinge:
+        return _solve_hinged(poses, limb, limb.hinge, end)
     above, below = poses.length(limb.middle), poses.length(limb.lower)
     upper, middle = poses.position(limb.upper), poses.position(limb.middle)
     lower = poses.position(limb.lower)
@@ -102,6 +120,29 @@ def solve(poses: LimbPoses, limb: Limb, end: Points) -> LimbTurns:
     return LimbTurns(
         quat.mul(quat.conj(poses.parent_orientation(limb.upper)), thigh),
         quat.mul(quat.conj(thigh), shin),
+        quat.mul(quat.conj(shin), poses.orientation(limb.lower)),
+    )
+
+
+def _solve_hinged(poses: LimbPoses, limb: Limb, hinge: Hinge, end: Points) -> LimbTurns:
+    """Return rotations as `solve` does, of a limb whose middle joint keeps its limits.
+
+    The middle joint bends about its axis to the wanted distance, and the limb turns about its upper
+    joint by the smallest rotation towards the end.
+    """
+    limits = hinges.one_joint(hinge)
+    upper, frame = poses.position(limb.upper), poses.orientation(limb.upper)
+    inner = poses.orientation(limb.middle)
+    above = quat.rotate(quat.conj(frame), poses.position(limb.middle) - upper)
+    below = quat.rotate(quat.conj(inner), poses.position(limb.lower) - poses.position(limb.middle))
+    bent = quat.mul(quat.conj(frame), inner)[:, None]
+    bent = limits.bend(bent, above, below, np.sum(np.square(end), axis=-1))[:, 0]
+    towards = quat.rotate(frame, above + quat.rotate(bent, below))
+    thigh = quat.mul(shortest_turn(towards, end), frame)
+    shin = quat.mul(thigh, bent)
+    return LimbTurns(
+        quat.mul(quat.conj(poses.parent_orientation(limb.upper)), thigh),
+        bent,
         quat.mul(quat.conj(shin), poses.orientation(limb.lower)),
     )
 

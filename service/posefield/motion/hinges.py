@@ -7,6 +7,7 @@ the joint, as a forearm twists, and sideways.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -121,6 +122,34 @@ class Hinges:
         slopes: Floats = np.swapaxes(self.axes, -1, -2) @ (shares[..., None] * self.axes)
         return slopes
 
+    def bend(
+        self,
+        rotations: Annotated[Floats, "frames 1 4"],
+        above: Annotated[Floats, "frames 3"],
+        below: Annotated[Floats, "frames 3"],
+        squares: Annotated[Floats, "frames"],
+    ) -> Annotated[Floats, "frames 1 4"]:
+        """Return the rotations (F, 1, 4) with which the ends of a limb of one hinge are apart.
+
+        above, below: bones (F, 3), m, in the frames of the parent and of the joint. squares: of the
+        distances (F,), m². What is off the hinge stays, within the limits.
+        """
+        angles = self.limit(self.angles(rotations))
+        straight = angles * [0.0, 1.0, 1.0]
+        axis, reference = self.axes[0, 0], self.frames[0, 0]
+        turned = quat.rotate(self._rotations(straight, rotations)[:, 0], below)
+        lower = quat.rotate(quat.conj(reference), turned)
+        upper = quat.rotate(quat.conj(reference), above)
+        # upper . exp(axis t) lower = constant + cosine cos t + sine sin t
+        constant = (upper @ axis) * (lower @ axis)
+        cosine = np.sum(upper * lower, axis=-1) - constant
+        sine = np.sum(upper * quat.cross(axis, lower), axis=-1)
+        sizes = np.sum(np.square(above), axis=-1) + np.sum(np.square(below), axis=-1)
+        share = (0.5 * (squares - sizes) - constant) / np.hypot(cosine, sine)
+        flexion = np.arctan2(sine, cosine) + np.arccos(np.clip(share, -1.0, 1.0))
+        angles[..., 0] = flexion[:, None]
+        return self._rotations(self.limit(angles), rotations)
+
     def _components(self, turns: HingeRotations) -> HingeRotations:
         # Not a matrix product, whose sums could go in another order for more poses.
         frames, w, x, y, z = self.frames, *(turns[..., None, axis] for axis in range(4))
@@ -165,6 +194,12 @@ def from_card(hinges: Sequence[Hinge]) -> Hinges:
     low, high = (np.array([getattr(h, end) for h in hinges]).reshape(-1, 3) for end in RANGE)
     joints = tuple(hinge.joint for hinge in hinges)
     return Hinges(joints, quat.mul(references, turns), axes, low, high)
+
+
+@lru_cache(64)
+def one_joint(hinge: Hinge) -> Hinges:
+    """Return the limits of one hinge, whose joint has the index 0."""
+    return from_card([replace(hinge, joint=0)])
 
 
 def _axes(hinge: Hinge) -> Annotated[Floats, "3 3"]:

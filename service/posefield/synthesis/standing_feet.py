@@ -55,7 +55,11 @@ def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
     placed, requests = [], []
     for draft in drafts:
         limbs_of_draft = footsteps.choose_limbs(
-            card.skeleton.parents, draft.answer.bone_offsets, feet, _held_joints(draft)
+            card.skeleton.parents,
+            draft.answer.bone_offsets,
+            feet,
+            _held_joints(draft),
+            card.hinges,
         )
         if limbs_of_draft.feet:
             placed.append(draft)

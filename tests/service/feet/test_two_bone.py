@@ -1,11 +1,14 @@
 """Limbs: which are found, and inverse kinematics of two bones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from posefield.feet import footsteps, limbs, two_bone
 from posefield.feet.limbs import Limb
-from posefield.motion import quat, skeleton
+from posefield.motion import hinges, quat, skeleton
+from posefield.motion.hinges import FREE, MOST
 
 # Root, hip joint of no length, hip, knee, ankle, ball; spine, chest, shoulder, elbow, wrist, hand;
 # the other shoulder, elbow and wrist, and a head.
@@ -85,6 +88,53 @@ def test_the_end_reaches_its_target_and_keeps_its_orientation(rng):
     assert np.abs(same - 1.0).max() < 1e-12
     others = [joint for joint in range(16) if joint not in (2, 3, 4, 5)]
     assert np.abs(after[:, others] - before[:, others] - shift[:, None]).max() < 1e-12
+
+
+def off_hinge(rotations):
+    """Largest angle of a knee off an axis along x, rad."""
+    return np.abs(quat.log(rotations[:, LEG.middle])[:, 1:]).max()
+
+
+def test_a_knee_with_a_hinge_bends_about_its_axis_alone(rng):
+    rotations, roots = poses(rng)
+    rotations[:, LEG.middle] = flexed(np.linspace(0.2, 1.4, 30))
+    bones = (np.tile(BONES[joint], (30, 1)) for joint in (LEG.middle, LEG.lower))
+    knee = replace(hinges.measure(3, rotations[:, LEG.middle], *bones), joint=LEG.middle)
+    before, oriented = forward(rotations, roots)
+    leg = limbs.find_limb(PARENTS, BONES, LEG.tip, [knee])
+    assert leg == replace(LEG, hinge=knee)
+    found = limbs.evaluate_joints(PARENTS, BONES, [LEG.tip], rotations, roots)
+    target = before[:, LEG.lower] + 0.06 * rng.normal(size=(30, 3)) + [0.0, 0.05, 0.0]
+    end = two_bone.reach(found, leg, np.zeros((30, 3)), target)
+    turned = moved(rotations, leg, two_bone.solve(found, leg, end))
+    after, now = forward(turned, roots)
+    assert np.abs(after[:, LEG.lower] - before[:, LEG.upper] - end).max() < 1e-9
+    same = np.abs(np.sum(now[:, LEG.lower] * oriented[:, LEG.lower], axis=-1))
+    assert np.abs(same - 1.0).max() < 1e-12
+    assert off_hinge(turned) < np.radians(0.1)
+    # Negative control: without its hinge the knee turns off its axis.
+    free = moved(rotations, LEG, two_bone.solve(found, LEG, end))
+    assert off_hinge(free) > np.radians(3.0)
+
+
+def test_a_knee_with_a_hinge_stays_within_its_range(rng):
+    rotations, roots = poses(rng)
+    rotations[:, LEG.middle] = flexed(np.linspace(0.4, 1.0, 30))
+    bones = (np.tile(BONES[joint], (30, 1)) for joint in (LEG.middle, LEG.lower))
+    leg = replace(LEG, hinge=hinges.measure(LEG.middle, rotations[:, LEG.middle], *bones))
+    found = limbs.evaluate_joints(PARENTS, BONES, [LEG.tip], rotations, roots)
+    for scale, bound in ((0.5, 1.0 + MOST), (1.5, 0.4 - MOST)):
+        chord = found.position(LEG.lower) - found.position(LEG.upper)
+        bent = two_bone.solve(found, leg, scale * chord).middle
+        flexion = quat.log(bent)[:, 0]
+        assert (np.abs(flexion - 0.7) < 0.3 + MOST + 1e-4).all()
+        assert flexion[0 if scale > 1.0 else -1] == pytest.approx(bound, abs=0.02)
+        # Within the reach of the hinge, the end is met and the angle is within FREE.
+        end = two_bone.reach(
+            found, leg, np.zeros((30, 3)), found.position(LEG.upper) + scale * chord
+        )
+        flexion = quat.log(two_bone.solve(found, leg, end).middle)[:, 0]
+        assert (0.4 - FREE - 0.01 < flexion).all() and (flexion < 1.0 + FREE + 0.01).all()
 
 
 def test_a_limb_out_of_reach_is_never_stretched(rng):
