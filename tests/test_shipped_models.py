@@ -132,6 +132,16 @@ def test_the_reach_is_what_its_recipe_makes(posefield, tmp_path):
     assert_trained_again("reaching", made.read_bytes())
 
 
+def test_scripts_open_the_models_that_they_name_alone():
+    model_registry.shipped_model.cache_clear()
+    found = model_registry.with_shipped([])
+    assert tuple(found.models) == NAMES
+    assert model_registry.shipped_model.cache_info().currsize == 0
+    walk = found.find("cmu_walk")
+    assert found.find(walk.identity) is walk
+    assert model_registry.shipped_model.cache_info().currsize == 1
+
+
 @pytest.mark.system
 def test_serve_without_places_serves_the_shipped_models():
     with serving.process() as child:

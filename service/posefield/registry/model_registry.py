@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from itertools import accumulate, chain, takewhile
 from pathlib import Path
 from typing import Protocol
@@ -46,7 +46,7 @@ class ModelRegistry:
     those of one name from newer to older.
     """
 
-    models: dict[str, Synthesizer]
+    models: Mapping[str, Synthesizer]
     older: tuple[Synthesizer, ...] = ()
 
     def find(self, key: str) -> Synthesizer:
@@ -54,14 +54,14 @@ class ModelRegistry:
 
         Raises UnknownModel, with the available identities, for any other key.
         """
-        model = self._by_key.get(key)
-        if model is None:
-            name = key.partition("@")[0]
-            near = self.versions(name) or tuple(self._by_key[key] for key in self.models)
-            identities = ", ".join(model.identity for model in near)
-            hint = "" if name in self.models else did_you_mean(name, self.models)
-            raise UnknownModel("model", f"no model {key!r}{hint}; there are {identities}")
-        return model
+        name = key.partition("@")[0]
+        versions = self.versions(name)
+        for model in versions:
+            if key in (model.name, model.identity):
+                return model
+        identities = ", ".join(model.identity for model in versions or self.models.values())
+        hint = "" if versions else did_you_mean(name, self.models)
+        raise UnknownModel("model", f"no model {key!r}{hint}; there are {identities}")
 
     def versions(self, name: str) -> tuple[Synthesizer, ...]:
         """Return all versions of a name, the newest first; empty for an unknown name."""
@@ -77,11 +77,6 @@ class ModelRegistry:
     def identities(self) -> tuple[str, ...]:
         """Identities of the newest models, then of the older ones."""
         return tuple(model.identity for model in chain(self.models.values(), self.older))
-
-    @cached_property
-    def _by_key(self) -> dict[str, Synthesizer]:
-        versions = chain(self.models.values(), self.older)
-        return {**self.models, **{model.identity: model for model in versions}}
 
 
 @dataclass(frozen=True)
@@ -455,7 +450,33 @@ def file_or_shipped(path: Path) -> Path:
     raise ModelError(path, f"no such file, expected one or a shipped model: {expected}")
 
 
+@cache
+def shipped_model(name: str) -> Synthesizer:
+    """Return a shipped model, which a process opens once; KeyError for an unknown name."""
+    file = SHIPPED_FOLDER / f"{name}.onnx"
+    if not NAME.fullmatch(name) or not file.exists():
+        raise KeyError(name)
+    return load([file]).models[name]
+
+
+class ShippedModels(Mapping[str, Synthesizer]):
+    """The shipped models, each opened when it is first asked for, and others beside them."""
+
+    def __init__(self, others: Mapping[str, Synthesizer]) -> None:
+        """others: by name; they win where names are equal."""
+        self._others = others
+
+    def __getitem__(self, name: str) -> Synthesizer:
+        return self._others[name] if name in self._others else shipped_model(name)
+
+    def __iter__(self) -> Iterator[str]:
+        shipped = (file.stem for file in sorted(SHIPPED_FOLDER.glob("*.onnx")))
+        return iter(dict.fromkeys(chain(shipped, self._others)))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
 def with_shipped(paths: Sequence[Path]) -> ModelRegistry:
     """Return the shipped models and those of files and folders, which win where names are equal."""
-    models = load(paths).models if paths else {}
-    return ModelRegistry({**load([SHIPPED_FOLDER]).models, **models})
+    return ModelRegistry(ShippedModels(load(paths).models if paths else {}))
