@@ -33,7 +33,7 @@ def widened(known: Sequence[Hinge], examples: Sequence[Example]) -> tuple[Hinge,
     if not known:
         return ()
     rotations = np.concatenate([example.clip.rotations for example in examples])
-    angles = hinges.from_card(known).angles(rotations)
+    angles = hinges.from_card(tuple(known)).angles(rotations)
     lows, highs = angles.min(axis=0), angles.max(axis=0)
     return tuple(
         replace(

@@ -22,7 +22,7 @@ class ConstrainedMotion:
 
     numbers: the motion as the variables of the correction. state: the model's prediction.
     results: error of each constraint. steps: of the correction. distance: Mahalanobis distance of
-    the constraints from the prediction.
+    the constraints from the prediction. is_take: whether it deviates from the prediction at random.
     """
 
     scene: MotionVariables
@@ -31,6 +31,7 @@ class ConstrainedMotion:
     results: tuple[ConstraintResult, ...]
     steps: int = 0
     distance: float = 0.0
+    is_take: bool = False
 
     @property
     def duration(self) -> float:
@@ -79,6 +80,10 @@ def evaluate_poses(
     ]
     products, roots = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
     rotations = first.reduced.rotations_of(products)
+    if len(first.hinges):
+        pairs_of_centres = zip(motions, frames, strict=True)
+        centres = [motion.scene.hinge_centres(at) for motion, at in pairs_of_centres]
+        rotations = first.hinges.within(rotations, np.concatenate(centres))
     if first.cyclic:
         travel = np.array([motion.travel for motion in motions])[groups.group]
         share = np.concatenate(frames) / (first.reduced.frames - 1)

@@ -29,7 +29,7 @@ from posefield.inference.reduced_motion import ReducedTensor, ResidualCovariance
 from posefield.inference.session import PredictionState, Session
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import measures
+from posefield.motion import hinges, measures
 from posefield.motion.measures import MeasuredMotion
 from posefield.question.results import ConstraintResult
 
@@ -58,12 +58,12 @@ class LevelCorrector:
 
     def predict(self, state: PredictionState) -> ConstrainedMotion:
         """Return the predicted motion, without constraints."""
-        scene = MotionVariables(
-            self.reduced, self.card.skeleton.parents, state.bones, self.card.cyclic
-        )
         inner = self.reduced.motion(state.coefficients).ravel()
         outer = [np.log(state.duration), *state.travel] if self.card.cyclic else []
-        return ConstrainedMotion(scene, np.concatenate([inner, outer]), state, ())
+        numbers, limits = np.concatenate([inner, outer]), hinges.from_card(self.card.hinges)
+        parents, cyclic = self.card.skeleton.parents, self.card.cyclic
+        scene = MotionVariables(self.reduced, parents, state.bones, cyclic, numbers, limits)
+        return ConstrainedMotion(scene, numbers, state, ())
 
     def solve_all(self, tasks: Sequence[CorrectionTask]) -> list[ConstrainedMotion]:
         """Return the motions nearest to others that satisfy constraints.
@@ -125,7 +125,7 @@ def build_corrector(session: Session, level: int) -> LevelCorrector:
 def _kind(motion: ConstrainedMotion, aims: Sequence[Constraint]) -> tuple[object, ...]:
     """Return what tasks have in common that are solved at once."""
     kinds = tuple((aim.kind, len(aim.target)) for aim in aims)
-    return kinds, len(motion.numbers), motion.scene.predicted is None
+    return kinds, len(motion.numbers), motion.is_take
 
 
 @dataclass(frozen=True)
@@ -194,9 +194,9 @@ def _correct_alike(
     first = np.stack([motion.numbers for motion, _ in tasks])
     looked = constraint.evaluate_many(aims, scenes, first)
     predicted, looked_at_predicted = first, looked
-    if scenes[0].predicted is not None:
+    if tasks[0][0].is_take:
         # A take deviates from the prediction already; the spread is that about the prediction.
-        predicted = np.stack([scene.predicted for scene in scenes if scene.predicted is not None])
+        predicted = np.stack([scene.predicted for scene in scenes])
         looked_at_predicted = constraint.evaluate_many(aims, scenes, predicted)
     reach = reachability.assess(spread, tasks, predicted, *looked_at_predicted)
     goals = looked_at_predicted[0] + reach.reachable

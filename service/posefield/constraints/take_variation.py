@@ -90,8 +90,7 @@ class TakeVariation:
             seeds = np.array([take.seed])
             changes = self.changes(corrector, question.point, question.labels, seeds)
             numbers = motion.numbers + take.variety * changes[0]
-            scene = replace(motion.scene, predicted=motion.numbers)
-            motion = replace(motion, scene=scene, numbers=numbers)
+            motion = replace(motion, numbers=numbers, is_take=True)
         if not take.detail:
             return motion
         detailed = replace(corrector.reduced, detail=self.detail(corrector, take.seed))

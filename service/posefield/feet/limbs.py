@@ -110,8 +110,9 @@ def find_limb(
     scores = []
     for limb in candidates:
         lengths = [math.hypot(*bones[joint].tolist()) for joint in (limb.middle, limb.lower)]
-        # The shorter bone over the longer one.
-        scores.append(min(lengths) / max(lengths) if max(lengths) > 0.0 else 0.0)
+        # The shorter bone over the longer one; a known knee or elbow comes first.
+        score = min(lengths) / max(lengths) if max(lengths) > 0.0 else 0.0
+        scores.append(score + (limb.hinge is not None))
     return candidates[int(np.argmax(scores))] if max(scores, default=0.0) > 0.0 else None
 
 

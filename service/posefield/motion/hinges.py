@@ -8,7 +8,7 @@ the joint, as a forearm twists, and sideways.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -48,6 +48,17 @@ class Hinge:
     high: Triple
 
 
+class LimitedAngles(NamedTuple):
+    """Angles (..., H, 3), rad, within the limits.
+
+    shares: their slopes by the angles before. beyond: whether a hinge (..., H) was changed.
+    """
+
+    angles: Angles
+    shares: Angles
+    beyond: Annotated[Booleans, "*poses hinges"]
+
+
 @dataclass(frozen=True)
 class Hinges:
     """Limits of H joints.
@@ -69,58 +80,82 @@ class Hinges:
 
     def of_chain(self, links: Sequence[int]) -> "Hinges":
         """Return the hinges among some joints, with their places there as indices."""
-        kept = [row for row, joint in enumerate(self.joints) if joint in links]
-        places = tuple(links.index(self.joints[row]) for row in kept)
-        arrays = self.frames, self.axes, self.low, self.high
-        return Hinges(places, *(array[kept] for array in arrays))
+        rows = [row for row, joint in enumerate(self.joints) if joint in links]
+        places = tuple(links.index(self.joints[row]) for row in rows)
+        return Hinges(places, *(a[rows] for a in (self.frames, self.axes, self.low, self.high)))
 
     def angles(self, rotations: Annotated[Floats, "*poses joints 4"]) -> Angles:
         """Return the angles (..., H, 3), rad, of the hinges in local rotations (..., J, 4).
 
         The flexion is the one nearest to the middle of its range.
         """
-        return self._angles(self._components(rotations[..., list(self.joints), :]))
+        return self.turn_angles(rotations[..., list(self.joints), :])
 
     def within(
-        self, rotations: Annotated[Floats, "*poses joints 4"]
+        self, rotations: Annotated[Floats, "*poses joints 4"], centres: Angles | None = None
     ) -> Annotated[Floats, "*poses joints 4"]:
-        """Return local rotations (..., J, 4) whose hinges are within their limits.
+        """Return local rotations (..., J, 4) whose hinges are within their limits, as by `limit`.
 
-        Angles beyond the captured range by up to FREE stay; larger ones approach MOST smoothly. The
-        same array where none is larger.
+        The same array where they are.
         """
         turns = rotations[..., list(self.joints), :]
-        angles = self._angles(self._components(turns))
-        beyond = self.beyond(angles)
-        if not beyond.any():
+        limited = self.limit(self.turn_angles(turns), centres)
+        if not limited.beyond.any():
             return rotations
-        limited = self._rotations(self.limit(angles), turns)
         bounded = rotations.copy()
-        bounded[..., list(self.joints), :] = np.where(
-            beyond.any(axis=-1, keepdims=True), limited, turns
-        )
+        bounded[..., list(self.joints), :] = self.limited_turns(turns, limited)
         return bounded
 
-    def beyond(self, angles: Angles) -> Annotated[Booleans, "*poses hinges 3"]:
-        """Return which angles (..., H, 3) exceed the captured range by more than FREE."""
-        exceeds: Booleans = (angles < self.low - FREE) | (angles > self.high + FREE)
-        return exceeds
+    def limit(self, angles: Angles, centres: Angles | None = None) -> LimitedAngles:
+        """Return angles (..., H, 3) that are at most MOST beyond their captured range.
 
-    def limit(self, angles: Angles) -> Angles:
-        """Return angles (..., H, 3), rad, within the limits."""
-        within = np.clip(angles, self.low - FREE, self.high + FREE)
-        limited: Floats = within + (MOST - FREE) * np.tanh((angles - within) / (MOST - FREE))
-        return limited
+        centres: angles about which they deviate; half of the way from them to the limit is free,
+        and larger deviations approach the limit smoothly. Without them, what is beyond the range by
+        up to FREE is free.
+        """
+        near = np.clip(angles if centres is None else centres, self.low, self.high)
+        away = angles - near
+        away[..., 0] -= 2.0 * np.pi * np.round(away[..., 0] / (2.0 * np.pi))
+        room = MOST + np.where(away > 0.0, self.high - near, near - self.low)
+        free = FREE if centres is None else 0.5 * room
+        excess = (np.abs(away) - free) / (room - free)
+        beyond = excess > 0.0
+        # Zero where nothing is beyond: the hyperbolic functions of no excess are 0 and 1.
+        excess = np.where(beyond, excess, 0.0)
+        saturated = near + np.sign(away) * (free + (room - free) * np.tanh(excess))
+        limited = np.where(beyond, saturated, angles)
+        return LimitedAngles(limited, 1.0 / np.square(np.cosh(excess)), beyond.any(axis=-1))
 
-    def slopes(self, angles: Angles) -> Annotated[Floats, "*poses hinges 3 3"]:
+    def limited_turns(self, turns: HingeRotations, limited: LimitedAngles) -> HingeRotations:
+        """Return the rotations (..., H, 4) of limited angles; those within the limits as before."""
+        return np.where(limited.beyond[..., None], self._rotations(limited.angles, turns), turns)
+
+    def slopes(self, limited: LimitedAngles) -> Annotated[Floats, "*poses hinges 3 3"]:
         """Return the matrices (..., H, 3, 3) by which limits scale small turns of the joints.
 
         Both turns are in the joint's frame; to first order in the angles off the hinge.
         """
-        within = np.clip(angles, self.low - FREE, self.high + FREE)
-        shares = 1.0 / np.square(np.cosh((angles - within) / (MOST - FREE)))
-        slopes: Floats = np.swapaxes(self.axes, -1, -2) @ (shares[..., None] * self.axes)
+        scaled = limited.shares[..., None] * self.axes
+        slopes: Floats = np.swapaxes(self.axes, -1, -2) @ scaled
         return slopes
+
+    def turn_angles(self, turns: HingeRotations) -> Angles:
+        """Return the angles (..., H, 3), rad, of rotations (..., H, 4) as `angles` does."""
+        # Not a matrix product, whose sums could go in another order for more poses.
+        frames = self.frames
+        w, x, y, z = (turns[..., None, axis] for axis in range(4))
+        components = (
+            frames[..., 0] * w + frames[..., 1] * x + frames[..., 2] * y + frames[..., 3] * z
+        )
+        real, flexed, twisted, aside = (components[..., axis] for axis in range(4))
+        middle = 0.5 * (self.low + self.high)[:, 0]
+        flexion = 2.0 * np.arctan2(flexed, real)
+        flexion -= 2.0 * np.pi * np.round((flexion - middle) / (2.0 * np.pi))
+        size = np.hypot(real, flexed)
+        cosine, sine = real / np.maximum(size, 1e-12), flexed / np.maximum(size, 1e-12)
+        twist = 2.0 * np.arctan2(cosine * twisted + sine * aside, size)
+        sideways = 2.0 * np.arctan2(cosine * aside - sine * twisted, size)
+        return np.stack([flexion, twist, sideways], axis=-1)
 
     def bend(
         self,
@@ -134,7 +169,7 @@ class Hinges:
         above, below: bones (F, 3), m, in the frames of the parent and of the joint. squares: of the
         distances (F,), m². What is off the hinge stays, within the limits.
         """
-        angles = self.limit(self.angles(rotations))
+        angles = self.limit(self.turn_angles(rotations)).angles
         straight = angles * [0.0, 1.0, 1.0]
         axis, reference = self.axes[0, 0], self.frames[0, 0]
         turned = quat.rotate(self._rotations(straight, rotations)[:, 0], below)
@@ -148,26 +183,7 @@ class Hinges:
         share = (0.5 * (squares - sizes) - constant) / np.hypot(cosine, sine)
         flexion = np.arctan2(sine, cosine) + np.arccos(np.clip(share, -1.0, 1.0))
         angles[..., 0] = flexion[:, None]
-        return self._rotations(self.limit(angles), rotations)
-
-    def _components(self, turns: HingeRotations) -> HingeRotations:
-        # Not a matrix product, whose sums could go in another order for more poses.
-        frames, w, x, y, z = self.frames, *(turns[..., None, axis] for axis in range(4))
-        components: Floats = (
-            frames[..., 0] * w + frames[..., 1] * x + frames[..., 2] * y + frames[..., 3] * z
-        )
-        return components
-
-    def _angles(self, components: HingeRotations) -> Angles:
-        real, flexed, twisted, aside = (components[..., axis] for axis in range(4))
-        middle = 0.5 * (self.low + self.high)[:, 0]
-        flexion = 2.0 * np.arctan2(flexed, real)
-        flexion -= 2.0 * np.pi * np.round((flexion - middle) / (2.0 * np.pi))
-        size = np.hypot(real, flexed)
-        cosine, sine = real / np.maximum(size, 1e-12), flexed / np.maximum(size, 1e-12)
-        twist = 2.0 * np.arctan2(cosine * twisted + sine * aside, size)
-        sideways = 2.0 * np.arctan2(cosine * aside - sine * twisted, size)
-        return np.stack([flexion, twist, sideways], axis=-1)
+        return self._rotations(self.limit(angles).angles, rotations)
 
     def _rotations(self, angles: Angles, near: HingeRotations) -> HingeRotations:
         """Return the rotations of angles, with the signs of the rotations `near`."""
@@ -185,7 +201,8 @@ class Hinges:
         return quat.normalize(np.where(same, turns, -turns))
 
 
-def from_card(hinges: Sequence[Hinge]) -> Hinges:
+@lru_cache(64)
+def from_card(hinges: tuple[Hinge, ...]) -> Hinges:
     """Return the limits of the hinges of a model card."""
     axes = np.array([_axes(hinge) for hinge in hinges]).reshape(-1, 3, 3)
     references = quat.normalize(np.array([h.reference for h in hinges]).reshape(-1, 1, 4))
@@ -199,7 +216,7 @@ def from_card(hinges: Sequence[Hinge]) -> Hinges:
 @lru_cache(64)
 def one_joint(hinge: Hinge) -> Hinges:
     """Return the limits of one hinge, whose joint has the index 0."""
-    return from_card([replace(hinge, joint=0)])
+    return from_card((replace(hinge, joint=0),))
 
 
 def _axes(hinge: Hinge) -> Annotated[Floats, "3 3"]:
@@ -238,7 +255,7 @@ def measure(
     unlimited = Hinge(
         0, *map(rounded, (reference, axis, bone, [nearest, 0.0, 0.0], [nearest, 0.0, 0.0]))
     )
-    angles = from_card([unlimited]).angles(rotations[:, None])[:, 0]
+    angles = one_joint(unlimited).angles(rotations[:, None])[:, 0]
     low, high = rounded(angles.min(axis=0)), rounded(angles.max(axis=0))
     return replace(unlimited, joint=joint, low=low, high=high)
 

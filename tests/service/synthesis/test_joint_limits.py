@@ -1,0 +1,118 @@
+"""Knees and elbows of the shipped walk keep the limits of its predictions in every answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.motion import hinges, skeleton
+from posefield.motion.hinges import MOST
+from posefield.question.motion_question import ClipQuestion, Target
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+
+ENDS = {"LowerLeg": "Foot", "LowerArm": "Hand"}
+STEP = 1e-5
+
+
+def questions(card, count=8, **fields):
+    """Return questions at captured clips; a callable field is called with the number."""
+    names = [control.name for control in card.controls]
+    return [
+        ClipQuestion(
+            controls=dict(zip(names, card.examples[7 * row], strict=True)),
+            extrapolate="ok",
+            **{key: value(row) if callable(value) else value for key, value in fields.items()},
+        )
+        for row in range(count)
+    ]
+
+
+def known_limits(model, scale=1.0):
+    """Return the model with the hinges of its predictions, whose ranges are scaled."""
+    card, found = model.session.card, []
+    motions = clips.synthesize_clips(model, questions(card, feet="predicted"))
+    for side in ("left", "right"):
+        for hinge, end in ENDS.items():
+            joint, tip = (card.skeleton.names.index(card.roles[side + r]) for r in (hinge, end))
+            chain = skeleton.joint_chain(card.skeleton.parents, tip)
+            child = chain[chain.index(joint) + 1]
+            turns = np.concatenate([motion.clip.rotations[:, joint] for motion in motions])
+            bones = (np.tile(card.skeleton.offsets[j], (len(turns), 1)) for j in (joint, child))
+            limits = hinges.measure(joint, turns, *bones)
+            found.append(replace(limits, high=(scale * limits.high[0], *limits.high[1:])))
+    card = replace(card, hinges=tuple(sorted(found, key=lambda hinge: hinge.joint)))
+    return Synthesizer(model.name, replace(model.session, card=card))
+
+
+def excess(limits, answers):
+    """Return the largest angles (3,) of hinges beyond their range, rad."""
+    angles = [limits.angles(answer.clip.rotations) for answer in answers]
+    beyond = [np.maximum(limits.low - a, a - limits.high).max(axis=(0, 1)) for a in angles]
+    return np.max(beyond, axis=0)
+
+
+@pytest.fixture(scope="module")
+def limited(shipped_walk):
+    return known_limits(shipped_walk)
+
+
+def test_predicted_clips_within_the_limits_are_the_same(limited, shipped_walk):
+    asked = questions(limited.session.card, feet="predicted")
+    with_limits, without = (clips.synthesize_clips(m, asked) for m in (limited, shipped_walk))
+    for one, other in zip(with_limits, without, strict=True):
+        assert one.clip.rotations.tobytes() == other.clip.rotations.tobytes()
+
+
+@pytest.mark.parametrize("feet", ["predicted", "stand"])
+def test_takes_and_standing_feet_keep_the_limits(limited, shipped_walk, feet):
+    asked = questions(limited.session.card, feet=feet, take=lambda row: row + 1, variety=1.0)
+    limits = hinges.from_card(limited.session.card.hinges)
+    # Limits are those of the card, and some rounding: leg lengths differ between performers.
+    assert (excess(limits, clips.synthesize_clips(limited, asked)) < MOST + 1e-3).all()
+    # Negative control: a model without limits.
+    unlimited = replace(shipped_walk.session.card, hinges=())
+    free = Synthesizer("free", replace(shipped_walk.session, card=unlimited))
+    assert excess(limits, clips.synthesize_clips(free, asked)).max() > 3.0 * MOST
+
+
+def test_targets_are_met_within_the_limits(limited):
+    """A hand is led aside and up, so that its elbow bends by more than in any clip."""
+    card = limited.session.card
+    limits, hand = hinges.from_card(card.hinges), card.roles["rightHand"]
+    (plain,) = clips.synthesize_clips(limited, questions(card, 1))
+    near = plain.clip.positions()[10, card.skeleton.names.index(hand)] + np.array([0.0, 0.1, 0.08])
+    goal = Target(joint=hand, position=tuple(near), time=10 / 30.0)
+    asked = questions(card, 1, targets=[goal], take=3, variety=1.0)
+    (answer,) = clips.synthesize_clips(limited, asked)
+    assert answer.trust.targets[-1].reached
+    assert (excess(limits, [answer]) < MOST + 1e-3).all()
+    # In a narrow range the target cannot be met, and the answer tells so.
+    narrow = known_limits(limited, 0.55)
+    (missed,) = clips.synthesize_clips(narrow, asked)
+    assert not missed.trust.targets[-1].reached
+    bent = hinges.from_card(narrow.session.card.hinges)
+    assert (excess(bent, [missed]) < MOST + 1e-3).all()
+
+
+def test_gradients_are_those_of_limited_motions(limited, rng):
+    """Oracle: central differences, at a take whose knee is beyond its free range."""
+    narrow = known_limits(limited, 0.5)
+    card = narrow.session.card
+    foot = card.skeleton.names.index(card.roles["leftFoot"])
+    (asked,) = questions(card, 1)
+    question = narrow.question(asked)
+    motion = narrow.solver.solve(question, clips.NO_CONSTRAINTS)
+    unlimited = limited.solver.solve(question, clips.NO_CONSTRAINTS)
+    scene, numbers = motion.scene, motion.numbers
+    for frame in (20.0, 60.0, 75.0):
+        rotations, _ = motion.poses(np.array([frame]))
+        assert not np.array_equal(rotations, unlimited.poses(np.array([frame]))[0])
+        _, gradient = scene.position_and_gradient(numbers, foot, frame)
+        way = rng.standard_normal(len(numbers))
+        ends = [
+            scene.position_and_gradient(numbers + sign * STEP * way, foot, frame)[0]
+            for sign in (1.0, -1.0)
+        ]
+        slope = (ends[0] - ends[1]) / (2.0 * STEP)
+        assert gradient @ way == pytest.approx(slope, abs=0.02 * np.linalg.norm(slope))
