@@ -1,6 +1,7 @@
 """Random scripts of performances that are valid by the schema, and checks of their answers."""
 
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -285,7 +286,12 @@ def _jumps(answer: PerformanceAnswer, accelerations_found: Frames) -> Iterator[s
     )
     times = np.arange(len(accelerations_found)) / answer.clip.rate
     free = np.ones(len(accelerations_found), dtype=bool)
-    flagged = {join.pointer for join in answer.trust.script_warnings if FAST in join.message}
+    flagged = {
+        pointer
+        for warning in answer.trust.script_warnings
+        if FAST in warning.message
+        for pointer in re.findall(r"/segments/\d+", warning.sentence)
+    }
     for index, segment in enumerate(answer.trust.segments):
         if f"/segments/{index}" in flagged:
             free &= (times < segment.begins) | (times > segment.ends)

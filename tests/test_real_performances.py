@@ -25,6 +25,10 @@ from posefield.synthesis.synthesizer import Synthesizer
 
 pytestmark = pytest.mark.system
 
+ACTS = [
+    *("hdm05_grab_high", "hdm05_grab_return", "hdm05_kick", "hdm05_kick_return"),
+    *("hdm05_deposit_floor", "hdm05_deposit_return", "hdm05_hop"),
+]
 TARGET = [1.0, 1.65, 5.0]
 # Peak accelerations of captured walking, m/s², and skate, m/s, that performances stay below.
 PEAK, SKATE = 16.0, 0.08
@@ -47,9 +51,9 @@ def segments(**walk):
 
 @pytest.fixture(scope="module")
 def library(real_data, models_trained):
-    """The shipped models, and those of the reach, its return, and a kick."""
+    """The shipped models, and those of the acts and their returns."""
     found = dict(model_registry.load([model_registry.SHIPPED_FOLDER]).models)
-    for name in ("hdm05_grab_high", "hdm05_grab_return", "hdm05_kick"):
+    for name in ACTS:
         content = models_trained.captured(name, real_data)[2].content
         found[name] = Synthesizer(name, session.open_bytes(content, name))
     return ModelRegistry(found)
@@ -169,6 +173,30 @@ def test_a_kicking_foot_meets_its_target_and_stands_before_and_after_it(library,
         assert contact_detection.mean_skate_speed(path[rows, None], 60.0) < 0.02
     held = path[round(60 * act.event) : round(60 * last.begins) + 1]
     assert np.ptp(held, axis=0).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [ACTS[:2], ACTS[2:4], ACTS[4:6], ACTS[6:]],
+)
+def test_no_join_of_a_walk_and_an_act_with_its_return_is_hard(library, pair):
+    acts = [{"kind": "act", "model": name} for name in pair]
+    report = perform(library, {"segments": [WALK, *acts, WALK], "fps": 60}).trust
+    assert not any(join.hard for join in report.joins) and report.warnings == ()
+
+
+def test_a_return_without_the_controls_of_the_pose_before_it_is_hard(library):
+    first, then = ({"kind": "act", "model": name} for name in ACTS[4:6])
+    card = library.find(then["model"]).session.card
+    typical = {**then, "controls": {own.name: own.default for own in card.controls}}
+    joins = [
+        perform(
+            library, {"segments": [{**first, "controls": {"root_height": 0.5}}, act]}
+        ).trust.joins[0]
+        for act in (then, typical)
+    ]
+    assert [join.hard for join in joins] == [False, True]
+    assert joins[0].distance < 0.05
 
 
 @pytest.mark.parametrize("place", [[0.0, 1.65, 2.0], [2.0, 1.0, -1.0], [0.0, 2.6, 0.8]])

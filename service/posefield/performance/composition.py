@@ -1,6 +1,7 @@
 """Performances: one motion of all segments of a script, its feet, and the report about it."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any
@@ -331,9 +332,31 @@ def _report(
             for index, end in enumerate([*stops, len(timeline.done) - 1])
         ),
         tuple(_join(join, timeline.begin) for join in joins),
-        (*timeline.warnings, *warnings),
+        merge_warnings([*timeline.warnings, *warnings]),
         feet,
     )
+
+
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+def merge_warnings(warnings: Iterable[ScriptWarning]) -> tuple[ScriptWarning, ...]:
+    """Return warnings of which those that differ in numbers only are one, at the first place.
+
+    Its message names the other places.
+    """
+    kinds: dict[str, list[ScriptWarning]] = {}
+    for warning in warnings:
+        kinds.setdefault(NUMBER.sub("", warning.message), []).append(warning)
+    return tuple(_merged(*kind) for kind in kinds.values())
+
+
+def _merged(first: ScriptWarning, *others: ScriptWarning) -> ScriptWarning:
+    if not others:
+        return first
+    places = ", ".join(other.pointer for other in others)
+    message = f"{first.message}; as do {len(others)} more: {places}"
+    return replace(first, message=message)
 
 
 def _segment(timeline: Timeline, index: int, end: int, misses: dict[str, float]) -> SegmentReport:

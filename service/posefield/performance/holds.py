@@ -19,8 +19,9 @@ from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline
 from posefield.question.performance_question import Hold
 
-LOOKS_ASIDE = np.radians(2.0)
-"""Angle by which the gaze may stay beside its point without a warning, rad."""
+LOOKS_ASIDE = np.radians(15.0)
+"""Angle by which the head may stay beside its point without a warning, rad: eyes alone look as far
+aside (Stahl, "Amplitude of human head movements associated with horizontal saccades", 1999)."""
 
 
 def add_hold(timeline: Timeline, script: Script, index: int) -> None:

@@ -28,7 +28,11 @@ MOST_DISTANCE = 0.25
 MOST_PEAK = 3.0
 """Peak acceleration of a join over the usual one from which on it is hard (decision 0086)."""
 MOST_DROP = 0.12
-"""Difference of the roots' heights at a cut from which on a join is hard, m."""
+"""Difference of the roots' heights at a cut from which on a join is hard, m, unless the motions
+that are joined rise and fall faster themselves, as a hop does."""
+RISING, RISING_PERCENTILE = 1.0, 90.0
+"""Time before and after a cut in which it is looked for how fast roots rise and fall, s, and the
+percentile of their accelerations that counts: ends of clips have single larger ones."""
 # The peak is looked for from this time before a join to this one after it, s.
 BEFORE, AFTER = 0.1, 0.6
 MOTIONS: Mapping[Reference, str] = {
@@ -42,12 +46,13 @@ MOTIONS: Mapping[Reference, str] = {
 class JoinFacts:
     """Facts about a join.
 
-    distance: RMS distance of the joints at the cut, m. drop: difference of the roots' heights
-    there, m. blend: its kind, and seconds that it lasts. usual: larger 99th percentile of the
-    accelerations of the motions on both sides, m/s², and reference: in which motions it was
-    measured. segment: index of the one that begins, and frame at which it does. peak: largest mean
-    over the joints of the acceleration relative to the root, m/s², from 0.1 s before to 0.6 s after
-    the cut, in the motion that is sent; 0 until it is known.
+    distance: RMS distance of the joints at the cut, m. drop, most_drop: difference of the roots'
+    heights there, and that from which on the join is hard, m. blend: its kind, and seconds that it
+    lasts. usual: larger 99th percentile of the accelerations of the motions on both sides, m/s²,
+    and reference: in which motions it was measured. segment: index of the one that begins, and
+    frame at which it does. peak: largest mean over the joints of the acceleration relative to the
+    root, m/s², from 0.1 s before to 0.6 s after the cut, in the motion that is sent; 0 until it is
+    known.
     """
 
     distance: float
@@ -59,6 +64,7 @@ class JoinFacts:
     frame: int = 0
     seconds: float = 0.0
     peak: float = 0.0
+    most_drop: float = MOST_DROP
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -69,10 +75,10 @@ class JoinFacts:
                 f"the poses are {100 * self.distance:.0f} cm apart, expected at most"
                 f" {100 * MOST_DISTANCE:.0f}"
             )
-        if self.drop > MOST_DROP:
+        if self.drop > self.most_drop:
             reasons.append(
                 f"the root is {100 * self.drop:.0f} cm higher on one side, expected at most"
-                f" {100 * MOST_DROP:.0f}"
+                f" {100 * self.most_drop:.0f}"
             )
         if self.peak > MOST_PEAK * self.usual:
             reasons.append(
@@ -80,6 +86,22 @@ class JoinFacts:
                 f" the {self.usual:.1f} m/s2 of the {MOTIONS[self.reference]}"
             )
         return tuple(reasons)
+
+
+def most_drop(before: Passage, after: Passage, cut: Cut, seconds: float) -> float:
+    """Return the difference of the roots' heights from which on a join is hard, m.
+
+    seconds: of the blend, which rises over a height h in a time T by at most 6 h / T², as the
+    smooth step does.
+    """
+    frames = round(RISING * RATE)
+    heights = (
+        before.roots[max(cut.exit - frames, 0) : cut.exit + 1, 1],
+        after.roots[cut.entry : cut.entry + frames + 1, 1],
+    )
+    rising = np.concatenate([np.abs(np.diff(side, n=2)) for side in heights]) * RATE**2
+    usual = float(np.percentile(rising, RISING_PERCENTILE)) if len(rising) else 0.0
+    return max(MOST_DROP, usual * seconds**2 / 6.0)
 
 
 def accelerations(character: Character, passage: Passage, begin: int, end: int) -> Frames:

@@ -147,6 +147,7 @@ class Timeline:
                 segment,
                 cut.exit,
                 fits,
+                most_drop=join_quality.most_drop(before, placed, cut, fits),
             )
         )
         self.usual = acceleration

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from passages import character, smooth
 
+from posefield.motion.quat import smoothstep
 from posefield.performance import join_quality, joins
 from posefield.performance.join_quality import JoinFacts
-from posefield.performance.passage import Passage
+from posefield.performance.joins import Cut
+from posefield.performance.passage import RATE, FloorMotion, Passage
 
 EASY = JoinFacts(0.05, 0.02, "dead", 4.0, "captured", peak=8.0)
 
@@ -50,6 +52,21 @@ def test_an_act_that_is_faster_than_captured_clips_is_told():
     assert not join_quality.judge_act(character(), twitching(30), (0, 160), 1e5)
     assert not join_quality.judge_act(character(), twitching(30), (60, 160), 4.0)
     assert not join_quality.judge_act(character(), twitching(30), (28, 34), 4.0)
+
+
+@pytest.mark.parametrize(("fall", "seconds"), [(0.0, 0.5), (9.81, 0.5), (9.81, 0.1)])
+def test_roots_may_differ_by_as_much_as_a_blend_rises_when_they_accelerate_as_usual(fall, seconds):
+    times = np.arange(60) / RATE
+    still = twitching(0, 60)
+    falling = replace(still, roots=np.outer(0.5 * fall * times**2, (0.0, 1.0, 0.0)))
+    cut = Cut(59, 0, FloorMotion(), 0.0, 0.0)
+    allowed = join_quality.most_drop(falling, falling, cut, seconds)
+    # The smooth step over that height has the acceleration of the fall.
+    steps = np.arange(0.0, 1.0 + 1e-9, 1e-3)
+    risen = allowed * np.gradient(np.gradient(smoothstep(steps), 1e-3), 1e-3) / seconds**2
+    limited = allowed == join_quality.MOST_DROP
+    assert limited == (fall * seconds**2 / 6.0 < join_quality.MOST_DROP)
+    assert limited or np.abs(risen).max() == pytest.approx(fall, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question.json_decoding import decode_question
 from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_report import ScriptWarning
 from posefield.synthesis.synthesizer import Synthesizer
 
 MAX_FRAMES = 2000
@@ -57,6 +58,18 @@ def test_the_larger_of_two_models_counts(walk):
     fast = {**WALK, "model": "fast"}
     found = performed([WALK, HOLD, fast, HOLD, WALK, HOLD, WALK], models).joins
     assert [join.usual for join in found] == [11.0, 11.0, 7.0]
+
+
+def test_warnings_that_differ_in_numbers_only_are_one():
+    kinds = "turns by up to {} rad/s more", "stays {} cm away"
+    turn, miss, later = (
+        ScriptWarning(f"/segments/{index}", kinds[kind].format(number))
+        for index, kind, number in ((0, 0, 0.2), (1, 1, 3), (12, 0, 1.25))
+    )
+    merged = composition.merge_warnings([turn, miss, later])
+    message = "turns by up to 0.2 rad/s more; as do 1 more: /segments/12"
+    assert merged == (replace(turn, message=message), miss)
+    assert composition.merge_warnings([turn, miss]) == (turn, miss)
 
 
 def test_only_feet_as_they_are_sent_count(walk):
