@@ -27,6 +27,7 @@ from posefield_train.kriging import (
     coefficient_models,
     kriging_bank,
     kriging_tuning,
+    performer_means,
     sample_points,
     universal_kriging,
 )
@@ -247,6 +248,7 @@ def _fit_models(
     pose = coefficient_models.choose_covariance(
         recipe.kriging, samples, full.motions, effector, jobs
     )
+    pose = performer_means.shrink(pose, samples, full.motions, effector)
     fitted = {
         k: coefficient_models.fit(recipe.kriging, pose.hyper, samples, v)
         for k, v in other_values.items()
@@ -337,10 +339,11 @@ def _assemble(
     fits: _FittedModels,
     reduced: TuckerTensor,
 ) -> FloatModel:
-    solved = universal_kriging.solve_samples(fits.pose.hyper, clips.samples, reduced.bases[2])
+    motions = performer_means.move(clips.samples, fits.pose.share, reduced.bases[2])
+    solved = universal_kriging.solve_samples(fits.pose.hyper, clips.samples, motions)
     event, blend = None, _event_blend(recipe, reference, fits, reduced)
     if fits.event and blend:
-        values = reduced.bases[2][:, : blend.count]
+        values = motions[:, : blend.count]
         event = universal_kriging.solve_samples(fits.event.hyper, clips.samples, values)
     other_models = {name: fit.field for name, fit in fits.other_models.items()}
     ranges, tensor = (controls.min(axis=0), controls.max(axis=0)), reference.tensor

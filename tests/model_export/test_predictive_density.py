@@ -18,6 +18,7 @@ from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     PRIORS,
     LeaveOneOutLoss,
+    PoseLoss,
     PredictiveDensityLoss,
     TuningProblem,
 )
@@ -35,8 +36,8 @@ def laid(rng):
     return SamplePoints(points, 2, recordings, (PEOPLE,))
 
 
-def loss_of(laid, values, kind=PredictiveDensityLoss):
-    return kind(TuningProblem(laid, values), HYPER, NAMES, own_scales=False)
+def loss_of(laid, values, kind=PredictiveDensityLoss, effector=None):
+    return kind(TuningProblem(laid, values, effector=effector), HYPER, NAMES, own_scales=False)
 
 
 def in_search_units(hyper):
@@ -67,8 +68,10 @@ def test_loss_is_the_density_of_takes_left_out_one_by_one(laid, rng):
     assert abs(loss_of(single, values).of_samples(HYPER)[0] - expected) > 0.1
 
 
-def test_gradient_is_that_of_finite_differences(laid, rng):
-    loss, x = loss_of(laid, rng.normal(size=(COUNT, 1))), in_search_units(HYPER)
+@pytest.mark.parametrize("kind", [PredictiveDensityLoss, PoseLoss])
+def test_gradient_is_that_of_finite_differences(laid, rng, kind):
+    effector = rng.normal(size=(COUNT, 3, 1)) if kind is PoseLoss else None
+    loss, x = loss_of(laid, rng.normal(size=(COUNT, 1)), kind, effector), in_search_units(HYPER)
     values = [
         [loss.value_and_slope(x + sign * step)[0] for sign in (1, -1)] for step in 1e-5 * np.eye(3)
     ]
@@ -76,6 +79,30 @@ def test_gradient_is_that_of_finite_differences(laid, rng):
     slope = loss.value_and_slope(x)[1]
     assert np.abs(slope - expected).max() < 1e-6 * np.abs(expected).max()
     assert np.abs(loss.value_and_slope(x + 0.05)[1] - expected).max() > 1e-3
+
+
+def test_the_pose_is_tuned_by_squares_with_the_event_and_by_density(laid, rng):
+    values, effector = rng.normal(size=(COUNT, 4)), rng.normal(size=(COUNT, 3, 2))
+    squares, density, both = (
+        loss_of(laid, values, kind, effector).of_samples(HYPER)[0]
+        for kind in (LeaveOneOutLoss, PredictiveDensityLoss, PoseLoss)
+    )
+    assert both == pytest.approx(squares + density, rel=1e-12)
+    # The event's joint counts in the squares alone.
+    plain = loss_of(laid, values, PoseLoss).of_samples(HYPER)[0]
+    without = loss_of(laid, values, LeaveOneOutLoss).of_samples(HYPER)[0]
+    assert both - plain == pytest.approx(squares - without, rel=1e-9)
+    assert squares - without > 1.0
+    # Performers without names keep the squares alone.
+    points = SamplePoints(laid.half_ranges, 2, laid.groups, unnamed=True)
+    for samples, kind in ((laid, PoseLoss), (points, LeaveOneOutLoss)):
+        strength = tuning_loss.UNNAMED_STRENGTH if samples.unnamed else tuning_loss.POSE_STRENGTH
+        problem = TuningProblem(samples, values, strength=strength, unnamed=samples.unnamed)
+        expected = kriging_tuning.tune(problem, "matern52", None, loss=kind).hyper
+        chosen = coefficient_models.choose_covariance(
+            Kriging(covariance="matern52"), samples, values
+        )
+        assert chosen.hyper.nugget == expected.nugget
 
 
 def test_only_a_single_value_is_tuned_by_its_density(laid, rng):

@@ -144,7 +144,7 @@ def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> Level
     pose = adapted.model.bank.pose.samples
     labels = tuple(map(len, adapted.model.bank.labels.values()))
     samples = SamplePoints(pose, len(adapted.model.bank.low), np.arange(len(pose)), labels)
-    uncut = levels.untruncated(adapted.model, extended.full, samples)
+    uncut = levels.untruncated(adapted.model, extended.full, samples, extended.full.bases[2])
 
     def exam(questions: int) -> LevelTest:
         return levels.level_test_against(uncut, parents, moment, questions)

@@ -17,7 +17,7 @@ from posefield_train.graph import truncation_cost
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.graph.truncation_cost import ParetoFront, RankTriple
-from posefield_train.kriging import kriging_bank, universal_kriging
+from posefield_train.kriging import kriging_bank, performer_means, universal_kriging
 from posefield_train.kriging.kriging_bank import ThinningData
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.recipe_sections import Detail
@@ -103,7 +103,8 @@ class LevelTest:
 def level_test(trained: TrainedModel, questions: int) -> LevelTest:
     """Return a test of a trained model's levels with the given number of inputs."""
     moment = truncation_error.event_frame(trained.recipe, trained.examples)
-    model = untruncated(trained.model, trained.full, trained.samples)
+    motions = performer_means.move(trained.samples, trained.pose.share, trained.full.bases[2])
+    model = untruncated(trained.model, trained.full, trained.samples, motions)
     return level_test_against(model, trained.skeleton.parents, moment, questions)
 
 
@@ -139,18 +140,22 @@ def _event_positions(
     return model.joint_at_frame(fields, chain, moment.frame, level)
 
 
-def untruncated(model: FloatModel, full: TuckerTensor, samples: SamplePoints) -> FloatModel:
-    """Return the model with the tensor before truncation. samples: of the tensor's clips."""
+def untruncated(
+    model: FloatModel, full: TuckerTensor, samples: SamplePoints, motions: Floats
+) -> FloatModel:
+    """Return the model with the tensor before truncation.
+
+    samples: of the tensor's clips. motions: values (N, N) of the samples that the pose is kriged
+    from, in the coordinates of the tensor's last basis.
+    """
     bank = model.bank
-    pose = universal_kriging.solve_samples(bank.pose.hyper, samples, full.bases[2])
+    pose = universal_kriging.solve_samples(bank.pose.hyper, samples, motions)
     decoder = replace(model.decoder, reduced=full)
     event, blend = bank.event, model.decoder.event
     if event and blend:
         longer = build_blend(blend.count, blend.weights, full.core, full.bases[1])
         decoder = replace(decoder, event=longer)
-        event = universal_kriging.solve_samples(
-            event.hyper, samples, full.bases[2][:, : longer.count]
-        )
+        event = universal_kriging.solve_samples(event.hyper, samples, motions[:, : longer.count])
     return replace(model, bank=replace(bank, pose=pose, event=event), decoder=decoder)
 
 

@@ -17,7 +17,7 @@ from posefield_train.graph import levels, trained_card
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import single_threaded
-from posefield_train.kriging import kriging_bank, sample_points, universal_kriging
+from posefield_train.kriging import kriging_bank, performer_means, sample_points
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -126,6 +126,8 @@ DRAWS, ROUNDS = 2, 3
 """Draws of each clip and rounds of the search for the gain."""
 REPEAT_LAG = 0.1
 """Distance of controls, root mean square in half-ranges, at which repeats count less (Gaussian)."""
+ENOUGH = 0.99
+"""Acceleration of left-out predictions over that of captured clips from which no detail is stored."""
 JITTER = 1e-9
 """Added to a covariance that clips of one duration or without turns make singular."""
 
@@ -246,7 +248,7 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
             float(np.mean([_accelerations(trained, sample).mean() for sample in detailed]))
             / captured
         )
-        if without >= 1.0 or reached <= without:
+        if without >= ENOUGH or reached <= without:
             return None
         last, gain = gain, gain * np.sqrt((1.0 - without**2) / (reached**2 - without**2))
     return DetailFit(last * deviations, float(without), reached)
@@ -254,7 +256,7 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
 
 def _left_out(trained: TrainedModel) -> Floats:
     """Return the matrix (N, N) from sample values to leave-one-out residuals."""
-    return universal_kriging.leave_out_samples(trained.pose.hyper, trained.samples)
+    return performer_means.leave_out(trained.pose, trained.samples)
 
 
 def _harmonic_deviations(trained: TrainedModel) -> Deviations:

@@ -36,7 +36,8 @@ class TunedKriging:
     the mean of the other samples; at one or above the controls explain nothing. variances: of the
     residuals (n,), as shares of the sill. sill: of the sum over values. disagreement: between
     parameters tuned on two draws of a large family, the relative difference of their leave-one-out
-    errors over all clips; None for one.
+    errors over all clips; None for one. share: of the way to the means of performers by which the
+    samples are moved (`performer_means`).
     """
 
     hyper: Hyper
@@ -45,6 +46,7 @@ class TunedKriging:
     variances: PerSample
     sill: float
     disagreement: float | None = None
+    share: float = 0.0
 
 
 def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> TunedKriging:
@@ -85,8 +87,9 @@ def tune(
     degree: int | None,
     draw: int = 0,
     jobs: Jobs = SERIAL,
+    loss: type[LeaveOneOutLoss] = LeaveOneOutLoss,
 ) -> TunedKriging:
-    """Return the model whose parameters minimize the leave-one-out loss.
+    """Return the model whose parameters minimize a loss.
 
     degree: of the drift; None for a constant and a trend within the covariance. draw: of the clips
     of a large family, 0 or 1. jobs: executor of the searches from several starts.
@@ -96,8 +99,8 @@ def tune(
     hyper = Hyper(covariance, (degree or 0,), scales, 0.0, 0.0, labels)
     names = _free(problem, trend=degree is None)
     starts = [(np.log(scale), np.log(nugget)) for scale, nugget in STARTS]
-    loss = LeaveOneOutLoss(problem.drawn(draw), hyper, names, own_scales=True)
-    return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts], problem, jobs)
+    drawn = loss(problem.drawn(draw), hyper, names, own_scales=True)
+    return _best(drawn, [drawn.start(scale, nugget) for scale, nugget in starts], problem, jobs)
 
 
 def tune_beside(

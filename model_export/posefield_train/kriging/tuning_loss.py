@@ -321,3 +321,18 @@ class PredictiveDensityLoss(LeaveOneOutLoss):
         spread = block @ np.linalg.inv(diagonal) @ block
         both = 0.5 * count / squares * slope + 0.5 * spread
         return loss, 0.5 * (both + both.T)
+
+
+@dataclass(frozen=True)
+class PoseLoss(PredictiveDensityLoss):
+    """Sum of the losses of squared residuals and of density.
+
+    Of many values the squared residuals alone leave the model too sure of its samples; the density
+    alone says nothing of the event's joint.
+    """
+
+    def of_samples(self, hyper: Hyper) -> tuple[float, SampleMatrix]:
+        """Return the loss without the prior, and its derivative (n, n) by the covariances."""
+        pairs = LeaveOneOutLoss.of_samples(self, hyper), super().of_samples(hyper)
+        (squares, first), (density, second) = pairs
+        return squares + density, first + second
