@@ -127,7 +127,7 @@ DRAWS, ROUNDS = 2, 3
 REPEAT_LAG = 0.1
 """Distance of controls, root mean square in half-ranges, at which repeats count less (Gaussian)."""
 ENOUGH = 0.99
-"""Acceleration of left-out predictions over that of captured clips from which no detail is stored."""
+"""Acceleration of left-out predictions over captured, from which on no detail is stored."""
 JITTER = 1e-9
 """Added to a covariance that clips of one duration or without turns make singular."""
 
