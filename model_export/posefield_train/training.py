@@ -213,11 +213,12 @@ def _predictor(recipe: Recipe, samples: SamplePoints, jobs: Jobs) -> time_alignm
 class _FittedModels:
     """Tuned models of all quantities.
 
-    values: sample values (N, m) by name. left_out_errors: mean squared leave-one-out distance (N,),
-    m². warped_errors: the same of whole motions after time warping.
+    timing: of predictions. values: sample values (N, m) by name. left_out_errors: mean squared
+    leave-one-out distance (N,), m². warped_errors: the same of whole motions after time warping.
     """
 
     proportions: Proportions
+    timing: CanonicalTiming
     values: dict[str, Floats]
     pose: TunedKriging
     other_models: dict[str, FittedModel]
@@ -265,10 +266,14 @@ def _fit_models(
     left_out_errors = _left_out_errors(tensor, pose, fitted)
     motions = full.motions - pose.residuals
     expected = {name: values[name] - fit.residuals for name, fit in fitted.items()}
+    timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)
+    # Where the recipe gives a nugget, it has decided that the controls explain the samples.
+    if recipe.kriging.nugget is None:
+        timing = timing.unbiased(expected["warp"])
 
     def motions_of(rows: slice) -> tuple[Floats, Floats, int]:
         predicted = warped_errors.predicted_positions(
-            CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
+            timing,
             tensor,
             proportions,
             full.slices(motions[rows]),
@@ -282,7 +287,7 @@ def _fit_models(
     warped = np.concatenate(ordered_results(jobs, warped_errors.mean_squared_errors, compared))
     event = _fit_event(recipe, samples, reference, full, pose, effector)
     return _FittedModels(
-        proportions, values, pose, fitted, left_out_errors, warped, power_law, event
+        proportions, timing, values, pose, fitted, left_out_errors, warped, power_law, event
     )
 
 
@@ -347,11 +352,10 @@ def _assemble(
         event = universal_kriging.solve_samples(fits.event.hyper, clips.samples, values)
     other_models = {name: fit.field for name, fit in fits.other_models.items()}
     ranges, tensor = (controls.min(axis=0), controls.max(axis=0)), reference.tensor
-    timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)
     sill = float(np.mean(fits.warped_errors / fits.pose.variances))
     return FloatModel(
         KrigingBank(*ranges, clips.labels, solved, other_models, sill, (), fits.power_law, event),
-        timing,
+        fits.timing,
         Decoder(
             reduced, tensor.mean, tensor.unwhiten, tensor.chart, event=blend, curves=tensor.curves
         ),

@@ -10,7 +10,7 @@ from posefield.common.units import UP
 from posefield.kriging.kriging_model import half_ranges
 from posefield.motion import clip, quat
 from posefield.motion.skeleton import Skeleton
-from posefield_train.align import time_alignment
+from posefield_train.align import dtw, time_alignment
 from posefield_train.align.time_alignment import Refinement
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.kriging import kriging_tuning
@@ -154,6 +154,23 @@ def test_weights_of_joints_decide_what_is_aligned(rng):
     arm = aligned(family, weights=np.array([1.0, 1.0, 400.0, 1.0]))
     assert disagreement(arm.logs, second) < 0.7 * disagreement(even.logs, second)
     assert disagreement(arm.logs, first) > disagreement(even.logs, first)
+
+
+def test_clips_that_differ_by_chance_keep_an_even_pace(rng):
+    """Joints tremble by as much as they move: what time warping finds is chance."""
+    clips = []
+    for one in (example(1.0, CANONICAL) for _ in range(CLIPS)):
+        angles = np.cumsum(0.06 * rng.normal(size=one.clip.rotations.shape[:2]), axis=0)
+        trembling = quat.from_axis_angle(np.array([0, 0, 1.0]), angles)
+        rotations = quat.mul(one.clip.rotations, trembling)
+        clips.append(replace(one, clip=replace(one.clip, rotations=rotations)))
+    even = np.zeros((CLIPS, BASIS.knots))
+    traces = np.stack([time_alignment.trace(one.clip, WEIGHTS) for one in clips])
+    paths = dtw.warp(traces, traces.mean(axis=0))
+    dense = [np.interp(FIT_TIMES, CANONICAL, path) for path in paths]
+    ones = np.ones(len(FIT_TIMES))
+    loose = np.stack([BASIS.fit(path, ones) for path in dense])
+    assert disagreement(aligned(clips).logs, even) < 0.5 * disagreement(loose, even)
 
 
 def test_landmark_is_met_by_every_clip(family, logs, rng):

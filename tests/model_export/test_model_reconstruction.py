@@ -51,6 +51,8 @@ def test_a_reopened_model_answers_as_the_trained_one(labelled_exported, reopened
     expected, found = trained.evaluate(*question), own.model.evaluate(*question)
     assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-4
     assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-6
+    assert np.abs(trained.timing.correction).max() > 0.01
+    assert np.abs(own.model.timing.correction - trained.timing.correction).max() < 1e-6
     # Negative control: one sample of one clip, moved by a hundredth of what samples differ by.
     bank, reduced = own.model.bank, own.model.decoder.reduced
     values = reduced.bases[2].copy()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.interpolate import PchipInterpolator
 
-from posefield_train.align.warp import FIT_TIMES, MINIMUM_INCREMENT, WarpBasis
+from posefield_train.align.warp import FIT_TIMES, MINIMUM_INCREMENT, CanonicalTiming, WarpBasis
 
 TOLERANCE = 1e-12
 EVEN = np.ones(len(FIT_TIMES))
@@ -117,3 +117,31 @@ def test_fit_meets_what_weighs_more():
     heavy = basis.evaluate(basis.fit(wanted, weights), FIT_TIMES)[150]
     light = basis.evaluate(basis.fit(wanted, EVEN), FIT_TIMES)[150]
     assert abs(heavy - wanted[150]) < 1e-3 < abs(light - wanted[150])
+
+
+def test_stiffness_weighs_slopes_against_times(basis, logs):
+    """By the normal equations, with a sum of one, where no increment is at its bound."""
+    own, stiffness = 0.5 * logs[0], 0.1
+    s, design = basis.evaluate(own, FIT_TIMES), basis.design(FIT_TIMES)
+    slopes = np.diag(1.0 / basis.identity)
+    weight = stiffness**2 * len(FIT_TIMES) / basis.knots
+    matrix = np.zeros((basis.knots + 1, basis.knots + 1))
+    matrix[:-1, :-1] = design.T @ design + weight * slopes @ slopes
+    matrix[-1, :-1] = matrix[:-1, -1] = 1.0
+    found = np.linalg.solve(matrix, [*(design.T @ s + weight * slopes.sum(axis=0)), 1.0])[:-1]
+    fitted = basis.increments(basis.fit(s, EVEN, stiffness))
+    assert np.max(np.abs(fitted - found)) < 1e-4 * np.max(found)
+    assert np.max(np.abs(basis.increments(own) - found)) > 1e-2 * np.max(found)
+    assert np.max(np.abs(basis.fit(s, EVEN, 1e3))) < 1e-4
+
+
+def test_predicted_warps_are_the_identity_in_the_mean(basis, logs):
+    """Of left-out predictions, which vary less than the warps that they are of."""
+    timing = CanonicalTiming(basis, 60).unbiased(logs)
+    means = (
+        np.mean([basis.invert(own, FIT_TIMES) for own in warps], axis=0)
+        for warps in (timing.warps(logs), logs)
+    )
+    corrected, plain = (np.max(np.abs(mean - FIT_TIMES)) for mean in means)
+    # What the knots cannot follow is left.
+    assert corrected < 0.004 and corrected < 0.3 * plain

@@ -96,10 +96,10 @@ def _as_float64(array: Any) -> Floats:
 
 def _adaptable(file: _ModelFile) -> AdaptableModel:
     card, making = file.card, file.card.making
-    bank = _bank(file)
+    bank, basis = _bank(file), WarpBasis(len(file["warp_still"]))
     model = FloatModel(
         bank,
-        CanonicalTiming(WarpBasis(len(file["warp_still"])), card.frames),
+        CanonicalTiming(basis, card.frames, file["warp_still"] - np.log(basis.identity)),
         _decoder(file, bank),
         _proportions(file),
         Travel(card.frames, len(card.skeleton)) if card.cyclic else None,

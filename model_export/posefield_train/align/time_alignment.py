@@ -38,7 +38,9 @@ SERIAL = SerialJobs()
 # Numbers of frames for the medoid and for warps; more frames do not improve the result.
 COARSE, FINE = 25, 100
 # A landmark is one of 501 samples; the weight makes the fitted warp pass through it.
-LANDMARK_WEIGHT = 200.0
+LANDMARK_WEIGHT = 2000.0
+# Keeps a reference that rests from a division by zero.
+TINY = 1e-12
 # Clips up to which each is compared with all others for the medoid, and as many of more clips.
 LARGEST_COMPARED, MEDOID_SAMPLE = 299, 200
 
@@ -293,15 +295,33 @@ def _warps_to(
     straight = np.stack(
         [np.interp(FIT_TIMES, knee_times, knees.canonical) for knee_times in knees.times]
     )
+    paths = _phases(traces, reference, jobs)
     # Time warping may shift a landmark: the phases are rescaled so that it returns to its time.
     phases = [
         np.interp(phase, np.interp(knees.canonical, _uniform_times(FINE), phase), knees.canonical)
-        for phase in _phases(traces, reference, jobs)
+        for phase in paths
     ]
     warps = np.stack(
         [np.interp(s, _uniform_times(FINE), p) for s, p in zip(straight, phases, strict=True)]
     )
-    return np.stack([basis.fit(warp, w) for warp, w in zip(warps, knees.weights, strict=True)])
+    # Where a clip begins in another pose than its reference, the path hurries to where they are
+    # alike: without stiffness, motions that differ by chance would have steep time functions.
+    listed = zip(warps, knees.weights, _time_errors(traces, reference, paths), strict=True)
+    return np.stack([basis.fit(*arguments) for arguments in listed])
+
+
+def _time_errors(
+    traces: Traces, reference: Annotated[Floats, "... frames features"], paths: ClipFrames
+) -> PerClip:
+    """Return the errors (N,) of warped times, as shares of the clip.
+
+    In such a time the reference moves as far as traces are from it after warping.
+    """
+    references = np.broadcast_to(reference, traces.shape)
+    pairs = zip(traces, references, paths, strict=True)
+    distances = [np.mean(np.square(a - interpolate(b, path))) for a, b, path in pairs]
+    steps = [np.mean(np.square(np.diff(one, axis=0))) for one in references]
+    return np.sqrt(np.divide(distances, np.maximum(steps, TINY))) / (FINE - 1)
 
 
 def _phases(

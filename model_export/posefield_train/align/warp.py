@@ -6,7 +6,7 @@ increments relative to the identity are stored, averaged and predicted: any real
 warp, and zeros make the identity.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated
 
@@ -22,6 +22,8 @@ DEGREE = 3
 # Least increment as a share of the identity's, so that no pose is frozen.
 MINIMUM_INCREMENT = 0.15
 FIT_TIMES = np.linspace(0.0, 1.0, 501)
+# After them the mean differs from the identity by what the knots cannot follow.
+CORRECTION_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -100,27 +102,55 @@ class WarpBasis:
         return np.interp(s, self.evaluate(logs, FIT_TIMES), FIT_TIMES)
 
     def fit(
-        self, s: Annotated[Floats, "dense"], weights: Annotated[Floats, "dense"]
+        self,
+        s: Annotated[Floats, "dense"],
+        weights: Annotated[Floats, "dense"],
+        stiffness: float = 0.0,
     ) -> Annotated[Floats, "{self.knots}"]:
-        """Return log increments (knots,) of the warp nearest to samples s (501,) at DENSE.
+        """Return log increments (knots,) of the warp nearest to samples s (501,) at FIT_TIMES.
 
-        Least squares with a lower bound FLOOR; the large weight of the last sample makes the
-        increments sum to one.
+        Penalized least squares with a lower bound; the large weight of the last sample makes the
+        increments sum to one. stiffness: miss of all samples, as a share of the clip, that costs as
+        much as slopes that differ from the identity's by their whole.
         """
         worth = np.sqrt(weights)
         worth[-1] = 1e3
         bounds = (MINIMUM_INCREMENT * self.identity, np.ones(self.knots))
-        fitted = lsq_linear(self._dense_design * worth[:, None], s * worth, bounds, method="bvls")
+        penalty = np.full(self.knots, stiffness * np.sqrt(len(FIT_TIMES) / self.knots))
+        rows = np.vstack([self._dense_design * worth[:, None], np.diag(penalty / self.identity)])
+        fitted = lsq_linear(rows, np.concatenate([s * worth, penalty]), bounds, method="bvls")
         increments = fitted.x / fitted.x.sum()
         return np.log(increments / self.identity)
 
 
 @dataclass(frozen=True)
 class CanonicalTiming:
-    """Canonical frames 0 to frames - 1, and the basis of the warps to them."""
+    """Canonical frames 0 to frames - 1, and the warps to them that are predicted.
+
+    correction: log increments (knots,) that are added to predicted ones; None for none.
+    """
 
     basis: WarpBasis
     frames: int
+    correction: Annotated[Floats, "knots"] | None = None
+
+    def unbiased(self, predicted: Annotated[Floats, "clips knots"]) -> "CanonicalTiming":
+        """Return the timing with the correction for left-out predicted log increments (N, knots).
+
+        The exponential of a mean is less than the mean of exponentials (Duan 1983, "Smearing
+        estimate"), so predicted warps are steep where captured ones vary, which is at the ends.
+        With the correction their mean inverse is the identity, as that of the captured warps is.
+        """
+        timing, even = self, np.ones(len(FIT_TIMES))
+        for _ in range(CORRECTION_ROUNDS):
+            corrected = timing.warps(predicted)
+            inverse = np.mean([self.basis.invert(logs, FIT_TIMES) for logs in corrected], axis=0)
+            timing = replace(self, correction=timing.warps(self.basis.fit(inverse, even)))
+        return timing
+
+    def warps(self, logs: Annotated[Floats, "*clips knots"]) -> Annotated[Floats, "*clips knots"]:
+        """Return log increments (..., knots) of the warps that predicted ones (..., knots) mean."""
+        return logs if self.correction is None else logs + self.correction
 
     def numpy(
         self,
@@ -134,13 +164,13 @@ class CanonicalTiming:
         """
         durations = np.exp(log_duration[:, 0])
         u = np.clip(time / durations[:, None], 0.0, 1.0)
-        return durations, (self.frames - 1) * self.basis.evaluate(logs, u)
+        return durations, (self.frames - 1) * self.basis.evaluate(self.warps(logs), u)
 
     def onnx(self, net: GraphBuilder, log_duration: str, logs: str, time: str) -> tuple[str, str]:
         """Build durations (B, 1), s, and canonical frames (B, S)."""
         duration = net.rename_value(ROW_VALUES["duration"], net("Exp", log_duration))
         u = net("Clip", net("Div", time, duration), net.number(0.0), net.number(1.0))
-        still = net.weights("warp_still", np.log(self.basis.identity))
+        still = net.weights("warp_still", self.warps(np.log(self.basis.identity)))
         increments = net("Softmax", net("Add", logs, still), axis=1)
         # Scale to frames here, at no extra cost.
         form = net.weights("warp_form", (self.frames - 1) * self.basis.power_form)

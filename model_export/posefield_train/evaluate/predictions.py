@@ -257,4 +257,4 @@ def _predicted_event(
         return None
     timing = trained.model.timing
     share = np.array([event.frame / (timing.frames - 1)])
-    return MotionEvent(event.joint, float(timing.basis.invert(logs, share)[0]))
+    return MotionEvent(event.joint, float(timing.basis.invert(timing.warps(logs), share)[0]))
