@@ -140,13 +140,8 @@ class MotionVariables:
     @cached_property
     def _canonical_centres(self) -> Annotated[Floats, "frames hinge_angles"]:
         """Angles (T, 3 H) of the hinges in the prediction at the canonical frames."""
-        joints, tensor = list(self.hinges.joints), self.reduced
-        rows = np.ravel(3 + 3 * np.array(joints, int)[:, None] + np.arange(3))
-        moves = tensor.time @ self.motion(self.predicted)
-        numbers = (tensor.mean[rows] + moves @ tensor.directions[:, rows]).reshape(
-            len(moves), -1, 3
-        )
-        turns = quat.mul(tensor.rotations[joints], CHARTS[tensor.chart].quaternions(numbers))
+        moves = self.reduced.time @ self.motion(self.predicted)
+        turns = self.reduced.joint_turns(moves, self.hinges.joints)
         return self.hinges.turn_angles(turns).reshape(len(moves), -1)
 
     def hinge_centres(self, frames: Frames) -> HingeAngles:

@@ -137,7 +137,7 @@ class Character:
     limbs whose ends keep their predicted paths while they are led there, such as the arm of a hand
     with an exact target.
     fixed: whether the pelvis keeps its height above the floor. raised: whether a fixed one follows
-    the floor nevertheless.
+    the floor nevertheless. hinges: limits of its knees and elbows, as far as known.
     """
 
     parents: tuple[int, ...]
@@ -146,6 +146,7 @@ class Character:
     kept: tuple[Limb, ...] = ()
     fixed: bool = False
     raised: bool = False
+    hinges: tuple[Hinge, ...] = ()
 
     @property
     def limbs(self) -> tuple[Limb, ...]:
@@ -274,7 +275,14 @@ def choose_limbs(
             legs[index] = leg
         used |= chain
     arms, fixed = _arms(parents, bones, joints, used, hinges)
-    character = Character(parents, bones, tuple(legs.values()), (*kept_limbs, *arms), fixed)
+    character = Character(
+        parents,
+        bones,
+        tuple(legs.values()),
+        (*kept_limbs, *arms),
+        fixed,
+        hinges=tuple(hinges),
+    )
     return LimbChoice(character, tuple(legs), tuple(left))
 
 

@@ -9,7 +9,7 @@ leave most directions undetermined, so the covariance is shrunk towards the Kron
 marginals over time and degrees of freedom, which keeps corrections smooth in time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
@@ -148,6 +148,15 @@ class ReducedTensor:
         """Return rotations (S, J, 4) of pose vectors (S, D)."""
         charts = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(numbers), -1, 3)
         return quat.mul(self.rotations, CHARTS[self.chart].quaternions(charts))
+
+    def joint_turns(
+        self, moves: Annotated[Floats, "frames freedoms"], joints: Sequence[int]
+    ) -> Annotated[Floats, "frames some 4"]:
+        """Return the local rotations (S, H, 4) of joints, from coefficients (S, r1) of moves."""
+        rows = np.ravel(3 + 3 * np.array(joints, int)[:, None] + np.arange(3))
+        numbers = self.mean[rows] + moves @ self.directions[:, rows]
+        charts = numbers.reshape(len(moves), len(joints), 3)
+        return quat.mul(self.rotations[list(joints)], CHARTS[self.chart].quaternions(charts))
 
     def turn_products(
         self, motion: Annotated[Floats, "times freedoms"], frames: Frames

@@ -17,7 +17,7 @@ from posefield.feet import body_plans, foot_placement
 from posefield.feet.footsteps import FeetPlan, PlanRequest
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
-from posefield.motion import joint_roles, quat
+from posefield.motion import hinges, joint_roles, quat
 from posefield.motion.clip import Clip, assemble
 from posefield.performance import acts, holds, join_quality, limb_targets, walk_steps
 from posefield.performance.act_motion import StagedAct
@@ -137,6 +137,10 @@ def compose(script: Script) -> Timeline:
                 acts.add_act(timeline, script, act)
                 staged = None
             timeline.check_duration()
+    if character.body.hinges:
+        # Blends go on with the velocities of the motion before, beyond the limits too.
+        limits = hinges.from_card(character.body.hinges)
+        timeline.motion = replace(timeline.done, rotations=limits.within(timeline.done.rotations))
     if timeline.targets:
         timeline.motion, timeline.misses = limb_targets.meet_targets(
             character.body, timeline.done, timeline.targets

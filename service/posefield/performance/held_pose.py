@@ -25,6 +25,7 @@ from posefield.feet import limbs, two_bone
 from posefield.feet.limbs import Limb
 from posefield.kriging import random_field
 from posefield.motion import quat, skeleton
+from posefield.motion.hinges import Hinge
 from posefield.motion.skeleton import Skeleton
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.question import motion_question
@@ -70,6 +71,7 @@ class HeldBody:
     """Skeleton of a character that stays in a pose, and can look.
 
     bones: offsets (J, 3), m. joints: by role. facing: of the rest pose, from +z to the left, rad.
+    hinges: limits of its knees and elbows, as far as known.
     """
 
     names: tuple[str, ...]
@@ -77,6 +79,7 @@ class HeldBody:
     bones: Bones
     joints: Mapping[str, int]
     facing: float = 0.0
+    hinges: tuple[Hinge, ...] = ()
 
     def look_at(self, rotations: JointRotations, root: Vector, point: Vector) -> Gaze:
         """Return the turn of a pose (J, 4) towards a point (3,), m, in the frame of the pose.
@@ -209,14 +212,18 @@ WINDOW = 4
 
 
 def body_of(
-    skeleton: Skeleton, roles: Mapping[str, str], bones: Bones, facing: float = 0.0
+    skeleton: Skeleton,
+    roles: Mapping[str, str],
+    bones: Bones,
+    facing: float = 0.0,
+    hinges: tuple[Hinge, ...] = (),
 ) -> HeldBody:
     """Return the body of a character with joints by role, bone offsets (J, 3), m, and its facing.
 
     facing: of the rest pose, from +z to the left, rad.
     """
     joints = {role: skeleton.names.index(joint) for role, joint in roles.items()}
-    return HeldBody(skeleton.names, skeleton.parents, bones, joints, facing)
+    return HeldBody(skeleton.names, skeleton.parents, bones, joints, facing, hinges)
 
 
 def come_to_rest(before: Passage) -> Passage:
@@ -347,7 +354,7 @@ def _limb(body: HeldBody, name: str | None) -> Limb | None:
     if name not in body.names:
         names = ", ".join(body.names)
         raise InvalidField("joint", f"{name!r}{did_you_mean(name, body.names)}, expected {names}")
-    limb = limbs.find_kept_limb(body.parents, body.bones, body.names.index(name))
+    limb = limbs.find_kept_limb(body.parents, body.bones, body.names.index(name), body.hinges)
     if limb is None:
         raise InvalidField("joint", f"{name!r}, expected a joint that an arm or a leg leads to")
     return limb

@@ -37,7 +37,13 @@ def add_hold(timeline: Timeline, script: Script, index: int) -> None:
     before = timeline.done
     joint = hold.joint or _held_joint(timeline, script)
     character = script.character
-    body = held_pose.body_of(character.skeleton, character.roles, character.bones, character.facing)
+    body = held_pose.body_of(
+        character.skeleton,
+        character.roles,
+        character.bones,
+        character.facing,
+        character.body.hinges,
+    )
     passage, miss = held_pose.hold_passage(
         before, body, hold.seconds, joint, hold.look_at, script.question.take
     )

@@ -47,7 +47,9 @@ class WorldTarget:
 def find_limbs(character: Character, targets: Sequence[WorldTarget]) -> dict[int, Limb | None]:
     """Return the limb that moves each joint with a target; None for a joint of the trunk."""
     return {
-        target.joint: limbs.find_kept_limb(character.parents, character.bones, target.joint)
+        target.joint: limbs.find_kept_limb(
+            character.parents, character.bones, target.joint, character.hinges
+        )
         for target in targets
     }
 
@@ -166,8 +168,7 @@ def _hold(poses: LimbPoses, limb: Limb, target: WorldTarget) -> tuple[float, Lim
     goal = target_end + _shortfall(poses, limb, upper, target_end)
     end = goal - upper
     distance = np.linalg.norm(end, axis=-1)
-    above, below = poses.length(limb.middle), poses.length(limb.lower)
-    length = np.maximum(distance, 1.001 * np.abs(above - below) + 1e-6)
+    length = np.maximum(distance, 1.001 * two_bone.distances(poses, limb)[0] + 1e-6)
     end = end * (length / np.maximum(distance, 1e-9))[:, None]
     before = (lower - upper)[:1]
     sine, cosine = np.linalg.norm(quat.cross(before, end[:1])), np.sum(before * end[:1])
@@ -188,7 +189,7 @@ def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, target_end: RootPa
     spread = float(np.linalg.norm(upper - centre, axis=-1).max())
     away = target_end.mean(axis=0) - centre
     distance = max(float(np.linalg.norm(away)), 1e-9)
-    length = float((poses.length(limb.middle) + poses.length(limb.lower))[0])
+    length = float(two_bone.distances(poses, limb)[1][0])
     reached = float(two_bone.soften(np.array([distance + spread]), firm[:1], length)[0]) - spread
     beyond = np.clip((distance + spread - firm[:1]) / FAR, 0.0, 1.0)
     reached -= EASE * float(smoothstep(beyond)[0])

@@ -28,6 +28,7 @@ from posefield.performance.passage import (
     match_skeletons,
     scale_heights,
 )
+from posefield.performance.shared_hinges import shared_hinges
 from posefield.question.motion_question import MotionQuestion, check_number, check_range, check_take
 from posefield.question.performance_question import (
     Act,
@@ -300,7 +301,7 @@ def _character(
         chosen = question.character
         with errors_under("character"):
             return _script_character(
-                find(chosen.model), chosen.controls, chosen.performer, chosen.labels
+                find(chosen.model), chosen.controls, chosen.performer, chosen.labels, models
             )
     segments = list(enumerate(question.segments))
     for kind in (Act, Walk):
@@ -308,7 +309,7 @@ def _character(
             model = models[index]
             if isinstance(segment, kind) and model is not None:
                 with errors_under("segments", index):
-                    return _script_character(model, {}, segment.performer, segment.labels)
+                    return _script_character(model, {}, segment.performer, segment.labels, models)
     raise InvalidField("character", "none, expected one: no segment has a model")
 
 
@@ -317,12 +318,15 @@ def _script_character(
     controls: dict[str, float],
     performer: str | None,
     labels: dict[str, str | dict[str, float]],
+    others: Sequence[Synthesizer | None],
 ) -> ScriptCharacter:
+    """Return the character of a model, with limits for the motions of all models of a script."""
     card = model.session.card
     bones = _bones(model, MotionQuestion(controls=controls, performer=performer, labels=labels))
     foot_contacts = [contact for contact in card.contacts if contact.joint in card.feet]
+    limits = shared_hinges(card, [other.session.card for other in others if other is not None])
     choice = footsteps.choose_limbs(
-        card.skeleton.parents, bones, [contact.joint for contact in foot_contacts], ()
+        card.skeleton.parents, bones, [contact.joint for contact in foot_contacts], (), limits
     )
     contacts = tuple(foot_contacts[index] for index in choice.feet)
     feet = tuple(contact.joint for contact in contacts)

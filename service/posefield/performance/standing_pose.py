@@ -105,7 +105,9 @@ def _made(walker: Walker) -> StandingPose | None:
     parents = walker.card.skeleton.parents
     session, controls = walker.gait.session, walker.slowest
     bones = stride.bones(session, controls, walker.labels(1))[0].astype(np.float64)
-    legs = [limbs.find_limb(parents, bones, contact.joint) for contact in contacts]
+    legs = [
+        limbs.find_limb(parents, bones, contact.joint, walker.card.hinges) for contact in contacts
+    ]
     phases = np.arange(PHASES) / PHASES
     rows = np.repeat(controls, PHASES, axis=0)
     posed = stride.synthesize_poses(session, rows, walker.labels(PHASES), phases)

@@ -24,7 +24,7 @@ from posefield.common.units import (
 from posefield.inference import level_selection, onnx_runtime
 from posefield.inference.level_selection import LevelCriteria, LevelTable
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import curves, quat, skeleton
+from posefield.motion import curves, hinges, quat, skeleton
 from posefield.motion.clip import CrowdPoses, Placement
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 from posefield.validation import crowd_validation
@@ -58,12 +58,17 @@ def pose_takes(
     coefficients, frame_column, *ways = (array.astype(float) for array in arrays)
     frames, travel = frame_column[:, 0], ways[0] if ways else np.zeros((len(controls), 3))
     motions = coefficients @ reduced.core.reshape(r2 * r1, -1).T
+    predicted = np.einsum("nt,ntd->nd", reduced.rows(frames), motions.reshape(-1, r2, r1))
     changes = model.solver.variation.changes(corrector, controls, labels, takes.seeds)
     motions += takes.variety[:, None] * changes[:, : r2 * r1]
     moves = np.einsum("nt,ntd->nd", reduced.rows(frames), motions.reshape(-1, r2, r1))
     moves += _details(model, takes, frames, level)
     numbers = reduced.mean + moves @ reduced.directions
     end, rotations = 3 + 3 * len(reduced.rotations), reduced.turns(numbers)
+    limits = hinges.from_card(model.session.card.hinges)
+    if len(limits):
+        centres = limits.turn_angles(reduced.joint_turns(predicted, limits.joints))
+        rotations = limits.within(rotations, centres)
     share = frames / (reduced.frames - 1)
     turned, path = skeleton.add_travel(rotations, numbers[:, :3], share[:, None] * travel)
     return turned, path, curves.clamp(model.session.card.curves, numbers[:, end:])

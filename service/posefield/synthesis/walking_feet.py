@@ -26,7 +26,7 @@ from posefield.locomotion.walking_crowd import (
     PoseMaker,
 )
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import skeleton
+from posefield.motion import hinges, skeleton
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
 from posefield.motion.contact_detection import FootContact
 from posefield.question.motion_question import MAX_TAKE
@@ -155,6 +155,7 @@ def _relative_poses(
     card = model.session.card
     shapes = ((len(card.skeleton), 4), (3,), (len(card.curves),))
     posed = [np.empty((len(phases), *shape)) for shape in shapes]
+    limits = hinges.from_card(card.hinges)
     for batch in stride.batches(len(phases)):
         cancellation.check()
         times = (phases[batch] * strides.durations[batch])[:, None]
@@ -168,12 +169,15 @@ def _relative_poses(
         frames = canonical[:, 0]
         deviations_of_batch = deviations.coefficients[rows[batch], pair[1][batch]]
         changes = take_variation.change_coefficients(corrector, deviations_of_batch)
+        predicted = corrector.reduced.moves_of_coefficients(coefficients, frames)
         coefficients[:, : changes.shape[1]] += changes
         moves = corrector.reduced.moves_of_coefficients(coefficients, frames)
         moves += deviations.detail_rows(rows[batch], frames)[:, : moves.shape[1]]
-        for column, values in zip(
-            posed, _poses(corrector.reduced, moves, frames, travel), strict=True
-        ):
+        poses = _poses(corrector.reduced, moves, frames, travel)
+        if len(limits):
+            turns = corrector.reduced.joint_turns(predicted, limits.joints)
+            poses = limits.within(poses[0], limits.turn_angles(turns)), *poses[1:]
+        for column, values in zip(posed, poses, strict=True):
             column[batch] = values
     rotations, roots, values = posed
     relative = stride.relative_poses(strides, phases, rotations, roots)
