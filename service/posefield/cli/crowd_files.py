@@ -62,6 +62,7 @@ def write_crowd(
         "outside_share": crowd.facts["outside_share"],
         "feet_stand": crowd.facts["feet_stand"],
         "take": crowd.facts.get("take", {}),
+        "overlaps": crowd.facts.get("overlaps", {}),
         "warnings": crowd.facts.get("warnings", []),
         **feet.facts(),
     }

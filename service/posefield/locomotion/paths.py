@@ -1,7 +1,8 @@
 """Paths on the floor that characters follow: through given waypoints, or at random.
 
 The random numbers of a character are one row of a table that is generated row by row: they depend
-on the seed and the character's index, not on the size of the crowd or the duration.
+on the seed and the character's index, not on the size of the crowd. Characters on random paths keep
+their distances.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,8 @@ from posefield.common.units import (
     PerPoint,
 )
 from posefield.inference.level_selection import MAX_COORDINATE
-from posefield.locomotion import floor_plane, stride
+from posefield.locomotion import collision_avoidance, floor_plane, stride
+from posefield.locomotion.collision_avoidance import SPEED_MARGIN, STEP, RandomWalks
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.motion.clip import Placement
@@ -202,12 +204,15 @@ def _check_turning(gait: Gait, paths: Paths) -> None:
 
 # Spacing of the initial grid, and largest offset of a character from its grid point, m.
 SPACING, MAX_JITTER = 2.0, 0.5
+# Phases of neighbours on the grid in each direction, and their largest variation: any of the eight
+# neighbours differ by at least a tenth of a cycle.
+PHASE_STEPS, PHASE_VARIATION = (0.4, 0.2), 0.1
+# Rings of the grid around a crowd whose starts are kept free.
+RINGS = 2
 # Wavelengths, m, and weights of the variation of turning and speed along a path.
 WAVELENGTHS, WAVE_WEIGHTS = np.array([23.0, 11.0, 6.1]), np.array([0.5, 0.3, 0.2])
 # Share of the sampled turning that is used, and relative variation of the speed.
 TURNING_SHARE, SPEED_VARIATION = 0.8, 0.15
-# Share of the sampled speeds that is left out at either end, where little turning was sampled.
-SPEED_MARGIN = 0.05
 
 
 @dataclass(frozen=True)
@@ -216,18 +221,22 @@ class Characters:
 
     who: (N,), labels by index in `stride.label_rows`, -1 for a model without any. phases: (N,), of
     the cycle at the beginning. random_numbers: (N, columns), random numbers from 0 to 1 for the
-    paths.
+    paths. later: (M,), starts of further characters of the seed, around these.
     """
 
     who: Annotated[Indices, "characters"]
     phases: PerCharacter
     random_numbers: Annotated[Floats, "characters columns"]
+    later: Annotated[FloorVectors, "later"]
 
 
 def draw_characters(gait: Gait, count: int, seed: int) -> Characters:
     """Return the characters of a seed."""
-    table = _random_table(count, seed)
-    return Characters(gait.labels.draw(table[:, 0]), table[:, 1], table[:, 2:])
+    all_rows = _random_table((int(np.ceil(np.sqrt(count))) + RINGS) ** 2, seed)
+    table, (rows, columns) = all_rows[:count], grid_cells(count)
+    phases = PHASE_STEPS[0] * rows + PHASE_STEPS[1] * columns + PHASE_VARIATION * table[:, 1]
+    later = _starts(all_rows[:, 2:4])[count:]
+    return Characters(gait.labels.draw(table[:, 0]), phases % 1.0, table[:, 2:], later)
 
 
 def initial_placement(count: int, seed: int) -> Placement:
@@ -239,23 +248,37 @@ def initial_placement(count: int, seed: int) -> Placement:
 
 
 def draw_paths(gait: Gait, characters: Characters, seconds: float) -> Paths:
-    """Return random paths, long enough for `seconds` at the highest speed."""
-    spot, pace = characters.random_numbers[:, :2], characters.random_numbers[:, 3]
-    waves = 2.0 * np.pi * characters.random_numbers[:, 4:].reshape(len(spot), 2, len(WAVELENGTHS))
+    """Return random paths that keep their distances, long enough for `seconds`.
+
+    Beyond them a path goes on with its last speed and curvature.
+    """
+    walks = _draw_walks(gait, characters, seconds)
+    walks = collision_avoidance.keep_distances(gait.region, walks, characters.later)
     count = int(np.ceil(gait.region.speeds[1] * seconds / POINT_SPACING)) + 3
     along = np.linspace(0.0, (count - 1) * POINT_SPACING, count)
-    mean_speeds = _captured_speeds(gait, characters.who, pace)
+    gone = collision_avoidance.cumulative_integrals(walks.speeds)
+    speeds, turning = (
+        np.stack([np.interp(along, *pair) for pair in zip(gone, rates, strict=True)])
+        for rates in (walks.speeds, walks.turning)
+    )
+    # Curvatures, 1/m. The trapezoidal rule: that of a step is the mean of those at its ends.
+    bends = turning / speeds
+    turns = np.cumsum(0.5 * POINT_SPACING * (bends[:, 1:] + bends[:, :-1]), axis=1)
+    headings = walks.headings[:, None] + np.pad(turns, ((0, 0), (1, 0)))
+    return Paths(walks.starts, headings, speeds, np.full(len(headings), along[-1]))
+
+
+def _draw_walks(gait: Gait, characters: Characters, seconds: float) -> RandomWalks:
+    """Return random walks of characters that do not know of one another."""
+    numbers = characters.random_numbers
+    waves = 2.0 * np.pi * numbers[:, 4:].reshape(len(numbers), 2, len(WAVELENGTHS))
+    mean_speeds = _captured_speeds(gait, characters.who, numbers[:, 3])
+    along = mean_speeds * STEP * np.arange(int(np.ceil(seconds / STEP)) + 2)
     speeds = _speeds(gait, mean_speeds, _wave(along, waves[:, 0]))
     low, high = gait.region.turning(speeds)
-    wave = TURNING_SHARE * _wave(along, waves[:, 1])
-    # Curvatures, 1/m: straight where the wave is zero.
-    bends = _vary(wave, low, np.zeros(1), high) / speeds
-    # The trapezoidal rule: the curvature of a step is the mean of those at its ends.
-    turns = np.cumsum(0.5 * POINT_SPACING * (bends[:, 1:] + bends[:, :-1]), axis=1)
-    headings = _initial_headings(characters.random_numbers)[:, None] + np.pad(
-        turns, ((0, 0), (1, 0))
-    )
-    return Paths(_starts(spot), headings, speeds, np.full(len(spot), along[-1]))
+    # Straight where the wave is zero.
+    turning = _vary(TURNING_SHARE * _wave(along, waves[:, 1]), low, np.zeros(1), high)
+    return RandomWalks(_starts(numbers[:, :2]), _initial_headings(numbers), speeds, turning)
 
 
 def _random_table(count: int, seed: int) -> Annotated[Floats, "{count} columns"]:
@@ -273,17 +296,24 @@ def _starts(spot: Annotated[Floats, "characters 2"]) -> Annotated[FloorVectors, 
 
     A character's start does not depend on how many characters follow.
     """
-    number = np.arange(len(spot))
-    ring = np.sqrt(number).astype(np.int64)
-    on = number - ring**2
-    columns, rows = np.minimum(on, ring), np.minimum(2 * ring - on, ring)
+    rows, columns = grid_cells(len(spot))
     jitter = MAX_JITTER * (2.0 * spot - 1.0)
     return (SPACING * rows + jitter[:, 0]) + 1j * (SPACING * columns + jitter[:, 1])
 
 
-def _wave(along: PerPoint, phases: Annotated[Floats, "characters waves"]) -> CharacterPoints:
-    """Return values (N, K) from -1 to 1 that vary smoothly along (K,) m."""
-    angles = 2.0 * np.pi * along[:, None] / WAVELENGTHS + phases[:, None]
+def grid_cells(count: int) -> tuple[Indices, Indices]:
+    """Return the rows and columns (N,) of a grid that is numbered in growing squares."""
+    number = np.arange(count)
+    ring = np.sqrt(number).astype(np.int64)
+    on = number - ring**2
+    return np.minimum(2 * ring - on, ring), np.minimum(on, ring)
+
+
+def _wave(
+    along: Annotated[Floats, "characters steps"], phases: Annotated[Floats, "characters waves"]
+) -> Annotated[Floats, "characters steps"]:
+    """Return values (N, T) from -1 to 1 that vary smoothly along (N, T) m."""
+    angles = 2.0 * np.pi * along[..., None] / WAVELENGTHS + phases[:, None]
     return np.sin(angles) @ WAVE_WEIGHTS
 
 

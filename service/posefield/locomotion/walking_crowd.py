@@ -12,8 +12,16 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.level_selection import Camera, NamedModel
 from posefield.inference.session import Session
-from posefield.locomotion import floor_plane, locomotion_plan, paths, stride
+from posefield.locomotion import (
+    collision_avoidance,
+    floor_plane,
+    locomotion_plan,
+    paths,
+    stride,
+)
 from posefield.locomotion import paths as given
+from posefield.locomotion.collision_avoidance import RADIUS
+from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
 from posefield.locomotion.paths import Route
@@ -269,6 +277,8 @@ def mean_foot_skate(gait: Gait, rate: float) -> float:
 MAX_CHARACTERS = 1_000_000
 """Largest number of characters of one crowd, which may share motions."""
 DEFAULT_FPS, DEFAULT_PIXELS = 30.0, 1.0
+MOST_OVERLAPS = 20
+"""Pairs of characters that overlap, the first ones, of which a crowd tells the times."""
 
 
 @dataclass(frozen=True)
@@ -357,12 +367,45 @@ def build_crowd(
     else:
         plan = plan_random(gait, order.motions or order.count, *span)
     levels = _build_schedule(model, plan, order)
-    crowd = crowd_of_plan(gait.session, plan, levels, make)
-    if order.motions is None:
+    crowd, places = crowd_of_plan(gait.session, plan, levels, make), plan.places
+    if order.motions is not None:
+        # The characters reuse the motions in turn.
+        stands = paths.initial_placement(order.count, order.seed)
+        motion = np.arange(len(stands)) % len(plan.who)
+        crowd = replace(crowd, placement=stands, motion=motion)
+    if not collision_avoidance.is_searchable(len(crowd.motion), plan.places.shape[1], plan.rate):
         return crowd
-    # The characters reuse the motions in turn.
-    stands = paths.initial_placement(order.count, order.seed)
-    return replace(crowd, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
+    if order.motions is not None:
+        places = _placed(crowd.placement, plan.relative_to_start().places[crowd.motion])
+    return replace(crowd, facts={**crowd.facts, **_overlap_facts(places, plan.rate)})
+
+
+def _placed(
+    placement: Placement, relative: Annotated[FloorVectors, "characters frames"]
+) -> Annotated[FloorVectors, "characters frames"]:
+    """Return the places of characters (N, F), m, from those in the frames of their starts."""
+    starts = floor_plane.project(placement.positions)[:, None]
+    return starts + relative * floor_plane.unit_vectors(placement.headings)[:, None]
+
+
+def _overlap_facts(
+    places: Annotated[FloorVectors, "characters frames"], rate: float
+) -> dict[str, Any]:
+    """Return the facts of the pairs of characters that overlap, with a warning of any."""
+    overlaps = collision_avoidance.find_overlaps(places, rate)
+    if not overlaps:
+        return {"overlaps": {"pairs": 0}}
+    told = overlaps[:MOST_OVERLAPS]
+    columns = {name: [getattr(overlap, name) for overlap in told] for name in vars(told[0])}
+    first = told[0]
+    warning = (
+        f"pairs of characters that come nearer than {2.0 * RADIUS:g} m: {len(overlaps)}, the first "
+        f"at {first.seconds:.1f} s ({first.first} and {first.second})"
+    )
+    return {
+        "overlaps": {"pairs": len(overlaps), **columns},
+        "warnings": [warning],
+    }
 
 
 def _build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:

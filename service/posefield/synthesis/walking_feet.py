@@ -223,7 +223,7 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
             "detail": takes.detail,
         }
     if order.detail and not model.session.card.making.detail:
-        facts["warnings"] = [NO_DETAIL]
+        facts["warnings"] = [*crowd.facts.get("warnings", ()), NO_DETAIL]
     return replace(crowd, facts={**crowd.facts, **facts})
 
 

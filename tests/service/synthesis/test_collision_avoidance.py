@@ -1,0 +1,92 @@
+"""Tests of crowds that keep their distances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.inference import session
+from posefield.locomotion import collision_avoidance, gait, paths, walking_crowd
+from posefield.locomotion.paths import Route
+from posefield.locomotion.walking_crowd import CrowdOrder
+from posefield.synthesis import walking_feet
+from posefield.synthesis.synthesizer import Synthesizer
+
+RATE = 30.0
+
+
+@pytest.fixture(scope="module")
+def model(walk_path):
+    return Synthesizer("stroll", session.load(walk_path))
+
+
+@pytest.fixture(scope="module")
+def own(model):
+    return gait.fit_gait(model.session)
+
+
+def nearest(places):
+    """The smallest distance of two characters in any frame, m."""
+    apart = np.abs(places[:, None] - places) + 9.0 * np.eye(len(places))[..., None]
+    return apart.min()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_fifty_walkers_do_not_walk_through_each_other(own, seed, monkeypatch):
+    plan = walking_crowd.plan_random(own, 50, 20.0, RATE, seed)
+    assert nearest(plan.places) > 2.0 * collision_avoidance.RADIUS
+    # They still walk: nobody stands or turns in circles.
+    assert np.abs(plan.places[:, -1] - plan.places[:, 0]).min() > 5.0
+    # Negative control: walks as drawn.
+    monkeypatch.setattr(collision_avoidance, "MOST_CELLS", 0)
+    drawn = walking_crowd.plan_random(own, 50, 20.0, RATE, seed)
+    assert nearest(drawn.places) < 0.3
+    assert len(collision_avoidance.find_overlaps(drawn.places, RATE)) > 10
+
+
+def test_overlaps_are_those_of_all_pairs(rng):
+    places = np.cumsum(rng.normal(size=(40, 90)) + 1j * rng.normal(size=(40, 90)), axis=1)
+    expected = {}
+    for first, second in zip(*np.triu_indices(40, 1), strict=True):
+        near = np.abs(places[first] - places[second])[::3] < 0.5
+        if near.any():
+            expected[int(first), int(second)] = int(near.argmax()) * 3 / RATE
+    found = collision_avoidance.find_overlaps(places, RATE)
+    assert {(one.first, one.second): one.seconds for one in found} == expected
+    assert len(expected) > 20
+    assert [one.seconds for one in found] == sorted(one.seconds for one in found)
+
+
+def test_neighbours_begin_at_different_phases(own):
+    drawn = paths.draw_characters(own, 100, 3)
+    grid = np.stack(paths.grid_cells(100))
+    beside = np.abs(grid[:, :, None] - grid[:, None]).max(axis=0) == 1
+    gaps = np.abs(drawn.phases[:, None] - drawn.phases)[beside]
+    assert np.minimum(gaps, 1.0 - gaps).min() >= 0.1 - 1e-9
+    assert np.histogram(drawn.phases, 5, (0.0, 1.0))[0].min() >= 15
+
+
+def test_routes_are_kept_and_told_where_they_cross(model, own):
+    across = [
+        Route(np.array([[0.0, -3.0], [0.0, 3.0]]), 1.0),
+        Route(np.array([[-3.0, 0.0], [3.0, 0.0]]), 1.0),
+        Route(np.array([[9.0, -3.0], [9.0, 3.0]]), 1.0),
+    ]
+    order = CrowdOrder(count=3, routes=across, seconds=4.0)
+    made = walking_feet.build_crowd(model, own, order)
+    assert made.facts["overlaps"] == {
+        "pairs": 1,
+        "first": [0],
+        "second": [1],
+        "seconds": [pytest.approx(2.7, abs=0.11)],
+    }
+    (warning,) = made.facts["warnings"]
+    assert warning.endswith("nearer than 0.5 m: 1, the first at 2.7 s (0 and 1)")
+    alone = walking_feet.build_crowd(model, own, replace(order, count=2, routes=across[1:]))
+    assert alone.facts["overlaps"] == {"pairs": 0} and "warnings" not in alone.facts
+
+
+def test_overlaps_of_shared_motions_are_told(model, own):
+    order = CrowdOrder(count=40, motions=3, seconds=10.0)
+    found = walking_feet.build_crowd(model, own, order).facts["overlaps"]
+    assert found["pairs"] > 10 and len(found["seconds"]) <= walking_crowd.MOST_OVERLAPS
