@@ -1,5 +1,6 @@
 """Tests of the doctor on reference motions of other programs."""
 
+import json
 import zipfile
 from dataclasses import replace
 
@@ -7,9 +8,12 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import MotionFileError
-from posefield.robots import robot_formats
+from posefield.motion import quat
+from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
+from posefield_train import training
 from posefield_train.robots import doctor, robot_file
+from posefield_train.source import ingest, recipe
 
 pytestmark = pytest.mark.system
 
@@ -66,3 +70,76 @@ def test_gaits_of_a_biped_stand_within_limits_and_an_altered_one_is_found(files)
     found = doctor.outliers(motions)
     assert found[7].where == "left_knee"
     assert len(set(found) - sound - {7}) <= 1
+
+
+RECIPE = """schema = 1
+name = "go_bdx"
+description = "Gaits of a biped"
+licence = "NVIDIA, not commercial"
+[robot]
+model = "go_bdx.xml"
+[clips]
+table = "clips.csv"
+file = "file"
+first_frame = "first"
+last_frame = "last"
+[motion]
+frames = 60
+cyclic = true
+root = "travelling"
+[alignment]
+warp = "identity"
+[size]
+rms_budget_cm = 0.02
+"""
+COMMANDS = {"forward": "dx", "left": "dy", "turning": "dtheta"}
+FIRST, PERIOD = 240, 99
+"""First frame of the cycle that is cut, behind the robot's start, and its length."""
+
+
+def test_gaits_left_out_are_predicted_better_than_a_lookup_does(files):
+    """With a tenth of the commands left out, twice: 0.64 degrees, where the nearest has 1.26."""
+    folder = files / "robot_go_bdx"
+    robot = robot_file.read(folder / "go_bdx.xml")
+    rows = ["file,dx,dy,dtheta,first,last"]
+    for path in sorted((folder / "gaits").glob("*.json"), key=lambda path: int(path.stem)):
+        stated = json.loads(path.read_text())["Placo"]
+        values = [str(stated[column]) for column in COMMANDS.values()]
+        rows.append(",".join([f"gaits/{path.name}", *values, str(FIRST), str(FIRST + PERIOD)]))
+    (folder / "clips.csv").write_text("\n".join(rows) + "\n")
+    controls = [
+        f'[[controls]]\nname = "{name}"\ncolumn = "{column}"\nunit = "m/s"\ndescription = "Command"'
+        for name, column in COMMANDS.items()
+    ]
+    (folder / "recipe.toml").write_text("\n".join([RECIPE, *controls]))
+    family = recipe.read(folder / "recipe.toml")
+    examples, _ = ingest.ingest(family, folder)
+    made = robot_clip.of(robot)
+    angles = np.array([made.motion(each.clip, "").angles[:PERIOD] for each in examples])
+    commands = np.array([each.controls for each in examples])
+    order = np.random.default_rng(0).permutation(len(examples))
+    errors, lookups = [], []
+    for left_out in (order[::10], order[1::10]):
+        rest = np.setdiff1d(order, left_out)
+        trained = training.train_examples(family, [examples[index] for index in rest])
+        predicted = predicted_angles(trained, made, commands[left_out])
+        errors.append(predicted - angles[left_out])
+        scaled = commands / commands.std(axis=0)
+        distances = np.linalg.norm(scaled[left_out, None] - scaled[rest], axis=-1)
+        lookups.append(angles[rest][distances.argmin(axis=1)] - angles[left_out])
+    error, lookup = (np.degrees(np.sqrt(np.mean(np.square(each)))) for each in (errors, lookups))
+    assert error < 0.7
+    assert lookup > 1.7 * error
+
+
+def predicted_angles(trained, made, commands):
+    """Return the hinges' angles of a model at commands, at the frames of a cycle."""
+    labels = np.zeros((len(commands), 0))
+    bank = trained.model.bank
+    durations = np.exp(bank.numpy(bank.points(commands, labels))["duration"])
+    times = durations * np.arange(PERIOD) / PERIOD
+    rotations = trained.model.evaluate(commands, times, labels).rotations
+    names = trained.skeleton.names
+    joints = [names.index(made.skeleton.names[joint]) for joint in made.hinge_joints]
+    turns = [quat.twist(rotations[:, :, j], a) for j, a in zip(joints, made.axes, strict=True)]
+    return np.stack(turns, axis=-1)

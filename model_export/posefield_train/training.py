@@ -174,7 +174,9 @@ def _vectorize(
     """Align clips and build the tensor of their pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
     samples, labels = sample_points.make_samples(recipe, examples)
-    refinement = Refinement(settings.rounds, _predictor(recipe, samples, jobs))
+    refinement = None
+    if settings.warp == "fitted":
+        refinement = Refinement(settings.rounds, _predictor(recipe, samples, jobs))
     aligned = time_alignment.align(examples, recipe.motion.frames, basis, weights, refinement, jobs)
     travels = {}
     if recipe.motion.cyclic:

@@ -9,9 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
+import posefield
+import posefield_train
 from posefield.common.errors import MotionFileError
+from posefield.model_file import card_check, checked_file
 from posefield.motion import quat
-from posefield.robots import robot_formats
+from posefield.motion.clip import Clip
+from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
 from posefield.robots.robot_motion import RobotMotion
 from posefield_train.robots import doctor, robot_file
@@ -32,6 +36,12 @@ BIPED = f"""<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
 {LEG.format(side="right", y=-0.1)}
 <body name="neck" pos="0 0 0.2"><joint name="neck_yaw" axis="0 0 1"/>
 <geom type="sphere" size="0.05"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.fixture
+def command(posefield):
+    """Function that runs `posefield` here; the package has the fixture's name."""
+    return posefield
 
 
 @pytest.fixture(scope="module")
@@ -278,25 +288,154 @@ def test_a_urdf_file_floats(tmp_path):
     np.testing.assert_allclose(robot.ranges, [[-1.0, 2.0]])
 
 
-def test_the_command_tells_converts_and_draws(robot, file, tmp_path, posefield):
+def test_the_command_tells_converts_and_draws(robot, file, tmp_path, command):
     sound = save(tmp_path, standing(robot), robot, "awd.json")
     output, drawn = tmp_path / "converted", tmp_path / "picture.png"
     words = ["doctor", sound, "--robot", file, "--to", "mjlab.npz", "-o", output]
-    code, out, _ = posefield(*words, "--picture", drawn, "--json")
+    code, out, _ = command(*words, "--picture", drawn, "--json")
     (facts,) = json.loads(out)["motions"]
     assert (code, facts["format"], facts["frames"], facts["findings"]) == (0, "awd.json", 100, [])
     assert drawn.read_bytes().startswith(b"\x89PNG")
     mjlab = robot_formats.read(output / "motion.npz", Conventions(robot))
     np.testing.assert_allclose(mjlab.angles, standing(robot).angles, atol=1e-9)
-    code, _, errors = posefield(*words)
+    code, _, errors = command(*words)
     assert code and "exists already" in errors
 
 
-def test_the_command_names_a_file_that_cannot_be_read(robot, file, tmp_path, posefield):
+def test_the_command_names_a_file_that_cannot_be_read(robot, file, tmp_path, command):
     broken = tmp_path / "broken.csv"
     broken.write_text("1,2,three\n")
     sound = save(tmp_path, standing(robot), robot, "awd.json")
-    code, out, errors = posefield("doctor", broken, sound, "--robot", file)
+    code, out, errors = command("doctor", broken, sound, "--robot", file)
     assert code == 1
     assert "line 1: found '1,2,three', expected numbers" in errors.replace("\n", " ")
     assert "no faults" in out
+
+
+def test_a_skeleton_moves_as_the_robot_and_gives_its_angles_back(robot):
+    motion = motion_of(robot)
+    made = robot_clip.of(robot)
+    rotations, translations = made.joint_motion(motion)
+    clip = Clip(made.skeleton, rotations, translations, motion.rate)
+    positions, _ = motion.body_poses(robot)
+    foot = made.skeleton.names.index("right_foot")
+    # Y up, and +Z ahead: the axes of a robot's file, moved on by one.
+    expected = positions[:, robot.bodies.index("right_foot")][:, [1, 2, 0]]
+    np.testing.assert_allclose(clip.positions()[:, foot], expected, atol=1e-12)
+    back = made.motion(clip, "clip")
+    np.testing.assert_allclose(back.angles, motion.angles, atol=1e-12)
+    np.testing.assert_allclose(back.base_path, motion.base_path, atol=1e-12)
+    np.testing.assert_allclose(back.base_rotations, motion.base_rotations, atol=1e-12)
+
+
+def test_means_of_hinges_are_hinges(robot):
+    made = robot_clip.of(robot)
+    chart = quat.CHARTS["stereographic"]
+    first, second = (
+        chart.numbers(quat.log(made.joint_motion(motion_of(robot, seed=seed))[0]))
+        for seed in (0, 1)
+    )
+    mixed = chart.quaternions(0.3 * first + 0.7 * second)
+    for hinge, joint in enumerate(made.hinge_joints):
+        across = quat.cross(mixed[:, joint, 1:], made.axes[hinge])
+        np.testing.assert_allclose(across, 0.0, atol=1e-12)
+
+
+RECIPE = """schema = 1
+name = "biped"
+description = "Gaits of a biped"
+licence = "CC0-1.0"
+[robot]
+model = "biped.xml"
+[clips]
+table = "clips.csv"
+file = "file"
+[[controls]]
+name = "pace"
+column = "pace"
+unit = "m/s"
+description = "Speed"
+[motion]
+frames = 24
+cyclic = true
+root = "travelling"
+[alignment]
+warp = "identity"
+[size]
+rms_budget_cm = 0.01
+"""
+
+
+def gait(robot, pace):
+    """One cycle of 40 frames, the last of which is the first of the next, at a pace in m/s."""
+    motion = motion_of(robot, 41, rate=40.0, turn=0.0)
+    cycle = np.sin(2 * np.pi * np.arange(41) / 40)[:, None]
+    angles = motion.angles.mean(axis=0) + 0.4 * pace * cycle * np.linspace(0.5, 1.0, 9)
+    path = np.stack([pace * np.arange(41) / 40, np.zeros(41), np.full(41, 0.7)], axis=-1)
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (41, 1))
+    return replace(motion, angles=angles, base_path=path, base_rotations=upright)
+
+
+@pytest.fixture(scope="module")
+def family(robot, file, tmp_path_factory):
+    """Folder of a recipe with gaits at eight paces, and the model of it."""
+    folder = tmp_path_factory.mktemp("biped")
+    rows = ["file,pace"]
+    for index, pace in enumerate(np.linspace(0.2, 0.9, 8)):
+        content = robot_formats.WRITTEN["awd.json"].write(gait(robot, pace), robot)
+        (folder / f"{index}.json").write_bytes(content)
+        rows.append(f"{index}.json,{pace}")
+    (folder / "clips.csv").write_text("\n".join(rows) + "\n")
+    (folder / "biped.xml").write_text(file.read_text())
+    (folder / "recipe.toml").write_text(RECIPE)
+    recipe = posefield_train.read_recipe(folder / "recipe.toml")
+    posefield_train.export(posefield_train.train(recipe, folder), folder / "biped.onnx")
+    return folder
+
+
+def test_a_model_of_a_robot_answers_with_its_angles_between_the_commands(family, robot):
+    model = posefield.load(family / "biped.onnx")
+    motion = model.clip(pace=0.45, fps=40.0).robot_motion()
+    # Between two commands, to which neither lies nearer than 0.05 m/s: 1.1 degrees off.
+    expected = gait(robot, 0.45).angles[:40]
+    assert np.degrees(np.abs(motion.angles[:40] - expected).max()) < 0.2
+    nearest = np.degrees(np.abs(gait(robot, 0.4).angles[:40] - expected).max())
+    assert nearest > 1.0
+    assert motion.base_path[39, 0] == pytest.approx(0.45 * 39 / 40, abs=1e-3)
+
+
+@pytest.mark.parametrize("ending", ["mjlab.npz", "unitree.csv", "gmr.pkl"])
+def test_a_clip_of_a_robot_is_saved_for_its_readers(ending, family, robot, command):
+    output = family / f"walk.{ending}"
+    words = ["clip", family / "biped.onnx", "-c", "pace=0.45", "--fps", "40", "-o", output]
+    assert command(*words)[0] == 0
+    stated = Conventions(robot, rate=40.0, quaternions="xyzw")
+    written = robot_formats.read(output, stated)
+    assert written.format == ending
+    np.testing.assert_allclose(
+        np.degrees(written.angles[:40]), np.degrees(gait(robot, 0.45).angles[:40]), atol=0.2
+    )
+
+
+def test_a_clip_of_no_robot_is_no_reference_motion(walk_path, tmp_path, command):
+    output = tmp_path / "walk.mjlab.npz"
+    code, _, errors = command("clip", walk_path, "-o", output)
+    assert code and "this model is of none" in errors
+    assert not output.exists()
+
+
+BAD_CARDS = {
+    "parents": lambda robot: {"parents": (*robot.parents[:-1], 40)},
+    "axes": lambda robot: {"axes": 2.0 * robot.axes},
+    "parents is": lambda robot: {"parents": (-1, 2, 1, *robot.parents[3:])},
+    "hinge_bodies": lambda robot: {"hinge_bodies": (0, *robot.hinge_bodies[1:])},
+    "the joints of the skeleton": lambda robot: {"bodies": ("hips", *robot.bodies[1:])},
+}
+
+
+@pytest.mark.parametrize("message", BAD_CARDS)
+def test_a_card_with_a_broken_robot_is_refused(message, family):
+    card = checked_file.load_card((family / "biped.onnx").read_bytes(), "biped.onnx")
+    broken = replace(card, robot=replace(card.robot, **BAD_CARDS[message](card.robot)))
+    with pytest.raises(ValueError, match=message):
+        card_check.check(broken)

@@ -85,12 +85,13 @@ def align(
     frames: int,
     basis: WarpBasis,
     joint_weights: JointWeights,
-    refinement: Refinement,
+    refinement: Refinement | None,
     jobs: Jobs = SERIAL,
 ) -> AlignedClips:
     """Warp examples to one canonical time and resample them to `frames` frames.
 
-    joint_weights: weights (J,) of the joints' positions in the comparison. jobs: executor of the
+    joint_weights: weights (J,) of the joints' positions in the comparison. refinement: None for
+    identical warps. jobs: executor of the
     warps of many clips. The mean of the inverse warps is the identity, so canonical time is the
     average timing of the family.
     """
@@ -98,6 +99,10 @@ def align(
     marks = _landmark_times(examples)
     knees = _breakpoints(marks, marks.mean(axis=0))
     medoid = _medoid(_align_piecewise(traces, knees, COARSE))
+    if refinement is None:
+        return _resample_all(
+            examples, frames, basis, np.zeros((len(examples), basis.knots)), medoid
+        )
     fine = _align_piecewise(traces, knees, FINE)
     compared = fine if len(fine) <= LARGEST_COMPARED else _movements(fine)
     logs = _centre(_warps_to(compared, compared[medoid], knees, basis, jobs), knees, basis)

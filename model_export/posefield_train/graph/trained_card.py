@@ -180,6 +180,7 @@ def build_card(
         contacts=trained.contacts.statistics if trained.contacts else (),
         captured_acceleration=captured_acceleration(examples),
         hinges=captured_hinges.measure_hinges(examples, roles),
+        robot=examples[0].robot,
     )
 
 

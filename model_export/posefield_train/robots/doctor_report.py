@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from posefield.robots.robot import Robot
+from posefield.robots.robot import UNLIMITED, Robot
 from posefield_train.robots.doctor import Diagnosis
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _draw_angles(axes: "Axes", diagnosis: Diagnosis, robot: Robot | None) -> Non
     motion = diagnosis.motion
     ranges = np.stack([motion.angles.min(axis=0), motion.angles.max(axis=0)], axis=-1)
     if robot:
-        ranges = np.where(np.isfinite(robot.ranges), robot.ranges, ranges)
+        ranges = np.where(np.abs(robot.ranges) < UNLIMITED, robot.ranges, ranges)
     extents = np.maximum(ranges[:, 1] - ranges[:, 0], 1e-9)
     shares = (motion.angles - ranges[:, 0]) / extents
     axes.imshow(

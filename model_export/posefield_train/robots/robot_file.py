@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 from posefield.common.errors import MotionFileError
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield.robots.robot import Foot, Robot
+from posefield.robots.robot import UNLIMITED, Foot, Robot
 
 if TYPE_CHECKING:
     import mujoco
@@ -87,7 +87,7 @@ class _Joint:
         self.axis = model.jnt_axis[index].copy()
         self.anchor = model.jnt_pos[index].copy()
         limited = bool(model.jnt_limited[index])
-        self.range = model.jnt_range[index].copy() if limited else np.array([-np.inf, np.inf])
+        self.range = model.jnt_range[index].copy() if limited else np.array([-UNLIMITED, UNLIMITED])
 
 
 def _surface(model: "mujoco.MjModel", body: int) -> Floats:

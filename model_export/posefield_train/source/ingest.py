@@ -11,11 +11,15 @@ from posefield.common.errors import TrainingError, did_you_mean
 from posefield.common.units import Floats, Positions
 from posefield.motion.clip import Clip
 from posefield.motion.joint_roles import Role
+from posefield.robots.file_conventions import Conventions as RobotConventions
+from posefield.robots.robot import Robot
+from posefield_train.robots import robot_file
 from posefield_train.source import (
     canonical,
     clip_joints,
     clip_table,
     curve_files,
+    data_folder,
     measured_controls,
     motion_file,
     recording_groups,
@@ -50,7 +54,7 @@ class Example:
     recording are left out together. facing: degrees from the root's +z to the body's facing in the
     file, to the left; None for a motion without a facing. captured: the clip of a cycle before its
     seam was closed; None where nothing was closed. contacts: first and last share of the clip as it
-    was cut of each contact in the table, by joint.
+    was cut of each contact in the table, by joint. robot: whose bodies the joints are.
     """
 
     row: ClipRow
@@ -63,6 +67,7 @@ class Example:
     facing: float | None = 0.0
     captured: Clip | None = None
     contacts: Mapping[str, Spans] = field(default_factory=dict)
+    robot: Robot | None = None
 
     @property
     def offsets(self) -> Floats:
@@ -81,7 +86,8 @@ def ingest(
     notes = list[str]()
     rows = clip_table.read(recipe, folder, notes)
     alone = recipe.curves is not None and recipe.curves.alone
-    files = {} if alone else read_files(rows, recipe.source, files_read)
+    robot = robot_conventions(recipe, folder)
+    files = {} if alone else read_files(rows, recipe.source, files_read, robot)
     rate = recipe.source.rate
     curves = curve_files.find_curves(recipe.curves, rows, rate) if recipe.curves else ()
     notes += reader_notes(files)
@@ -156,16 +162,21 @@ def ingest(
             examples[0].clip.skeleton.names,
         )
     examples = [
-        replace(example, recording=recording)
+        replace(example, recording=recording, robot=robot.robot if robot else None)
         for example, recording in zip(examples, recordings, strict=True)
     ]
     return examples, [*recording_notes, *notes]
 
 
 def read_files(
-    rows: Sequence[ClipRow], source: Source, files_read: MotionFiles | None = None
+    rows: Sequence[ClipRow],
+    source: Source,
+    files_read: MotionFiles | None = None,
+    robot: RobotConventions | None = None,
 ) -> dict[str, MotionFile]:
     """Return the motions of rows by their names, each content read once.
+
+    robot: whose reference motions the files hold, if they do.
 
     Raises MotionFileError for a file that cannot be read and RecipeError for more than MAX_POSES in
     all. A file that states another unit or up axis than the source is overruled, with a note.
@@ -174,7 +185,9 @@ def read_files(
     poses = 0
     for row in rows:
         if row.motion not in files:
-            files[row.motion] = files_read.read(row.file, ReadOptions(source.rate, row.animation))
+            files[row.motion] = files_read.read(
+                row.file, ReadOptions(source.rate, row.animation, robot=robot)
+            )
             poses += files[row.motion].poses
         if poses > MAX_POSES:
             raise row.error(
@@ -182,6 +195,16 @@ def read_files(
                 f"{MAX_POSES}"
             )
     return {name: _as_stated(file, source, files.values()) for name, file in files.items()}
+
+
+def robot_conventions(recipe: Recipe, folder: Path) -> RobotConventions | None:
+    """Return the robot of a recipe and the conventions of its files; None for other recipes."""
+    stated = recipe.robot
+    if stated is None:
+        return None
+    body = robot_file.read(Path(str(data_folder.find(folder, stated.model))))
+    rate, degrees = recipe.source.rate, stated.degrees
+    return RobotConventions(body, rate, stated.quaternions, stated.order, degrees)
 
 
 def _as_stated(file: MotionFile, source: Source, other_files: Collection[MotionFile]) -> MotionFile:

@@ -12,6 +12,7 @@ from posefield.common.units import Floats, Positions, Rotations, UpAxis
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.rigs.rest_joints import JointTree
+from posefield.robots.file_conventions import Conventions as RobotConventions
 
 BROADCAST_RATES = tuple(1000.0 * base / 1001.0 for base in (24, 30, 60, 120))
 RATE_TOLERANCE = 1e-4
@@ -128,6 +129,7 @@ class ReadOptions:
 
     rate: source.rate, frames a second. animation: name of one of several in the file. skeleton:
     the same, or the name of one of its joints. rate, metres_per_unit and up overrule the file.
+    robot: whose motion the file holds, in formats of reference motions.
     """
 
     rate: float | None = None
@@ -135,6 +137,7 @@ class ReadOptions:
     skeleton: str | None = None
     metres_per_unit: float | None = None
     up: UpAxis | None = None
+    robot: RobotConventions | None = None
 
 
 AS_STATED = ReadOptions()

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from posefield.common.errors import AcclaimError, FileError, MotionFileError
+from posefield.robots import robot_clip, robot_formats
+from posefield.robots.file_conventions import Conventions
 from posefield_train.source import acclaim, bvh, data_folder
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.motion_file import (
@@ -96,6 +98,25 @@ def _read_usd(file: FileLocation, options: ReadOptions) -> MotionFile:
         return usd_motion.read(copy, str(file), options)
 
 
+def _read_robot(file: FileLocation, conventions: Conventions) -> MotionFile:
+    """Return the motion of a robot's joints, which has Y up and faces +Z."""
+    motion = robot_formats.read(file, conventions)
+    assert conventions.robot is not None
+    body = robot_clip.of(conventions.robot)
+    rotations, translations = body.joint_motion(motion)
+    return MotionFile(
+        str(file),
+        motion.format,
+        body.skeleton,
+        rotations,
+        translations,
+        motion.rate,
+        motion.evidence["rate"],
+        metres_per_unit=1.0,
+        up="y",
+    )
+
+
 FORMATS = (
     MotionFormat(
         "BVH",
@@ -139,6 +160,8 @@ def read(file: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
     Raises MotionFileError for a format that is not read, with the way out, for an animation chosen
     in a format with one motion a file, and for a file that cannot be read.
     """
+    if options.robot:
+        return _read_robot(file, options.robot)
     suffix = _suffix(file.name)
     motion_format = SUFFIXES.get(suffix)
     if motion_format is None:

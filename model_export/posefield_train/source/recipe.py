@@ -49,6 +49,7 @@ from posefield_train.source.recipe_sections import (
     Kriging,
     Motion,
     Preset,
+    RobotSource,
     Size,
     SkeletonSettings,
     Source,
@@ -181,6 +182,7 @@ class Recipe(RecipePart):
         "no model is trained until posefield review --accept, or an editor, writes true",
     )
     source: Source
+    robot: RobotSource | None = None
     clips: Clips
     skeleton: SkeletonSettings = SkeletonSettings()
     controls: Annotated[list[Control], Field(min_length=1)]
@@ -248,6 +250,15 @@ class Recipe(RecipePart):
             return list(auto.joints or filter(None, leg))
         return []
 
+    @model_validator(mode="before")
+    @classmethod
+    def _complete_source(cls, tables: Any) -> Any:
+        """Add what files of robots need not state: their unit, and the axes that reading gives."""
+        if isinstance(tables, dict) and "robot" in tables:
+            source = {"metres_per_unit": 1.0, "up": "y", **tables.get("source", {})}
+            return {**tables, "source": source}
+        return tables
+
     @field_validator("controls")
     @classmethod
     def _check_control_names(cls, controls: list[Control]) -> list[Control]:
@@ -275,6 +286,12 @@ class Recipe(RecipePart):
         for index, control in enumerate(self.controls):
             if isinstance(control, ControlMeasured):
                 check_measurement(self, index, control)
+        if self.alignment.warp == "identity" and self.landmark_names:
+            raise KeyFault(
+                f"found 'identity' and landmarks {self.landmark_names}, which warps move to one "
+                "time, expected 'fitted'",
+                *("alignment", "warp"),
+            )
         check_moments(self.event, self.size, self.clips.landmarks)
         return self
 

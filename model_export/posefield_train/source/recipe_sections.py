@@ -15,6 +15,8 @@ from pydantic import (
 
 from posefield.common.units import UpAxis
 from posefield.motion.joint_roles import Role
+from posefield.robots.file_conventions import QuaternionOrder
+from posefield.robots.robot import Order
 from posefield_train.source.control_sources import TIME_NAMES, Name, RecipePart, Text
 from posefield_train.source.facing import Facing
 
@@ -42,6 +44,25 @@ class Source(RecipePart):
         "files whose keys are not one a frame: their curves are sampled at it; it overrules the "
         "frame time of BVH files, with a note",
     )
+
+
+class RobotSource(RecipePart):
+    """Robot whose reference motions the files hold, and their conventions.
+
+    The files have metres and Z up, and the model Y up; the robot faces +Z.
+    """
+
+    model: Text = Field(
+        description="MJCF or URDF file of the robot, relative to the data folder; "
+        "its bodies are the joints"
+    )
+    quaternions: QuaternionOrder | None = Field(
+        default=None, description="order of the base's quaternions, where the numbers do not tell"
+    )
+    order: Order | None = Field(
+        default=None, description="order of joints without names, where the bodies do not tell"
+    )
+    degrees: bool = Field(default=False, description="whether the files give angles in degrees")
 
 
 class Condition(RecipePart):
@@ -184,6 +205,12 @@ class Alignment(RecipePart):
     )
     rounds: Annotated[int, Field(ge=0, le=8)] = Field(
         default=2, description="number of re-alignments after the alignment to the medoid"
+    )
+    warp: Literal["fitted", "identity"] = Field(
+        default="fitted",
+        description="fitted: the pace of each clip is aligned with the others; identity: clips are "
+        "compared at equal shares of their durations, for cycles that are in step as they are, "
+        "such as those of a program",
     )
     reference: Literal["prediction", "mean"] = Field(
         default="prediction",

@@ -19,8 +19,11 @@ from posefield.console.options import (
 from posefield.console.output import as_json, print_warnings, written_message
 from posefield.encode.formats import POSE_ENCODERS, encoder_for
 from posefield.question.motion_question import FileQuestion, PoseQuestion
+from posefield.question.results import ClipAnswer
 from posefield.question.walk_question import WalkQuestion
+from posefield.robots import robot_clip, robot_formats
 from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
 
 
 @with_question_options(PoseQuestion, default_values={"times": [0.0]})
@@ -51,22 +54,37 @@ def clip(
     curves. With --character, the character of another file moves: USD files refer to it, glTF files
     animate its nodes, others have its skeleton. Blender plays USD files at the scene's frame rate,
     24 by default: write them with --fps 24, or set the scene's rate.
+
+    Of a model of a robot a name such as walk.mjlab.npz writes a reference motion, in any format
+    that `posefield doctor` writes.
     """
-    encoder, opened = encoder_for(output), open_model(model)
+    opened = open_model(model)
+    if reference := robot_formats.of_file(output.name):
+        answer = clips.synthesize_clip(opened, question)
+        robot = opened.session.card.robot
+        content = robot_clip.file_content(robot, answer.clip, reference, output.name)
+    else:
+        answer, content = _clip_file(opened, output, question, character)
+    atomic_files.write(content, output)
+    print_warnings(answer.trust)
+    typer.echo(written_message(output, answer, json))
+
+
+def _clip_file(
+    opened: Synthesizer, output: Path, question: FileQuestion, character: CharacterOptions
+) -> tuple[ClipAnswer, bytes]:
+    """Return a clip and its file, of the model's own or of a user's character."""
+    encoder = encoder_for(output)
     delivery = character.delivery(encoder, question, output)
     if delivery is None:
         convention = encoder.convention(question.unit, question.up, question.body)
         answer = encoder.noted(clips.synthesize_clip(opened, question))
-        content = encoder.encode(answer, convention)
-    else:
-        card = opened.session.card
-        delivery.check(question, card.skeleton, card.roles)
-        predicted = clips.synthesize_clip(opened, question)
-        answer = encoder.noted(delivery.clip(predicted, question, card.roles))
-        content = delivery.encode(answer)
-    atomic_files.write(content, output)
-    print_warnings(answer.trust)
-    typer.echo(written_message(output, answer, json))
+        return answer, encoder.encode(answer, convention)
+    card = opened.session.card
+    delivery.check(question, card.skeleton, card.roles)
+    predicted = clips.synthesize_clip(opened, question)
+    answer = encoder.noted(delivery.clip(predicted, question, card.roles))
+    return answer, delivery.encode(answer)
 
 
 DEFAULT_COUNT = 500

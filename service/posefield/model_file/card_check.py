@@ -15,6 +15,7 @@ from posefield.kriging.kriging_model import COVARIANCE_MODELS
 from posefield.model_file.model_card import ROW_VALUES, ModelCard
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
+from posefield.robots import robot_clip
 
 MAX_ENTRIES = {"controls": 64, "levels": 16, "skeleton": 4096}
 """Largest number of entries of lists that need at least one."""
@@ -62,6 +63,7 @@ def check(card: ModelCard) -> None:
     _check_contacts(card)
     _check_accelerations(card)
     _check_hinges(card)
+    _check_robot(card)
 
 
 def check_graph(
@@ -337,6 +339,36 @@ def _check_hinges(card: ModelCard) -> None:
         for low, high in zip(hinge.low, hinge.high, strict=True):
             right = -np.pi <= low <= high <= np.pi
             _expect(right, path, [low, high], "angles in order, from -pi to pi")
+
+
+def _check_robot(card: ModelCard) -> None:
+    robot = card.robot
+    if robot is None:
+        return
+    bodies, hinges = len(robot.bodies), len(robot.hinges)
+    for name, values, shape in (
+        ("parents", np.array(robot.parents), (bodies,)),
+        ("offsets", robot.offsets, (bodies, 3)),
+        ("turns", robot.turns, (bodies, 4)),
+        ("hinge_bodies", np.array(robot.hinge_bodies), (hinges,)),
+        ("axes", robot.axes, (hinges, 3)),
+        ("anchors", robot.anchors, (hinges, 3)),
+        ("ranges", robot.ranges, (hinges, 2)),
+    ):
+        _expect(values.shape == shape, f"robot.{name}", values.shape, f"the shape {shape}")
+    ordered = all(-1 < parent < body for body, parent in enumerate(robot.parents) if body)
+    _expect(ordered, "robot.parents", robot.parents, "each parent before its children")
+    known = all(0 < body < bodies for body in robot.hinge_bodies)
+    _expect(known, "robot.hinge_bodies", robot.hinge_bodies, f"bodies from 1 to {bodies - 1}")
+    for foot in robot.feet:
+        _expect(0 <= foot.body < bodies, "robot.feet", foot.body, f"bodies below {bodies}")
+        _expect(foot.points.shape[1:] == (3,), "robot.feet", foot.points.shape, "points of three")
+    for name, vectors in (("axes", robot.axes), ("turns", robot.turns)):
+        lengths = np.linalg.norm(vectors, axis=-1)
+        unit = bool(np.all(np.abs(lengths - 1.0) <= UNIT_TOLERANCE))
+        _expect(unit, f"robot.{name}", lengths.tolist(), "lengths of 1")
+    skeleton = robot_clip.of(robot).skeleton
+    _expect(skeleton.same_tree(card.skeleton), "robot", robot.name, "the joints of the skeleton")
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:

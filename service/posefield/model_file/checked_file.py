@@ -142,7 +142,9 @@ class Provenance(TypedDict):
     adapted: NotRequired[tuple[Adaptation, ...]]
 
 
-OPTIONAL = dict.fromkeys(OPTIONAL_ENTRIES, b"[]") | {"captured_acceleration": b"null"}
+OPTIONAL = dict.fromkeys(OPTIONAL_ENTRIES, b"[]") | dict.fromkeys(
+    ("captured_acceleration", "robot"), b"null"
+)
 """Entries that a file may lack, and the text that stands for them."""
 
 _TYPES = get_type_hints(ModelCard, include_extras=True) | {
@@ -187,11 +189,17 @@ def _decode_entry(texts: Mapping[str, bytes], name: str, kind: Any) -> Any:
         raise ValueError(f"its card's entry {name!r} is wrong: {fault}") from fault
 
 
+ROWS = {2: tuple[Number, Number], 4: tuple[Number, Number, Number, Number]}
+"""Rows of arrays of other sizes than three, by size."""
+
+
 def _decode_array(kind: Any, value: Any) -> Floats:
-    """Return an array of numbers (n,), or of triples (n, 3)."""
+    """Return an array of numbers (n,), or of rows of equal length (n, 2 to 4); none are triples."""
     rows = isinstance(value, list) and all(isinstance(row, list) for row in value)
-    numbers = msgspec.convert(value, list[Triple] if rows else list[Number])
-    return np.array(numbers, dtype=np.float64).reshape((-1, 3) if rows else -1)
+    size = len(value[0]) if rows and value else 3
+    row: Any = ROWS.get(size, Triple)
+    numbers = msgspec.convert(value, list[row] if rows else list[Number])
+    return np.array(numbers, dtype=np.float64).reshape((-1, size) if rows else -1)
 
 
 MAX_BYTES = 64 << 20

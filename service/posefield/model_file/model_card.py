@@ -34,6 +34,7 @@ from posefield.motion.hinges import Hinge
 from posefield.motion.measures import Measure
 from posefield.motion.quat import ChartName
 from posefield.motion.skeleton import Skeleton
+from posefield.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def shape_rows(output: str, rows: Singles, questions: int, joints: int) -> Any:
 
 FORMAT = 5
 PREFIX = "posefield."
-OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration", "hinges")
+OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration", "hinges", "robot")
 """Entries that a file lacks where they are empty, or None."""
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
@@ -242,7 +243,8 @@ class ModelCard:
     probabilities of their contacts; the file has neither without them. captured_acceleration: of
     the clips of the training, with which joins of performances are compared; None in files of
     earlier versions. hinges: limits of knees and elbows, not sent to clients; empty without roles
-    and in files of earlier versions, whose joints have no limits.
+    and in files of earlier versions, whose joints have no limits. robot: whose bodies the joints
+    are, not sent to clients; None for others.
     """
 
     name: Slug
@@ -274,6 +276,7 @@ class ModelCard:
     contacts: tuple[FootContact, ...] = ()
     captured_acceleration: CapturedAcceleration | None = None
     hinges: tuple[Hinge, ...] = ()
+    robot: Robot | None = None
 
     @property
     def clip_labels(self) -> Floats:
@@ -329,12 +332,13 @@ def dump(card: ModelCard) -> dict[str, str]:
 
 
 def plain_values(card: ModelCard) -> dict[str, Any]:
-    """Return the card as numbers, texts, lists and dicts, without `making` and `hinges`.
+    """Return the card as numbers, texts, lists and dicts, but for parts that are not sent.
 
     The label set of performers is given in keys of its own, too, as in requests.
     """
     plain = _plain_fields(card)
     plain.pop("hinges")
+    plain.pop("robot")
     for preset in plain["presets"]:
         preset["performer"] = preset["labels"].pop(PERFORMER, None)
     return {**plain, "performers": list(card.performers), "moved_by": list(card.moved_by)}

@@ -15,6 +15,8 @@ from posefield.motion import quat
 HingeAngles = Annotated[Floats, "frames hinges"]
 BodyPositions = Annotated[Floats, "frames bodies 3"]
 BodyRotations = Annotated[Floats, "frames bodies 4"]
+UNLIMITED = 1e6
+"""Angle, rad, that stands for none."""
 Order = Literal["depth", "breadth"]
 """Order of bodies and hinges in a file: depth first as MuJoCo's, or breadth first as PhysX's."""
 
@@ -27,7 +29,7 @@ class Foot:
     points: Annotated[Floats, "points 3"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robot:
     """Bodies on a floating base, joined by hinges.
 
@@ -35,7 +37,7 @@ class Robot:
     (B, 3), m, and turns (B, 4): of a body at rest in its parent's frame; the base's height at rest
     is its offset. hinges: names (H), depth first. hinge_bodies: the body that each turns. axes,
     anchors (H, 3): unit axes and points on them in the body's frame, m. ranges (H, 2): least and
-    largest angle, rad; infinite without a limit. feet: empty if they are not known.
+    largest angle, rad; -UNLIMITED and UNLIMITED without a limit. feet: empty if they are not known.
     """
 
     name: str

@@ -5,8 +5,8 @@ import json
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePosixPath
-from typing import Any
+from pathlib import PurePosixPath
+from typing import IO, Any, Literal, Protocol
 
 import numpy as np
 
@@ -18,6 +18,17 @@ from posefield.robots.robot_motion import RobotMotion
 
 MAX_BYTES = 1_000_000_000
 """Limit of a file, and of what an archive unpacks to."""
+
+
+class RobotFile(Protocol):
+    """A file of a folder or of an archive."""
+
+    @property
+    def name(self) -> str:
+        """Return its name."""
+
+    def open(self, mode: Literal["rb"]) -> IO[bytes]:
+        """Open it."""
 
 
 @dataclass(frozen=True)
@@ -136,10 +147,16 @@ FORMATS = (
 WRITTEN = {each.name: each for each in FORMATS if each.write}
 
 
+def of_file(name: str) -> RobotFormat | None:
+    """Return the format that a file's name ends in, such as walk.mjlab.npz; None for others."""
+    endings = (form for ending, form in WRITTEN.items() if name.endswith(f".{ending}"))
+    return next(endings, None)
+
+
 SUFFIXES = (".csv", ".npz", ".pkl", ".json", ".txt")
 
 
-def read(path: Path, conventions: Conventions) -> RobotMotion:
+def read(path: RobotFile, conventions: Conventions) -> RobotMotion:
     """Return the reference motion of a file, in the order of the robot's joints if one is given.
 
     Raises MotionFileError for a file that is no reference motion, whose numbers are wrong, or
@@ -158,16 +175,17 @@ def read(path: Path, conventions: Conventions) -> RobotMotion:
     return motion.on(conventions.robot) if conventions.robot else motion
 
 
-def _content(path: Path) -> Content:
-    suffix = path.suffix.lower()
+def _content(path: RobotFile) -> Content:
+    suffix = PurePosixPath(path.name).suffix.lower()
     if suffix not in SUFFIXES:
         raise MotionFileError(str(path), f"found {suffix!r}, expected one of {', '.join(SUFFIXES)}")
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise MotionFileError(str(path), f"is larger than {MAX_BYTES // 10**6} MB")
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
     except OSError as fault:
         raise MotionFileError(str(path), f"cannot be read: {fault.strerror}") from None
+    if len(data) > MAX_BYTES:
+        raise MotionFileError(str(path), f"is larger than {MAX_BYTES // 10**6} MB")
     content = PARSERS[suffix](data, str(path))
     if not isinstance(content, dict):
         raise MotionFileError(str(path), f"holds a {type(content).__name__}, expected named fields")
