@@ -105,15 +105,22 @@ def test_the_pose_is_tuned_by_squares_with_the_event_and_by_density(laid, rng):
         assert chosen.hyper.nugget == expected.nugget
 
 
-def test_only_a_single_value_is_tuned_by_its_density(laid, rng):
-    values = rng.normal(size=(COUNT, 2)) + laid.half_ranges
-    for columns, kind in ((1, PredictiveDensityLoss), (2, LeaveOneOutLoss)):
-        own = values[:, :columns]
-        problem = TuningProblem(laid, own, strength=tuning_loss.OTHER_STRENGTH)
-        expected, other = (
-            kriging_tuning.tune_beside(problem, HYPER, loss).hyper
-            for loss in (kind, ({PredictiveDensityLoss, LeaveOneOutLoss} - {kind}).pop())
-        )
-        found = coefficient_models.fit(Kriging(), HYPER, laid, own).field.hyper
-        assert found.nugget == expected.nugget != other.nugget
-        assert PRIORS["nugget"].low <= np.log(found.nugget) <= PRIORS["nugget"].high
+@pytest.mark.parametrize("columns", [1, 2])
+def test_quantities_beside_the_pose_are_tuned_by_density(laid, rng, columns):
+    values = rng.normal(size=(COUNT, columns)) + laid.half_ranges[:, :columns]
+    problem = TuningProblem(laid, values, strength=tuning_loss.OTHER_STRENGTH)
+    tuned = kriging_tuning.tune_beside(problem, HYPER).hyper
+    assert coefficient_models.fit(Kriging(), HYPER, laid, values).field.hyper.nugget == tuned.nugget
+    loss, at = (
+        PredictiveDensityLoss(problem, HYPER, NAMES, own_scales=False),
+        in_search_units(tuned),
+    )
+    near = [loss.value_and_slope(at + 0.1 * step)[0] for step in (*np.eye(3), *-np.eye(3))]
+    inside = [
+        PRIORS[name].low < x < PRIORS[name].high for (name, _), x in zip(NAMES, at, strict=True)
+    ]
+    assert all(inside)
+    assert loss.value_and_slope(at)[0] < min(near)
+    # Negative control: squared residuals are least elsewhere.
+    squares = LeaveOneOutLoss(problem, HYPER, NAMES, own_scales=False)
+    assert np.abs(squares.value_and_slope(at)[1]).max() > 1e-2

@@ -21,7 +21,6 @@ from posefield_train.kriging.tuning_loss import (
     UNNAMED_STRENGTH,
     LeaveOneOutLoss,
     PoseLoss,
-    PredictiveDensityLoss,
     TuningProblem,
 )
 from posefield_train.source.recipe_sections import Kriging
@@ -186,14 +185,13 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
 
     Leave-one-out predictions tell by how much: their differences from the mean are multiplied by
     the share that fits the values best. A choice between model and mean does worse than either: a
-    sample that is left out pulls the choice away from itself. A single value, as the duration is,
-    is tuned by the density of its left-out recordings.
+    sample that is left out pulls the choice away from itself. Parameters are tuned by the density
+    of left-out recordings.
     """
     if np.ptp(values, axis=0).max() <= ROUNDING * np.abs(values).max():
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
-    loss = PredictiveDensityLoss if values.shape[1] == 1 else LeaveOneOutLoss
-    tuned = kriging_tuning.tune_beside(problem, pose, loss)
+    tuned = kriging_tuning.tune_beside(problem, pose)
     from_mean, mean = samples.from_mean(values), values.mean(axis=0)
     predicted = from_mean - tuned.residuals
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.

@@ -16,6 +16,7 @@ from posefield_train.kriging.tuning_loss import (
     PRIORS,
     LeaveOneOutLoss,
     Parameter,
+    PredictiveDensityLoss,
     TuningProblem,
 )
 
@@ -103,15 +104,10 @@ def tune(
     return _best(drawn, [drawn.start(scale, nugget) for scale, nugget in starts], problem, jobs)
 
 
-def tune_beside(
-    problem: TuningProblem, pose: Hyper, loss: type[LeaveOneOutLoss] = LeaveOneOutLoss
-) -> TunedKriging:
-    """Return a model with the scales and correlation of the pose's, and other parameters tuned.
-
-    loss: to minimize.
-    """
+def tune_beside(problem: TuningProblem, pose: Hyper) -> TunedKriging:
+    """Return a model with the scales and correlation of the pose's, and others tuned by density."""
     trend = pose.drifts == (0,) and pose.trend > 0.0
-    return _tune_at_scales(problem, replace(pose, trend=0.0), trend, loss)
+    return _tune_at_scales(problem, replace(pose, trend=0.0), trend, PredictiveDensityLoss)
 
 
 def tune_with_trend(problem: TuningProblem, hyper: Hyper) -> TunedKriging:
