@@ -9,17 +9,16 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.frame_groups import FrameGroups
-from posefield.common.units import UP, Floats, Frames, Indices
-from posefield.feet import stance_rows
+from posefield.common.units import UP, Floats, Frames
+from posefield.feet import heel_roll, stance_rows
 from posefield.feet.smooth_change import smooth_change
-from posefield.feet.stance_rows import UNEVEN, FootRows, Mask, PerRun, Runs
+from posefield.feet.stance_rows import UNEVEN, FootRows, PerRun, Runs
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 
-# A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
-HOLD = 0.05
-# Step from which on a swing is lifted to the full clearance, m.
-FULL_STEP = 0.1
+# A swing is lifted to this share of the captured clearance, which is that of high swings, and to
+# less for a step of less, m.
+LIFT_SHARE, FULL_STEP = 0.5, 0.1
 # A foot leaves the floor, and comes back to it, over this time, s: the knee of a straight leg moves
 # several times as fast as its foot is lifted. The exponent of the lift between both.
 RISE, LIFT_EXPONENT = 0.09, 0.2
@@ -34,15 +33,21 @@ def plan_paths(
     stances: Runs,
     goal: Annotated[Floats, "frames 3"],
 ) -> Annotated[Floats, "frames 3"]:
-    """Return the paths (N, 3), m, of feet that stand in the runs `stances`.
+    """Return the paths (N, 3), m, of feet that stand in the runs `stances`, and roll there.
 
     goal: points (N, 3), m, that the paths go through; not a number in other frames.
     """
-    led = ~np.isnan(goal[:, 0])
-    over, up = (floor_plane.project(goal), goal @ UP) if led.any() else (None, None)
-    floor = smooth_change(feet, feet.floor, held(feet, stances, led), fixed=over)
-    heights = smooth_change(feet, feet.heights, stances, feet.height[stances.rows], up)
+    over = up = None
+    roll = heel_roll.roll(feet, stances)
+    if not np.isnan(goal).all():
+        over, up = floor_plane.project(goal) - roll.floor, goal @ UP - roll.heights
+    # A foot that rolls keeps its place but for the offset of its ball.
+    floor = smooth_change(feet, feet.floor - roll.floor, stances, fixed=over) + roll.floor
+    heights = roll.heights + smooth_change(
+        feet, feet.heights - roll.heights, stances, feet.height[stances.rows], up
+    )
     added, lowest = lifts(feet, floor, heights, stances, goal @ UP)
+    lowest += np.minimum(roll.heights, 0.0)
     standing_heights = feet.height[feet.rows.groups.group]
     return floor_plane.at_height(floor, np.maximum(heights + added, standing_heights + lowest))
 
@@ -75,7 +80,9 @@ def lifts(
     outer_frames = _ends(swings, feet)
     first, last = (lowest[rows.flat(swings.rows, end)] for end in outer_frames)
     begin, end = (stance_rows.places(feet, floor, swings.rows, edge) for edge in outer_frames)
-    smallest_lift = feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
+    smallest_lift = (
+        LIFT_SHARE * feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
+    )
     # A parabola: how high a foot is lifted at most in the duration of its swing.
     highest = LIFT_ACCELERATION * (swings.lengths / rows.rates[swings.rows]) ** 2 / 8.0
     smallest_lift = np.where(swings.inner(rows), np.minimum(smallest_lift, highest), smallest_lift)
@@ -127,66 +134,6 @@ def _ends(swings: Runs, feet: FootRows) -> tuple[PerRun, PerRun]:
     return (
         np.where(cyclic, first_frames, np.maximum(first_frames, 0)),
         np.where(cyclic, last_frames, np.minimum(last_frames, counts - 1)),
-    )
-
-
-def held(feet: FootRows, stances: Runs, led: Mask) -> Runs:
-    """Return the stances with the ends of the swings in which the foot keeps its place.
-
-    A point to which it is led ends a swing.
-    """
-    rows = feet.rows
-    counts, cyclic = rows.counts[stances.rows], rows.cyclic[stances.rows]
-    hold = np.round(HOLD * rows.rates[stances.rows]).astype(np.int64)
-    gaps = _gaps(stances, feet)
-    before, after = (
-        np.minimum(hold, np.minimum(gap, far) // 4)
-        for gap, far in zip(gaps, _led_distances(stances, feet, led), strict=True)
-    )
-    first_frames, last_frames = stances.begins - before, stances.ends + after
-    lengths = np.minimum(last_frames - first_frames, counts)
-    first_frames = np.where(cyclic, first_frames % counts, np.maximum(first_frames, 0))
-    return Runs(
-        stances.rows,
-        first_frames,
-        np.where(cyclic, first_frames + lengths, np.minimum(last_frames, counts)),
-    )
-
-
-def _gaps(stances: Runs, feet: FootRows) -> tuple[Indices, Indices]:
-    """Return the numbers of frames from the stance before to each, and from each to the next.
-
-    Zero to an end of a motion that does not repeat.
-    """
-    rows, many = stances.rows, len(stances.rows)
-    number = np.bincount(rows, minlength=len(feet.rows.counts))
-    start = (np.cumsum(number) - number)[rows]
-    index = np.arange(many) - start
-    following = start + (index + 1) % number[rows]
-    cyclic = feet.rows.cyclic[rows]
-    after = (stances.begins[following] - stances.ends) % feet.rows.counts[rows]
-    after = np.where(cyclic | (index + 1 < number[rows]), after, 0)
-    before = np.zeros(many, np.int64)
-    before[following] = after
-    return before, after
-
-
-def _led_distances(stances: Runs, feet: FootRows, led: Mask) -> tuple[Indices, Indices]:
-    """Return the numbers of frames between each stance and the led frames before and after it."""
-    far = len(led)
-    frames = np.flatnonzero(led)
-    if not len(frames):
-        return (np.full(len(stances.rows), far),) * 2
-    start = feet.rows.groups.starts[stances.rows]
-    first_frames, last_frames = start + stances.begins, start + stances.ends
-    before = np.searchsorted(frames, first_frames) - 1
-    after = np.searchsorted(frames, last_frames)
-    last = frames[np.maximum(before, 0)]
-    first = frames[np.minimum(after, len(frames) - 1)]
-    stop = start + feet.rows.counts[stances.rows]
-    return (
-        np.where((before >= 0) & (last >= start), first_frames - 1 - last, far),
-        np.where((after < len(frames)) & (first < stop), first - last_frames, far),
     )
 
 

@@ -14,11 +14,12 @@ import numpy as np
 from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Booleans, Floats, Frames
-from posefield.feet import ball_path, footsteps, limbs, stance_rows, two_bone
+from posefield.feet import ball_path, footsteps, heel_roll, limbs, stance_rows, two_bone
 from posefield.feet.footsteps import FeetPlan, Footsteps, PlanRequest
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import UNEVEN, FootRows, Interval, Runs
 from posefield.locomotion import floor_plane
+from posefield.motion import quat
 from posefield.motion.contact_detection import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor, Floors
 
@@ -101,23 +102,36 @@ class _Bodies:
             feet,
             heights=feet.heights - lowered[feet.rows.groups.group],
             height=feet.height + np.clip(above - lowered, -UNEVEN, UNEVEN),
+            flat_pitch=heel_roll.flat_pitches(feet, down),
         )
-        stances = self._led_stances(stance_rows.discipline(down, feet), feet)
+        stances = heel_roll.trimmed(stance_rows.discipline(down, feet), feet)
+        stances = self._led_stances(stances, feet)
         followed = self._follow(grounded)
         reachable, paths, lowered = self._reachable_steps(feet, grounded, followed, stances)
-        before, after = (runs.by_row(len(feet.height)) for runs in (stances, reachable))
+        before = stances.by_row(len(feet.height))
+        after = self._footsteps(feet, paths, reachable)
         return list(self._split(paths, before, after, grounded, followed, lowered))
+
+    def _footsteps(self, feet: FootRows, paths: FootPaths, stances: Runs) -> list[Footsteps]:
+        """Return the footsteps of each row."""
+        rolled, first = heel_roll.roll(feet, stances), feet.rows.flat(stances.rows, stances.begins)
+        offset = floor_plane.at_height(rolled.floor[first], rolled.heights[first])
+        anchors = paths[first] - offset
+        return [
+            Footsteps(row, anchors[stances.rows == index], rolled.flats[stances.rows == index])
+            for index, row in enumerate(stances.by_row(len(feet.height)))
+        ]
 
     def _split(
         self,
         paths: FootPaths,
         before: Sequence[tuple[Interval, ...]],
-        after: Sequence[tuple[Interval, ...]],
+        after: Sequence[Footsteps],
         grounded: PerMotion,
         followed: Frames,
         lowered: Frames,
     ) -> Iterator[FeetPlan]:
-        """Yield the plan of each motion. before, after: stances of the rows, and those in reach."""
+        """Yield the plan of each motion. before, after: stances of the rows, and steps in reach."""
         groups = self.rows.groups
         by_leg = paths.reshape(len(self.legs), len(lowered), 3)
         changes = np.empty(by_leg.shape)
@@ -128,15 +142,12 @@ class _Bodies:
             zip(self.requests, self.poses.split(), strict=True)
         ):
             frames = slice(groups.starts[motion], groups.starts[motion] + groups.counts[motion])
-            stances = after[motion :: len(groups)]
+            steps = tuple(after[motion :: len(groups)])
             yield FeetPlan(
                 request.character,
                 request.rate,
                 request.cycle,
-                tuple(
-                    Footsteps(row, path[[stance.begin for stance in row]].reshape(-1, 3))
-                    for path, row in zip(by_leg[:, frames], stances, strict=True)
-                ),
+                steps,
                 changes[:, frames],
                 root_lowered[frames],
                 followed[frames],
@@ -144,7 +155,7 @@ class _Bodies:
                 poses,
                 request.leads,
                 request.floor,
-                _unreached(request.floor, before[motion :: len(groups)], stances),
+                _unreached(request.floor, before[motion :: len(groups)], steps),
             )
 
     def _feet(self) -> tuple[FootRows, Runs]:
@@ -154,6 +165,7 @@ class _Bodies:
         rows = FrameRows(groups, np.tile(self.rows.rates, legs), np.tile(self.rows.cyclic, legs))
         paths = [self.poses.position(leg.tip) for leg in self.legs]
         points = np.concatenate([np.zeros((0, 3)), *paths])
+        ankles = [self.poses.position(leg.lower) for leg in self.legs]
         down, contacts = self._contacts(points, rows)
         height, swing, longest_swing, clearance = (
             np.array([getattr(contact, name) for contact in contacts], float)
@@ -175,6 +187,8 @@ class _Bodies:
             np.tile(ways, legs),
             np.tile(factors, legs),
             np.tile(np.concatenate(walking), legs),
+            points - np.concatenate([np.zeros((0, 3)), *ankles]),
+            np.zeros(len(height)),
         )
         return feet, down
 
@@ -255,7 +269,7 @@ class _Bodies:
         led = footsteps.joined([request.leads for request in self.requests]).feet.ravel()
         goal = np.where(led[:, None], feet.positions, np.nan)
         paths = ball_path.plan_paths(feet, stances, goal)
-        needs = self._needs(feet, paths, grounded, followed)
+        needs = self._needs(paths, followed)
         for _ in range(ROUNDS):
             cancellation.check()
             beyond = two_bone.beyond(needs, np.tile(limit, legs))
@@ -268,7 +282,7 @@ class _Bodies:
             paths[changed] = ball_path.plan_paths(
                 feet.select(rows), shorter.of_rows(rows), goal[changed]
             )
-            needs, stances = self._needs(feet, paths, grounded, followed), shorter
+            needs, stances = self._needs(paths, followed), shorter
         lowered = two_bone.lower(list(needs.reshape(legs, len(limit))), limit, self.rows)
         return stances, self._on_floors(paths), lowered
 
@@ -278,26 +292,30 @@ class _Bodies:
         heights = [self.floors.heights(path) for path in by_leg]
         return np.asarray(paths + np.concatenate([np.zeros(0), *heights])[:, None] * UP)
 
-    def _needs(
-        self, feet: FootRows, paths: FootPaths, grounded: PerMotion, followed: Frames
-    ) -> Annotated[Floats, "foot_frames"]:
-        """Return how much lower each leg needs the pelvis to be (K N,), m."""
-        changes = (self._on_floors(paths) - feet.positions).reshape(-1, *self.roots.shape)
-        sunk = grounded[self.rows.groups.group][:, None] * UP
+    def _needs(self, paths: FootPaths, followed: Frames) -> Annotated[Floats, "foot_frames"]:
+        """Return how much lower each leg needs the pelvis to be (K N,), m, with its heel lifted."""
+        balls = self._on_floors(paths).reshape(-1, *self.roots.shape)
         needs = [np.zeros(0)]
-        for leg, change in zip(self.legs, changes, strict=True):
-            ankle = self.poses.position(leg.lower)
-            arm = self.poses.position(leg.tip) - ankle
-            target = ankle - sunk + change + (arm - self.floors.tilted(arm))
-            needs.append(two_bone.need(self.poses, leg, target, followed))
+        for leg, ball in zip(self.legs, balls, strict=True):
+            arm = self.floors.tilted(self.poses.position(leg.tip) - self.poses.position(leg.lower))
+            hip = self.poses.position(leg.upper) - followed[:, None] * UP
+            reach = two_bone.firm_reach(self.poses, leg)
+            if leg.tip != leg.lower:
+                distance = np.linalg.norm(hip - ball + arm, axis=-1)
+                # Rounding is no need.
+                reach = two_bone.leg_chord(self.poses, leg, distance) + 1e-6
+                lifted = quat.rotate(heel_roll.heel_turns(hip - ball, arm, reach), arm)
+                # On a slope the pelvis sinks first.
+                arm = np.where(self.floors.sloped[:, None], arm, lifted)
+            needs.append(two_bone.need(self.poses, leg, ball - arm, followed, reach))
         return np.concatenate(needs)
 
 
 def _unreached(
-    floor: Floor, before: Sequence[tuple[Interval, ...]], after: Sequence[tuple[Interval, ...]]
+    floor: Floor, before: Sequence[tuple[Interval, ...]], after: Sequence[Footsteps]
 ) -> tuple[int, ...]:
     """Return the legs, by index, that stood as predicted, but do not on a given floor."""
     if floor == LEVEL_FLOOR:
         return ()
     pairs = zip(before, after, strict=True)
-    return tuple(leg for leg, (first, last) in enumerate(pairs) if first and not last)
+    return tuple(leg for leg, (first, last) in enumerate(pairs) if first and not last.stances)

@@ -12,9 +12,9 @@ import numpy as np
 from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import UP, Floats, Frames, RootPath, Rotations
-from posefield.feet import limbs, stance_rows, two_bone
+from posefield.feet import heel_roll, limbs, stance_rows, two_bone
 from posefield.feet.footsteps import FeetPlan, evaluate_by_kind
-from posefield.feet.limbs import Limb, LimbPoses
+from posefield.feet.limbs import Limb, LimbPoses, Turns
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton
@@ -68,12 +68,12 @@ def place_grids(
     """
     placing = _Placing.on_grids(plans)
     before, after = np.empty((2, len(placing.at_frames), len(plans[0].character.legs), 3))
-    for foot, (leg, end) in enumerate(placing.limb_ends()):
+    for foot, limb_end in enumerate(placing.limb_ends()):
         cancellation.check()
         if rotations is not None:
-            placing.turns(leg, end).apply(leg, rotations)
+            placing.turns(limb_end).apply(limb_end.limb, rotations)
         if foot < before.shape[1]:
-            before[:, foot], after[:, foot] = placing.foot_path(leg, end)
+            before[:, foot], after[:, foot] = placing.foot_path(limb_end)
     return placing.shift, before, after
 
 
@@ -87,9 +87,11 @@ def largest_drifts(
     drifts = []
     for plan, feet in zip(plans, paths, strict=True):
         offsets = [
-            feet[stance.begin : stance.end, foot] - anchor
+            feet[flat : stance.end, foot] - anchor
             for foot, steps in enumerate(plan.steps)
-            for stance, anchor in zip(steps.stances, steps.anchors, strict=True)
+            for stance, anchor, flat in zip(
+                steps.stances, steps.anchors, steps.flats.tolist(), strict=True
+            )
         ]
         # Frames over the end of a cycle are those of its start, which have places of their own.
         away = np.concatenate([np.zeros((1, 3)), *offsets])
@@ -117,9 +119,9 @@ def _place_alike(
     above = {
         upper for joint in joints or () for upper in skeleton.joint_chain(body.parents, joint)[:-1]
     }
-    for limb, end in placing.limb_ends():
-        if joints is None or limb.upper in above:
-            placing.turns(limb, end).apply(limb, rotations)
+    for limb_end in placing.limb_ends():
+        if joints is None or limb_end.limb.upper in above:
+            placing.turns(limb_end).apply(limb_end.limb, rotations)
     return list(zip(groups.split(rotations), groups.split(roots + placing.shift), strict=True))
 
 
@@ -127,6 +129,20 @@ def _paths_alike(plans: Sequence[FeetPlan]) -> list[tuple[FootPaths, FootPaths]]
     _, before, after = place_grids(plans)
     groups = frame_groups.of_lengths([plan.lowered for plan in plans])
     return list(zip(groups.split(before), groups.split(after), strict=True))
+
+
+@dataclass(frozen=True)
+class _LimbEnd:
+    """End of a limb that is placed in N frames.
+
+    end: from the upper joint to it (N, 3), m. foot: turns of the foot (N, 4) against the poses;
+    None for none. arm: from the end to the joint that stands (N, 3), m, of a turned foot.
+    """
+
+    limb: Limb
+    end: Points
+    foot: Turns | None
+    arm: Points
 
 
 @dataclass(frozen=True)
@@ -174,47 +190,55 @@ class _Placing:
         """Return the groups of the poses."""
         return self.floors.groups
 
-    def limb_ends(self) -> Iterator[tuple[Limb, Points]]:
-        """Yield each limb with the vectors (N, 3), m, from its upper joint to its end.
-
-        The legs go first.
-        """
-        for limb, target in self._targets():
-            yield limb, two_bone.reach(self.poses, limb, self.shift, target)
-
-    def _targets(self) -> Iterator[tuple[Limb, Points]]:
-        """Yield each limb with the target (N, 3), m, of its end, the legs first."""
+    def limb_ends(self) -> Iterator[_LimbEnd]:
+        """Yield the end of each limb, the legs first."""
         body = self.plans[0].character
         for foot, leg in enumerate(body.legs):
             change = np.concatenate([plan.changes[foot] for plan in self.plans])
             path = self.poses.position(leg.tip) + self._interpolated_change(change)
-            yield leg, self._anchored(foot, path) - self._arm(leg)
+            yield self._leg_end(leg, self._anchored(foot, path))
         for index, limb in enumerate(body.kept):
             # Where it is not led, the end moves with the root.
             share = np.concatenate([plan.led.limbs[index] for plan in self.plans])
             led = _interpolate(self.grids, share, self.groups, self.at_frames)
             free = 1.0 - np.clip(led, 0.0, 1.0)
-            yield limb, self.poses.position(limb.lower) + free[:, None] * self.shift
+            target = self.poses.position(limb.lower) + free[:, None] * self.shift
+            end = two_bone.reach(self.poses, limb, self.shift, target)
+            yield _LimbEnd(limb, end, None, np.zeros_like(end))
 
-    def turns(self, limb: Limb, end: Points) -> two_bone.LimbTurns:
-        """Return the rotations (N, 4) of a limb's joints; feet are tilted as the floor is."""
-        turns, sloped = two_bone.solve(self.poses, limb, end), self.floors.sloped
-        if limb in self.plans[0].character.legs and sloped.any():
-            orientations = self.poses.orientation(limb.lower)[sloped]
-            tilt = quat.mul(
-                quat.conj(orientations), quat.mul(self.floors.tilts[sloped], orientations)
-            )
-            turns.lower[sloped] = quat.mul(turns.lower[sloped], tilt)
+    def _leg_end(self, leg: Limb, ball: Points) -> _LimbEnd:
+        """Return the end of a leg whose ball is placed (N, 3), m.
+
+        The foot is tilted as the floor is, and lifts its heel where the leg would be stretched.
+        """
+        poses, floors = self.poses, self.floors
+        arm = floors.tilted(poses.position(leg.tip) - poses.position(leg.lower))
+        foot = floors.tilts if floors.sloped.any() else None
+        offset = poses.position(leg.upper) + self.shift - ball
+        chord = two_bone.leg_chord(poses, leg, np.linalg.norm(offset + arm, axis=-1))
+        if leg.tip != leg.lower:
+            lift = heel_roll.heel_turns(offset, arm, chord)
+            arm = quat.rotate(lift, arm)
+            foot = lift if foot is None else quat.mul(lift, foot)
+        end = -(offset + arm)
+        end *= (chord / np.maximum(np.linalg.norm(end, axis=-1), 1e-9))[:, None]
+        return _LimbEnd(leg, end, foot, arm)
+
+    def turns(self, limb_end: _LimbEnd) -> two_bone.LimbTurns:
+        """Return the rotations (N, 4) of a limb's joints."""
+        limb, foot = limb_end.limb, limb_end.foot
+        turns = two_bone.solve(self.poses, limb, limb_end.end)
+        if foot is not None:
+            orientations = self.poses.orientation(limb.lower)
+            local = quat.mul(quat.conj(orientations), quat.mul(foot, orientations))
+            turns.lower[:] = quat.mul(turns.lower, local)
         return turns
 
-    def foot_path(self, leg: Limb, end: Points) -> tuple[Points, Points]:
+    def foot_path(self, leg_end: _LimbEnd) -> tuple[Points, Points]:
         """Return the paths (N, 3), m, of the joint that stands, predicted and placed."""
-        placed = self.poses.position(leg.upper) + self.shift + end + self._arm(leg)
+        leg = leg_end.limb
+        placed = self.poses.position(leg.upper) + self.shift + leg_end.end + leg_end.arm
         return self.poses.position(leg.tip), placed
-
-    def _arm(self, leg: Limb) -> Points:
-        """Return the vectors (N, 3), m, from the ankle to the joint that stands."""
-        return self.floors.tilted(self.poses.position(leg.tip) - self.poses.position(leg.lower))
 
     def _interpolated_change(self, change: Annotated[Floats, "grid 3"]) -> Points:
         """Return the changes (N, 3), m, of paths with changes on the grids."""
@@ -224,7 +248,7 @@ class _Placing:
         return floor_plane.at_height(over, up)
 
     def _anchored(self, foot: int, path: Points) -> Points:
-        """Return the paths (N, 3), m, exactly at their anchors in each stance."""
+        """Return the paths (N, 3), m, over the floor exactly at their anchors on flat feet."""
         motions, first, last, anchors = self._stances(foot)
         anchored, groups = path.copy(), self.groups
         # Memory and time grow with the frames and the stances, not with their product.
@@ -235,7 +259,7 @@ class _Placing:
             counts = np.searchsorted(at, last[stances] + 1e-9, "right", order) - begin
             standing = FrameGroups(counts)
             rows = groups.starts[motion] + order[begin[standing.group] + standing.frame]
-            anchored[rows] = anchors[stances[standing.group]]
+            anchored[rows, ::2] = anchors[stances[standing.group], ::2]
         return anchored
 
     def _stances(self, foot: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Points]:
@@ -244,9 +268,11 @@ class _Placing:
         Those of cycles are there a cycle earlier and later, too, each copy after its original.
         """
         intervals = [
-            (motion, stance.begin, stance.end - 1)
+            (motion, flat, stance.end - 1)
             for motion, plan in enumerate(self.plans)
-            for stance in plan.steps[foot].stances
+            for stance, flat in zip(
+                plan.steps[foot].stances, plan.steps[foot].flats.tolist(), strict=True
+            )
         ]
         motions, first, last = np.array(intervals, np.int64).reshape(-1, 3).T
         anchors = np.concatenate([plan.steps[foot].anchors for plan in self.plans])

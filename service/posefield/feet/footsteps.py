@@ -158,11 +158,14 @@ class Character:
 class Footsteps:
     """Places and frames at which one foot stands.
 
-    stances: frames. anchors: places (S, 3), m, in the coordinates of each stance's first frame.
+    stances: frames. anchors: places (S, 3), m, of the ball of a flat foot, in the coordinates of
+    each stance's first frame. flats: first frames (S,) in which the foot is flat, and keeps its
+    ball there; the stance's end where it is not.
     """
 
     stances: tuple[Interval, ...]
     anchors: Annotated[Floats, "stances 3"]
+    flats: Annotated[Indices, "stances"]
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ LIFTED = contact_detection.DEFAULT.grown_height
 # A foot may stand this much higher or lower than captured feet do, m: soles differ.
 UNEVEN = 0.01
 
+FRAME_FIELDS = ("floor", "heights", "walking", "arms")
+
 Mask = Annotated[Booleans, "frames"]
 PerRow = Annotated[Floats, "rows"]
 PerRun = Annotated[Indices, "runs"]
@@ -129,7 +131,8 @@ class FootRows:
 
     floor: (N,), over the floor. heights: (N,), m. height, swing, longest_swing, clearance: (R,), as
     of `FootContact`. ways, factors: (R,), of a cycle, as of `Cycle`. walking: whether the motion
-    walks (N,).
+    walks (N,). arms: from the ankles to the joints that contact (N, 3), m. flat_pitch: of an arm on
+    a flat foot (R,), rad.
     """
 
     rows: FrameRows
@@ -142,12 +145,14 @@ class FootRows:
     ways: Annotated[FloorVectors, "rows"]
     factors: Annotated[FloorVectors, "rows"]
     walking: Mask
+    arms: Annotated[Floats, "frames 3"]
+    flat_pitch: PerRow
 
     def select(self, rows: Annotated[Indices, "chosen"]) -> "FootRows":
         """Return some of the rows."""
         frames = np.isin(self.rows.groups.group, rows)
-        selected = {name: getattr(self, name)[frames] for name in ("floor", "heights", "walking")}
-        names = ("height", "swing", "longest_swing", "clearance", "ways", "factors")
+        selected = {name: getattr(self, name)[frames] for name in FRAME_FIELDS}
+        names = ("height", "swing", "longest_swing", "clearance", "ways", "factors", "flat_pitch")
         selected |= {name: getattr(self, name)[rows] for name in names}
         return replace(self, rows=self.rows.select(rows), **selected)
 
@@ -358,12 +363,20 @@ def heights_above(
     """
     run, frames = contacts.frames()
     row = contacts.rows[run]
-    standing = heights[rows.flat(row, frames)]
-    standing = standing[np.lexsort((standing, row))]
-    counts = np.bincount(row, minlength=len(captured_heights))
-    above = np.zeros(len(captured_heights))
-    stands = counts > 0
-    first, count = (np.cumsum(counts) - counts)[stands], counts[stands]
-    middle = 0.5 * (standing[first + (count - 1) // 2] + standing[first + count // 2])
-    above[stands] = middle - captured_heights[stands]
-    return above
+    offsets = heights[rows.flat(row, frames)] - captured_heights[row]
+    return row_percentiles(offsets, row, len(captured_heights), 50.0)
+
+
+def row_percentiles(
+    values: Annotated[Floats, "values"], row: Indices, rows: int, percent: float
+) -> PerRow:
+    """Return percentiles (R,) of the values (V,) of rows (V,), interpolated; zero without any."""
+    ordered, counts = values[np.lexsort((values, row))], np.bincount(row, minlength=rows)
+    percentiles = np.zeros(rows)
+    some = counts > 0
+    first, last = (np.cumsum(counts) - counts)[some], counts[some] - 1
+    rank = 0.01 * percent * last
+    before = rank.astype(np.int64)
+    low, high = ordered[first + before], ordered[first + np.minimum(before + 1, last)]
+    percentiles[some] = low + (rank - before) * (high - low)
+    return percentiles

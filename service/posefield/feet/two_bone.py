@@ -20,6 +20,8 @@ from posefield.motion.hinges import FREE, Hinge
 
 # A limb is not stretched beyond this share of its length; from 5 mm before it on it resists.
 REACH, SOFTNESS = 0.995, 0.005
+# A leg is no straighter than this share of its length, but as far as it is predicted: 178 degrees.
+STRAIGHT = 0.9998
 # Share of the limb's length by which it bends at least, where its plane is taken from its bend.
 LEAST_BEND = 0.01
 # Share of the limb's length up to which a leg that bends backwards is taken as straight; one that
@@ -82,6 +84,24 @@ def soften(
     beyond = np.maximum(distance - firm, 0.0)
     softened: Values = np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
     return softened
+
+
+def leg_chord(poses: LimbPoses, leg: Limb, distance: Values) -> Values:
+    """Return distances (F,), m, that a leg spans where it is wanted to span some.
+
+    A bent leg spans what is wanted. One that is predicted straight hardly becomes longer: its knee
+    would move several times as fast as its foot, which lifts its heel instead. A change x becomes
+    x / sqrt(1 + (x / w)²), where w is the room that the predicted leg has. Legs without a foot
+    follow as far as their firm reach.
+    """
+    length = poses.length(leg.middle) + poses.length(leg.lower)
+    if leg.tip == leg.lower:
+        return soften(distance, firm_reach(poses, leg), length)
+    source = np.linalg.norm(poses.position(leg.lower) - poses.position(leg.upper), axis=-1)
+    room = np.maximum(STRAIGHT * length - source, 1e-4)
+    more = distance - source
+    chord: Values = source + more / np.sqrt(1.0 + np.square(np.maximum(more, 0.0) / room))
+    return chord
 
 
 def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points:
@@ -208,21 +228,26 @@ def _towards_middle(side: Points, chord: Points, bone: Points, towards: Points) 
 # Gaussian that is half as wide.
 SPREAD, SMOOTHING = 0.06, 0.03
 # It is lowered no more than this, m.
-MOST = 0.05
+MOST = 0.02
 
 Lowering = Annotated[Floats, "frames"]
 
 
 def need(
-    poses: LimbPoses, leg: Limb, target: Points, sunk: float | Annotated[Floats, "_"]
+    poses: LimbPoses,
+    leg: Limb,
+    target: Points,
+    sunk: float | Annotated[Floats, "_"],
+    reach: Values,
 ) -> Values:
     """Return how much lower a leg needs the pelvis to be (F,), m; infinite out of reach.
 
-    target: of the leg's end (F, 3), m. sunk: by how much the pelvis is lowered already, m.
+    target: of the leg's end (F, 3), m. sunk: by how much the pelvis is lowered already, m. reach:
+    distance (F,), m, that the leg spans.
     """
     offset = poses.position(leg.upper) - np.asarray(sunk)[..., None] * UP - target
     level = np.sum(np.square(offset * (1.0 - UP)), axis=-1)
-    room = np.square(firm_reach(poses, leg)) - level
+    room = np.square(reach) - level
     highest = np.sqrt(np.maximum(room, 0.0))
     return np.where(room < 0.0, np.inf, np.maximum(offset @ UP - highest, 0.0))
 

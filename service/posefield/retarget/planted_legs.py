@@ -237,7 +237,7 @@ def plant(
         for foot, (leg, poses) in enumerate(legs)
     ]
     needs = [
-        two_bone.need(poses, leg, target, np.zeros(len(target)))
+        two_bone.need(poses, leg, target, np.zeros(len(target)), two_bone.firm_reach(poses, leg))
         for (leg, poses), target in zip(legs, targets, strict=True)
     ]
     largest = np.full(len(paths), DEEPEST * rig.body.leg_length)

@@ -136,15 +136,18 @@ def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult
 
 
 def _stances(plan: FeetPlan, names: Sequence[str]) -> tuple[StanceResult, ...]:
+    """Return the stances, from when the joint is in its place: the foot is flat."""
     return tuple(
         StanceResult(
             names[leg.tip],
-            round_micrometres(stance.begin / plan.rate),
+            round_micrometres(min(flat, stance.end - 1) / plan.rate),
             round_micrometres((stance.end - 1) / plan.rate),
             tuple(map(round_micrometres, anchor)),
         )
         for leg, steps in zip(plan.character.legs, plan.steps, strict=True)
-        for stance, anchor in zip(steps.stances, steps.anchors.tolist(), strict=True)
+        for stance, anchor, flat in zip(
+            steps.stances, steps.anchors.tolist(), steps.flats.tolist(), strict=True
+        )
     )
 
 

@@ -55,8 +55,8 @@ def frame_rows(lengths, rate, cyclic=False):
     return FrameRows(groups, np.full(len(groups), rate), np.full(len(groups), cyclic))
 
 
-def foot_rows(paths, foot):
-    """Return the rows of several feet with equal statistics."""
+def foot_rows(paths, foot, arms=None, flat=0.0):
+    """Return the rows of several feet with equal statistics; without arms they do not roll."""
     rows = FrameRows(
         of_lengths([own.positions for own in paths]),
         np.array([own.rate for own in paths], float),
@@ -74,6 +74,8 @@ def foot_rows(paths, foot):
         np.array([own.way for own in cycles], complex),
         np.array([own.factor for own in cycles], complex),
         np.concatenate(walking),
+        np.zeros((len(places), 3)) if arms is None else arms,
+        np.full(len(paths), flat),
     )
 
 
@@ -83,11 +85,11 @@ def discipline(stances, path, foot):
     return list(found.by_row(1)[0])
 
 
-def plan_path(path, found, foot, goal=None):
+def plan_path(path, found, foot, goal=None, feet=None):
     """Return the steps of one foot."""
     goal = np.full(path.positions.shape, np.nan) if goal is None else goal
     runs = stance_rows.from_intervals([found])
-    positions = ball_path.plan_paths(foot_rows([path], foot), runs, goal)
+    positions = ball_path.plan_paths(feet or foot_rows([path], foot), runs, goal)
     anchors = positions[[own.begin for own in found]].reshape(-1, 3)
     return PlannedPath(positions, tuple(found), anchors)
 

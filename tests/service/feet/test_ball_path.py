@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from few_feet import FootPath, change_smoothly, foot_rows, plan_path
 
-from posefield.feet import ball_path, smooth_change, stance_rows
+from posefield.feet import ball_path, heel_roll, smooth_change, stance_rows
 from posefield.feet.stance_rows import Cycle, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.contact_detection import FootContact
@@ -56,9 +56,11 @@ def test_a_foot_keeps_one_place_in_each_stance(rng):
     held = (Interval(0, 20), Interval(40, 66))
     found = plan_path(path, held, FOOT)
     for stance, anchor in zip(found.stances, found.anchors, strict=True):
-        assert (found.positions[stance.begin : stance.end] == anchor).all()
-        assert anchor[1] == FOOT.height
-    assert (found.positions[:, 1] >= FOOT.height).all()
+        apart = found.positions[stance.begin : stance.end] - anchor
+        assert not apart[:, ::2].any()
+        # Heights follow the prediction, within bounds.
+        assert np.abs(anchor[1] + apart[:, 1] - FOOT.height).max() <= stance_rows.UNEVEN
+    assert (found.positions[:, 1] >= FOOT.height - heel_roll.SUNK).all()
 
 
 def test_a_long_path_is_that_of_its_parts():
@@ -79,7 +81,8 @@ def test_a_dragged_swing_is_lifted_and_a_lifted_one_is_not():
     positions = floor_plane.at_height(ahead + 0j, np.full(60, 0.04))
     held = [Interval(0, 20), Interval(40, 60)]
     low = plan_path(FootPath(positions, RATE), held, FOOT)
-    assert low.positions[:, 1].max() == pytest.approx(FOOT.height + FOOT.clearance, abs=2e-3)
+    highest = FOOT.height + ball_path.LIFT_SHARE * FOOT.clearance
+    assert low.positions[:, 1].max() == pytest.approx(highest, abs=2e-3)
     lifted = positions.copy()
     lifted[20:40, 1] += 0.2 * np.sin(np.pi * np.linspace(0.0, 1.0, 20)) ** 2
     high = plan_path(FootPath(lifted, RATE), held, FOOT)
@@ -98,11 +101,6 @@ def test_a_foot_leaves_the_floor_and_comes_back_at_rest():
     # A sine to the power of 0.7 rises by a quarter in the first frame.
     steep = np.sin(np.pi * np.arange(1, 21) / 21.0) ** 0.7
     assert steep[0] > 0.25 * steep.max()
-    # While it is low it keeps its place; halfway it does not.
-    low = heights[20:40] < 0.3 * heights.max()
-    places = np.where(np.arange(20) < 10, planned[19, 2], planned[40, 2])
-    moved = np.abs(planned[20:40, 2] - places)
-    assert low.sum() >= 4 and moved[low].max() < 0.005 < moved[9]
 
 
 # Stances begin in the first and in the last frames of a cycle, and lie all around it.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from few_feet import Motion, frame_rows, plan_feet
 
-from posefield.feet import foot_placement, footsteps, limbs, stance_rows, two_bone
+from posefield.feet import foot_placement, footsteps, heel_roll, limbs, stance_rows, two_bone
 from posefield.feet.footsteps import Led
 from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
@@ -151,10 +151,10 @@ def test_feet_are_tilted_as_the_floor_is():
     turned, roots = foot_placement.place_feet(plan, times, whole.rotations, whole.roots)
     after = skeleton.positions(parents, turned, skeleton.translations(bones, roots))
     for leg, ball in zip(FEET, balls, strict=True):
-        arm = after[:, ball] - after[:, leg]
-        assert arm == pytest.approx(
-            np.tile(floor.tilted(height[0, ball] - height[0, leg]), (FRAMES, 1)), abs=1e-9
-        )
+        arm, tilted = after[:, ball] - after[:, leg], floor.tilted(height[0, ball] - height[0, leg])
+        # Stretched legs lift their heels.
+        lifted = np.arccos(np.clip(arm @ tilted / (tilted @ tilted), -1.0, 1.0))
+        assert np.median(lifted) < 0.1 and lifted.max() < heel_roll.MOST_LIFT
     ((_, paths),) = foot_placement.foot_paths([plan])
     assert np.abs(paths - after[:, list(balls)]).max() < 1e-9
 
@@ -222,8 +222,9 @@ def test_a_led_foot_is_where_the_motion_has_it_and_stands_before_and_after():
     assert [own.end <= KICK - 9 or own.begin > KICK + 9 for own in stances] == [True, True]
     assert plan.steps[0].anchors[:, 1] == pytest.approx(0.04, abs=0.02)
     for stance, anchor in zip(stances, plan.steps[0].anchors, strict=True):
-        assert np.abs(feet[stance.begin : stance.end, 0] - anchor).max() < 1e-9
-    assert feet[:, 0, 1].min() > plan.steps[0].anchors[0, 1] - 1e-9
+        apart = feet[stance.begin : stance.end, 0] - anchor
+        assert np.abs(apart[:, ::2]).max() < 1e-9 and np.abs(apart[:, 1]).max() < heel_roll.SUNK
+    assert feet[:, 0, 1].min() > plan.steps[0].anchors[0, 1] - heel_roll.SUNK
     # A foot that is not led is elsewhere, and one that is never planned slides.
     free = feet_of(placed(motion, planned(motion)))
     assert np.linalg.norm(free[KICK, 0] - wanted[KICK, 0]) > 1e-3

@@ -8,6 +8,7 @@ from msgspec import structs
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.common.units import UP
+from posefield.feet import stance_rows
 from posefield.inference import session
 from posefield.motion.measures import Measure
 from posefield.question import json_decoding, text_decoding
@@ -63,8 +64,15 @@ def test_a_standing_foot_keeps_its_place_at_any_rate(walker):
         for stance in told.stances:
             inside = (times >= stance.begin + 1e-6) & (times <= stance.end - 1e-6)
             path = joint(walker, answer, stance.joint)[inside]
-            assert np.abs(path - stance.position).max(initial=0.0) < 2e-6
+            assert_stands(path, stance)
         assert told.drift < 1e-9 and told.skate < 0.5 * told.skate_before
+
+
+def assert_stands(path, stance):
+    """A foot keeps its place over the floor; its height follows the prediction a little."""
+    apart = np.abs(path - stance.position)
+    assert apart[:, ::2].max(initial=0.0) < 2e-6
+    assert apart[:, 1].max(initial=0.0) < 2.0 * stance_rows.UNEVEN
 
 
 def test_bones_keep_their_lengths_and_other_joints_their_rotations(walker):
@@ -176,7 +184,7 @@ def test_feet_stand_on_a_slope(walker, floor):
     for stance in told.stances:
         inside = (times >= stance.begin + 1e-6) & (times <= stance.end - 1e-6)
         path = positions[inside, names.index(stance.joint)]
-        assert np.abs(path - stance.position).max(initial=0.0) < 2e-6
+        assert_stands(path, stance)
     assert told.left == () and told.drift < 1e-6
     # On a slope a clip is no loop: the low parts of the swings at its ends count as skate.
     assert told.skate < min(0.01, told.skate_before)

@@ -76,11 +76,12 @@ def test_a_standing_foot_stays_in_one_place_on_the_floor(model, own):
     _, free, _ = built(model, own, count=3, feet="as_predicted")
     heights = np.array([contact.height for contact in card.contacts])
     placed = joints(card, stood)[:, :, list(card.feet)]
-    assert (placed[..., 1] - heights).min() > -0.01
-    still = np.linalg.norm(np.diff(placed, axis=1), axis=-1) < 2e-6
-    slow = np.linalg.norm(np.diff(joints(card, free)[:, :, list(card.feet)], axis=1), axis=-1)
+    assert (placed[..., 1] - heights).min() > -0.015
+    free = joints(card, free)[:, :, list(card.feet)]
+    level = [np.diff(paths[..., [0, 2]], axis=1) for paths in (placed, free)]
+    still, slow = (np.linalg.norm(steps, axis=-1) < 2e-6 for steps in level)
     # Half of all frames or so, where the prediction has none.
-    assert 0.3 < still.mean() < 0.8 and (slow < 2e-6).mean() < 0.02
+    assert 0.3 < still.mean() < 0.8 and slow.mean() < 0.02
 
 
 def with_card(model, **changed):
