@@ -94,14 +94,14 @@ def leg_chord(poses: LimbPoses, leg: Limb, distance: Values) -> Values:
     x / sqrt(1 + (x / w)²), where w is the room that the predicted leg has. Legs without a foot
     follow as far as their firm reach.
     """
-    length = poses.length(leg.middle) + poses.length(leg.lower)
+    shortest, longest = distances(poses, leg)
     if leg.tip == leg.lower:
-        return soften(distance, firm_reach(poses, leg), length)
-    source = np.linalg.norm(poses.position(leg.lower) - poses.position(leg.upper), axis=-1)
-    room = np.maximum(STRAIGHT * length - source, 1e-4)
-    more = distance - source
-    chord: Values = source + more / np.sqrt(1.0 + np.square(np.maximum(more, 0.0) / room))
-    return chord
+        chord = soften(distance, firm_reach(poses, leg), longest)
+    else:
+        source = np.linalg.norm(poses.position(leg.lower) - poses.position(leg.upper), axis=-1)
+        more, room = distance - source, np.maximum(STRAIGHT * longest - source, 1e-4)
+        chord = source + more / np.sqrt(1.0 + np.square(np.maximum(more, 0.0) / room))
+    return np.asarray(np.maximum(chord, 1.001 * shortest + 1e-6))
 
 
 def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points:
