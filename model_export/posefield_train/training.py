@@ -25,6 +25,7 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import Jobs, ordered_results, single_threaded
 from posefield_train.kriging import (
     coefficient_models,
+    gaussian_process,
     kriging_bank,
     kriging_tuning,
     performer_means,
@@ -256,6 +257,8 @@ def _fit_models(
         k: coefficient_models.fit(recipe.kriging, pose.hyper, samples, v)
         for k, v in other_values.items()
     }
+    for k, v in clips.travels.items():
+        fitted[k] = gaussian_process.with_own_ranges(fitted[k], samples, v)
     power_law_fit = kriging_bank.fit_power_law(
         pose.hyper, samples, clips.controls, durations, fitted["duration"].residuals
     )

@@ -14,6 +14,7 @@ from posefield_train.evaluate import motion_errors, predictions, protocol, summa
 from posefield_train.evaluate.predictions import DEFINITIONS, OURS, Queries
 from posefield_train.evaluate.protocol import Fold
 from posefield_train.jobs import ProcessJobs
+from posefield_train.kriging import gaussian_process
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 from posefield_train.training import train_examples
@@ -200,7 +201,7 @@ def test_the_likelihood_is_scikit_learns(rng):
     theta = kernel.theta + 0.3 * rng.standard_normal(5)
     model = GaussianProcessRegressor(kernel, optimizer=None).fit(points, values)
     expected, slope = model.log_marginal_likelihood(theta, eval_gradient=True)
-    likelihood = predictions.MarginalLikelihood(np.square(points[:, None] - points), values)
+    likelihood = gaussian_process.MarginalLikelihood(np.square(points[:, None] - points), values)
     negative, negative_slope = likelihood.negative(theta)
     assert negative == pytest.approx(-expected, rel=1e-10)
     assert negative_slope == pytest.approx(-slope, rel=1e-8)

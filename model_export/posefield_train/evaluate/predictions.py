@@ -1,13 +1,10 @@
 """Predictions of posefield and two other methods for the same queries, from the same training."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky
-from scipy.optimize import minimize
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -18,14 +15,12 @@ from posefield_train.evaluate import motion_errors
 from posefield_train.evaluate.motion_errors import ComparedMotion, MotionEvent
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
+from posefield_train.kriging.gaussian_process import MarginalLikelihood
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.tensor import motion_tensor, truncation_error
 from posefield_train.tensor.motion_tensor import UNIFORM_SHARES
 from posefield_train.tensor.truncation_error import EventFrame
-
-# As scikit-learn adds to the diagonal.
-JITTER = 1e-10
 
 
 def predict_process(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
@@ -46,54 +41,6 @@ def predict_process(samples: SamplePoints, values: Floats, queries: Floats) -> F
         warnings.simplefilter("ignore", ConvergenceWarning)
         predicted = model.fit(samples.points, scaled).predict(queries)
     return centre + size * predicted.reshape(len(queries), -1)
-
-
-@dataclass(frozen=True)
-class MarginalLikelihood:
-    """Marginal likelihood of values (n, m) of the kernel above, all columns together.
-
-    scikit-learn makes tables (n, n, m) and (n, n, d) at every step of the search; the products here
-    give the same number and slope in a fraction of the time. squares: (n, n, d), of the differences
-    of the points in each coordinate.
-    """
-
-    squares: Floats
-    values: Floats
-
-    def negative(self, theta: Floats) -> tuple[float, Floats]:
-        """Return minus the logarithm of the likelihood, and its slope.
-
-        theta: logarithms of amplitude, length scales and noise, in the order of the kernel.
-        """
-        amplitude, noise = np.exp(theta[0]), np.exp(theta[-1])
-        rates = np.exp(-2.0 * theta[1:-1])
-        signal = amplitude * np.exp(-0.5 * self.squares @ rates)
-        covariance = signal + (noise + JITTER) * np.eye(len(signal))
-        try:
-            factor = cholesky(covariance, lower=True, check_finite=False)
-        except np.linalg.LinAlgError:
-            return np.inf, np.zeros_like(theta)
-        count, columns = self.values.shape
-        alpha = cho_solve((factor, True), self.values, check_finite=False)
-        inverse = cho_solve((factor, True), np.eye(count), check_finite=False)
-        likelihood = (
-            -0.5 * float(np.sum(self.values * alpha))
-            - columns * float(np.log(np.diag(factor)).sum())
-            - 0.5 * columns * count * np.log(2.0 * np.pi)
-        )
-        inner = alpha @ alpha.T - columns * inverse
-        weighted = inner * signal
-        lengths = np.tensordot(weighted, self.squares, axes=2) * rates
-        slope = 0.5 * np.array([weighted.sum(), *lengths, noise * np.trace(inner)])
-        return -likelihood, -slope
-
-    def optimize(
-        self, unused: Callable[..., Any], start: Floats, bounds: Floats
-    ) -> tuple[Floats, float]:
-        """Return the best theta and its value; an optimizer of scikit-learn's regressor."""
-        limits = [(float(low), float(high)) for low, high in bounds]
-        best = minimize(self.negative, start, method="L-BFGS-B", jac=True, bounds=limits)
-        return best.x, float(best.fun)
 
 
 OURS, GP, MEAN = "posefield", "gp", "mean"
