@@ -9,9 +9,10 @@ from typing import Annotated, Self
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import Bones, Floats, RootPath, Rotations
+from posefield.common.units import Bones, Floats, RootPath, Rotations, Vector
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.motion import skeleton
+from posefield.motion import hinges, quat, skeleton
+from posefield.motion.hinges import Hinge
 from posefield.motion.skeleton import Skeleton, joint_chain
 from posefield.rigs.rig import facing_of
 from posefield.roles import joint_recognition
@@ -141,6 +142,24 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
     return Body(skeleton.names, skeleton.parents, body_bones, joints)
 
 
+FOLDED = np.radians(155.0)
+"""Bend up to which any limb may fold, rad."""
+
+
+def _hinge(turns: Annotated[Floats, "frames 2 4"], above: Vector, below: Vector) -> Hinge | None:
+    """Return the hinge of a limb in its poses, with a range from straight to folded.
+
+    turns: orientations of its upper and middle joint. above, below: bones (3,) at rest, m.
+    """
+    bent = quat.mul(quat.conj(turns[:, 0]), turns[:, 1])
+    bones = (np.tile(bone, (len(bent), 1)) for bone in (above, below))
+    hinge = hinges.measure(0, bent, *bones)
+    if hinge is None:
+        return None
+    low = (min(hinge.low[0], 0.0), *hinge.low[1:])
+    return replace(hinge, low=low, high=(max(hinge.high[0], float(FOLDED)), *hinge.high[1:]))
+
+
 @dataclass(frozen=True)
 class PosedBody:
     """Poses of a body.
@@ -178,8 +197,12 @@ class PosedBody:
         rest = self.body.rest[list(joints)]
         bones = np.diff(rest, axis=0, prepend=rest[:1])
         parents = tuple(range(-1, len(joints) - 1))
-        limb_positions = self.positions[:, list(joints)]
-        limb = Limb(role_joints[0], role_joints[1], role_joints[2], role_joints[-1])
-        return limb, LimbPoses(
-            joints, parents, bones, limb_positions, self.orientations[:, list(joints)]
+        positions, turns = self.positions[:, list(joints)], self.orientations[:, list(joints)]
+        limb = Limb(
+            role_joints[0],
+            role_joints[1],
+            role_joints[2],
+            role_joints[-1],
+            _hinge(turns[:, 1:3], bones[2], bones[3]),
         )
+        return limb, LimbPoses(joints, parents, bones, positions, turns)
