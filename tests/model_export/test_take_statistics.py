@@ -16,9 +16,9 @@ def stroll(models_trained):
 
 @pytest.fixture(scope="module")
 def smooth(stroll):
-    """The model with three time functions, which cannot follow all of the walk."""
+    """The model with two time functions, which cannot follow all of the walk."""
     model, decoder = stroll.model, stroll.model.decoder
-    few = decoder.reduced.truncated((decoder.reduced.core.shape[0], 3, 8))
+    few = decoder.reduced.truncated((decoder.reduced.core.shape[0], 2, 8))
     return replace(stroll, model=replace(model, decoder=replace(decoder, reduced=few)))
 
 
@@ -39,7 +39,7 @@ def test_detail_restores_the_acceleration_that_left_out_predictions_lack(smooth)
     found = onnx_export.fit_detail(smooth)
     assert found is not None
     assert found.without < 0.99 and found.sampled == pytest.approx(1.0, abs=0.003)
-    assert found.deviations.shape == (19, 12) and (found.deviations >= 0.0).all()
+    assert found.deviations.shape == (19, 14) and (found.deviations >= 0.0).all()
 
 
 def test_no_detail_is_stored_where_none_is_missing(stroll, models_trained):
@@ -78,6 +78,6 @@ def test_cycles_have_no_duration_of_repeats(stroll):
 def test_the_card_says_what_is_sampled(smooth, models_trained):
     card = onnx_export.estimate(smooth).on_card(models_trained.exported("stroll").card)
     facts = card.diagnostics["detail"]
-    assert (facts["harmonics"], facts["directions"]) == (19, 12)
+    assert (facts["harmonics"], facts["directions"]) == (19, 14)
     assert facts["acceleration"] < facts["sampled"]
-    assert len(card.making.detail) == 2 * 19 * 12
+    assert len(card.making.detail) == 2 * 19 * 14
