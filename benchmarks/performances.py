@@ -1,7 +1,7 @@
 """Performances of trained models: joins, feet, paths, processor time, memory, and random scripts.
 
-MODELS are the files of hdm05_grab_high, hdm05_grab_return, hdm05_deposit_floor and
-hdm05_deposit_return; the walk is the shipped one.
+MODELS are the files of hdm05_grab_high, hdm05_deposit_floor, hdm05_kick, their returns, and
+hdm05_hop; the walk is the shipped one.
 """
 
 import argparse
@@ -22,13 +22,14 @@ from performance_costs import (
     time_rows,
     whole,
 )
-from random_scripts import Document
+from random_scripts import Cast, Document
 from rows import Row, record, table
 
 from posefield.common.units import Frames
 from posefield.feet import foot_placement
 from posefield.performance import composition
 from posefield.performance.passage import RATE
+from posefield.question.performance_report import PerformanceAnswer
 from posefield.registry import model_registry
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -230,12 +231,61 @@ def random_rows(models: Mapping[str, Synthesizer], count: int) -> list[Row]:
     return [Figure("random scripts with a fault", faulty, "scripts", note, None, 0.0)]
 
 
+def documented_rows(models: Mapping[str, Synthesizer], count: int) -> list[Row]:
+    """Return the hard joins and the warnings of the documented acts with their returns.
+
+    As the negative control, returns take the typical controls of their models, and kicks have none.
+    """
+    cast = random_scripts.cast(models)
+    documents = list(random_scripts.documented_scripts(cast, count))
+    answers = [random_scripts.check(document, cast.find).answer for document in documents]
+    spoiled = [random_scripts.check(_spoiled(own, cast), cast.find).answer for own in documents]
+    joins, hard = _hard_joins(answers)
+    others, others_hard = _hard_joins(spoiled)
+    warnings = [len(answer.trust.script_warnings) for answer in answers if answer]
+    title = "walks, acts and their returns"
+    control = f"{others_hard} of {others} with typical controls and kicks without returns"
+    return [
+        Figure(f"{title}: hard joins", hard, "joins", f"of {joins}; {control}", None, 0.0),
+        Figure(
+            f"{title}: warnings a script",
+            float(np.mean(warnings)),
+            "",
+            f"{len(warnings)} scripts; {count - len(warnings)} refused",
+            None,
+            0.3,
+            0.1,
+        ),
+    ]
+
+
+def _hard_joins(answers: Sequence[PerformanceAnswer | None]) -> tuple[int, int]:
+    """Return the number of joins, and of hard ones."""
+    joins = [join.hard for answer in answers if answer for join in answer.trust.joins]
+    return len(joins), sum(joins)
+
+
+def _spoiled(document: Document, cast: Cast) -> Document:
+    """Return a script whose returns take typical controls, and whose kicks have none."""
+    segments = []
+    for segment in document["segments"]:
+        model = segment.get("model", "")
+        if model == random_scripts.RETURNS["hdm05_kick"]:
+            continue
+        card = cast.find(model).session.card if model else None
+        typical = {own.name: own.default for own in card.controls} if card else {}
+        is_return = model in random_scripts.RETURNS.values()
+        segments.append({**segment, "controls": typical} if is_return else segment)
+    return {**document, "segments": segments}
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print the figures; write them where the documentation reads them if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("models", type=Path, nargs="+", help="model files")
     parser.add_argument("--scripts", type=int, default=1000, help="number of random scripts")
     parser.add_argument("--record", action="store_true")
+    parser.add_argument("--documented", type=int, default=200, help="number of documented scripts")
     options = parser.parse_args(arguments)
     models = {
         **model_registry.load([model_registry.SHIPPED_FOLDER / f"{WALK}.onnx"]).models,
@@ -243,7 +293,8 @@ def main(arguments: Sequence[str]) -> None:
     }
     find = models.__getitem__
     table_rows = [*whole_rows(find), *walk_rows(find), *flag_rows(find), *time_rows(find)]
-    table_rows += [*memory_rows(), *random_rows(models, options.scripts)]
+    table_rows += [*memory_rows(), *documented_rows(models, options.documented)]
+    table_rows += random_rows(models, options.scripts)
     print(table(table_rows))
     if options.record:
         command = f"python benchmarks/performances.py MODELS --scripts {options.scripts} --record"

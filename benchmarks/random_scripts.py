@@ -94,6 +94,53 @@ def draw(cast: Cast, rng: np.random.Generator) -> Document:
     return script
 
 
+RETURNS = {
+    "hdm05_grab_high": "hdm05_grab_return",
+    "hdm05_deposit_floor": "hdm05_deposit_return",
+    "hdm05_kick": "hdm05_kick_return",
+    "hdm05_hop": None,
+}
+"""Documented acts and their returns; a hop goes on into a walk."""
+
+
+def documented_scripts(cast: Cast, count: int, seed: int = 0) -> Iterator[Document]:
+    """Yield scripts of walks and one or two of the documented acts, with their returns.
+
+    Controls and heights of targets are within the captured ranges.
+    """
+    for number in range(count):
+        rng, here = np.random.Generator(np.random.PCG64([seed, number])), [0.0, 0.0]
+        acts = rng.choice(list(RETURNS), int(rng.integers(1, 3)))
+        segments = [segment for name in acts for segment in _visit(cast, rng, here, str(name))]
+        yield {"segments": [*segments, _stroll(cast, rng)], "fps": FPS}
+
+
+def _visit(cast: Cast, rng: np.random.Generator, here: list[float], name: str) -> list[Document]:
+    """Return a walk, an act, for some a hold, and the return if the act has one."""
+    walk, act = _stroll(cast, rng), {"kind": "act", "model": name}
+    ranges = [(own.name, own.minimum, own.maximum) for own in cast.find(name).session.card.controls]
+    controls = {control: _round(rng.uniform(low, high)) for control, low, high in ranges}
+    hold = {"kind": "hold", "seconds": _round(rng.uniform(0.3, 1.5))}
+    given, held = rng.random() < 0.5, rng.random() < 0.5
+    if "target_height" in controls:
+        place = _ahead(rng, here)
+        position = [place[0], controls["target_height"], place[1]]
+        act["targets"] = [{"joint": "rhand", "position": position, "at": "event"}]
+        del walk["seconds"]
+    elif given:
+        act["controls"] = controls
+    here[1] += walk["speed"] * walk.get("seconds", 0.0)
+    holds = [hold] if held and "targets" in act else []
+    after = RETURNS[name]
+    return [walk, act, *holds, *([{"kind": "act", "model": after}] if after else [])]
+
+
+def _stroll(cast: Cast, rng: np.random.Generator) -> Document:
+    speed, seconds = _round(rng.uniform(0.8, 1.5)), _round(rng.uniform(2.0, 4.0))
+    (name,) = cast.walks
+    return {"kind": "walk", "model": name, "speed": speed, "seconds": seconds}
+
+
 def _walk(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
     name = str(rng.choice(list(cast.walks)))
     low, high = cast.walks[name]

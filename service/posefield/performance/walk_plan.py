@@ -137,9 +137,9 @@ RADIUS_SHARE = 0.9
 """Share of the largest curvature that curves to a place use."""
 DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 """Clearances of ways around obstacles that are tried, as shares of the larger radius."""
-UNSEEN_PIVOT = 0.15
-"""Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 6°
-over a foot that stands for 0.65 s, and captured pelvises turn by 6° to 17° in each stride."""
+UNSEEN_PIVOT = 0.2
+"""Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 7°
+over a foot that stands for 0.65 s, and captured pelvises turn by 9° in each stride (median)."""
 # Frames between the points at which controls are solved, and the most points of mean offsets.
 STEP, OFFSET_POINTS = 6, 12
 SECONDS_RANGE = (0.1, walk_request.MAX_SECONDS)
