@@ -16,7 +16,6 @@ from posefield.question import json_decoding
 from posefield.question.motion_question import MotionQuestion
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.registry import model_registry
-from posefield.registry.model_registry import ModelRegistry
 
 EXACT, STILL = 1e-3, 1e-5
 HAND = "RightHand"
@@ -32,7 +31,7 @@ def find(models):
     library["early"] = acting.with_card(reach, event=Event(own.joint, 0.5))
     library["standing"] = measured_at_start(reach)
     library["cmu_walk"] = model_registry.load([model_registry.SHIPPED_FOLDER]).find("cmu_walk")
-    return ModelRegistry(library).find
+    return library.__getitem__
 
 
 def measured_at_start(model):
