@@ -28,6 +28,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "reference/typescript.md": lambda: data_pages.client("typescript"),
     "results/quality.md": lambda: data_pages.results("quality"),
     "results/targets.md": lambda: data_pages.results("targets"),
+    "results/feet.md": lambda: data_pages.results("feet"),
     "results/support.md": lambda: data_pages.results("support"),
     "results/performances.md": lambda: data_pages.results("performances"),
     "results/discovery.md": lambda: data_pages.results("discovery"),

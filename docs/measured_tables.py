@@ -30,6 +30,15 @@ LEVEL_COLUMNS = [
     "worst pose",
     "below a pixel from",
 ]
+STRIDE_COLUMNS = [
+    "speed, m/s",
+    "pelvis range, cm",
+    "pelvis, mean height, cm",
+    "knee, straightest",
+    "sole below the floor, cm",
+    "peak of a leg, m/s²",
+    "skate, cm/s",
+]
 PIXELS, FIELD = 1080, math.pi / 3.0
 """Height of the image, pixels, and vertical field of view, rad, for the distance of a level."""
 LEVELS_OF = "cmu_walk"
@@ -116,6 +125,24 @@ def levels() -> Rows:
             f"{100 * level['pose']:.1f} cm",
             f"{far:.0f} m",
         ]
+
+
+def stride_speeds() -> Rows:
+    """Yield the measures of straight strides by speed: predicted, standing, captured."""
+    for own in read("strides")["speeds"]:
+        kinds = [own["clip predicted"], own["clip standing"], own["captured"]]
+        cells = [
+            ", ".join(f"{kind[name]:.{digits}f}" for kind in kinds)
+            for name, digits in (
+                ("range", 1),
+                ("height", 1),
+                ("knee", 0),
+                ("sole", 1),
+                ("peak", 0),
+                ("skate", 1),
+            )
+        ]
+        yield [f"{own['speed']:g} ({own['strides']})", *cells]
 
 
 def _value(row: Found) -> str:

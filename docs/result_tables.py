@@ -27,6 +27,7 @@ JUDGED = (
     "proposed_controls",
     "roles",
     "scaled",
+    "strides",
 )
 TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "equal_known": lambda: (equal_tables.BEST_COLUMNS, equal_tables.best("known")),
@@ -69,6 +70,7 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
         ["family", "false alarms", tables.BEYOND],
         tables.support(),
     ),
+    "stride_speeds": lambda: (measured_tables.STRIDE_COLUMNS, measured_tables.stride_speeds()),
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
     **{
@@ -91,5 +93,6 @@ REMARKS: dict[str, Callable[[], str]] = {
 ORIGINS: dict[str, str] = {name: name for name in (*SPEED, *JUDGED)} | {
     "recipes": "models",
     "levels": "models",
+    "stride_speeds": "strides",
 }
 """File of docs/results that names the command and the date of a table's figures."""

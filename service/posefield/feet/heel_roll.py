@@ -143,4 +143,4 @@ def heel_turns(offset: Points, arm: Points, chord: Values) -> Turns:
     angle = np.arccos(np.clip(present, -1.0, 1.0)) - np.arccos(np.clip(wanted, -1.0, 1.0))
     axis = quat.cross(offset, arm)
     axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-12)
-    return quat.exp(axis * np.clip(angle, 0.0, MOST_LIFT)[:, None])
+    return quat.exp(axis * np.clip(angle, -MOST_LIFT, MOST_LIFT)[:, None])

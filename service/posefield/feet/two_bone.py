@@ -22,6 +22,8 @@ from posefield.motion.hinges import FREE, Hinge
 REACH, SOFTNESS = 0.995, 0.005
 # A leg is no straighter than this share of its length, but as far as it is predicted: 178 degrees.
 STRAIGHT = 0.9998
+# The heel of a straight leg presses by this much before the leg bends, m.
+PRESS = 0.005
 # Share of the limb's length by which it bends at least, where its plane is taken from its bend.
 LEAST_BEND = 0.01
 # Share of the limb's length up to which a leg that bends backwards is taken as straight; one that
@@ -91,8 +93,9 @@ def leg_chord(poses: LimbPoses, leg: Limb, distance: Values) -> Values:
 
     A bent leg spans what is wanted. One that is predicted straight hardly becomes longer: its knee
     would move several times as fast as its foot, which lifts its heel instead. A change x becomes
-    x / sqrt(1 + (x / w)²), where w is the room that the predicted leg has. Legs without a foot
-    follow as far as their firm reach.
+    x / sqrt(1 + (x / w)²), where w is the room that the predicted leg has. Nor does it become
+    shorter at once: its heel presses first, by p tanh(x / p). Legs without a foot follow as far as
+    their firm reach.
     """
     shortest, longest = distances(poses, leg)
     if leg.tip == leg.lower:
@@ -101,6 +104,8 @@ def leg_chord(poses: LimbPoses, leg: Limb, distance: Values) -> Values:
         source = np.linalg.norm(poses.position(leg.lower) - poses.position(leg.upper), axis=-1)
         more, room = distance - source, np.maximum(STRAIGHT * longest - source, 1e-4)
         chord = source + more / np.sqrt(1.0 + np.square(np.maximum(more, 0.0) / room))
+        press = PRESS / (1.0 + np.square(room / PRESS))
+        chord += press * np.tanh(np.maximum(-more, 0.0) / press)
     return np.asarray(np.maximum(chord, 1.001 * shortest + 1e-6))
 
 
