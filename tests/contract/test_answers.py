@@ -31,7 +31,8 @@ def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded)
     answer = ask("GET", url(f"{CLIP}.{extension}", controls))
     assert answer.headers["posefield-model"] == model.identity
     assert float(answer.headers["posefield-sigma"]) == trust.sigma
-    assert float(answer.headers["posefield-duration"]) == trust.duration
+    # The clip ends on a frame.
+    assert abs(float(answer.headers["posefield-duration"]) - trust.duration) <= 0.5 / 30
     assert answer.headers["posefield-supported"] == str(trust.supported).lower() == "true"
     assert "posefield-warning" not in answer.headers
     assert answer.headers["content-disposition"] == f'attachment; filename="reach.{extension}"'

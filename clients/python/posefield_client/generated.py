@@ -63,8 +63,8 @@ class Target(TypedDict, total=False):
     farthest from the root. Among the motions that reach the target, the response is the one
     closest to the prediction, in the metric of the deviations of captured motions from their
     predictions. A target beyond these deviations is approached as far as they extend, and
-    `targets` in Trust gives the remaining distance. Each joint has at most one target at a
-    moment.
+    `targets` in Trust gives the remaining distance, that of a clip in the frame at the moment.
+    Each joint has at most one target at a moment.
     """
 
     joint: Required[str]
@@ -556,6 +556,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     take: TakeFacts | None = None
     level: int
     duration: float
+    stretch: float | None = None
     sigma: float
     band: str | None = None
     supported: bool | None = None
@@ -657,6 +658,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     take: TakeFacts | None = None
     level: int
     duration: float
+    stretch: float | None = None
     sigma: float
     band: str | None = None
     deviations: tuple[Deviation, ...] = ()
@@ -757,6 +759,7 @@ class PerformanceReport(Struct, frozen=True, kw_only=True):
     models: tuple[str, ...]
     character: str
     duration: float
+    stretch: float | None = None
     frames: int
     sigma: float
     supported: bool
@@ -777,6 +780,7 @@ class PerformanceEntry(Struct, frozen=True, kw_only=True):
     models: tuple[str, ...]
     character: str
     duration: float
+    stretch: float | None = None
     frames: int
     sigma: float
     supported: bool

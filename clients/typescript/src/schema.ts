@@ -752,8 +752,8 @@ export interface components {
          * @description One whole cycle in N = max(1, round(duration * fps)) even steps, which gives N + 1 frames.
          *     Not valid with `start` or `end`. The last frame equals the first exactly or, if the root
          *     travels, equals the first moved by the travel and the turn of the cycle. The file plays for
-         *     N / fps seconds; `duration` in the trust is the model's. A model that is not cyclic refuses
-         *     it.
+         *     N / fps seconds, and `stretch` in the trust is the difference to its `duration`, which is
+         *     the model's. A model that is not cyclic refuses it.
          * @default false
          */
         Loop: boolean;
@@ -777,8 +777,8 @@ export interface components {
          *     farthest from the root. Among the motions that reach the target, the response is the one
          *     closest to the prediction, in the metric of the deviations of captured motions from their
          *     predictions. A target beyond these deviations is approached as far as they extend, and
-         *     `targets` in Trust gives the remaining distance. Each joint has at most one target at a
-         *     moment.
+         *     `targets` in Trust gives the remaining distance, that of a clip in the frame at the moment.
+         *     Each joint has at most one target at a moment.
          */
         Target: {
             /**
@@ -1353,6 +1353,7 @@ export interface components {
             character: components["schemas"]["Identity"];
             /** @description In seconds. */
             duration: number;
+            stretch?: components["schemas"]["Stretch"];
             frames: number;
             /** @description Expected distance from captured motion in metres, root mean square over joints and frames. */
             sigma: number;
@@ -1397,6 +1398,7 @@ export interface components {
             character: components["schemas"]["Identity"];
             /** @description In seconds. */
             duration: number;
+            stretch?: components["schemas"]["Stretch"];
             frames: number;
             /** @description Expected distance from captured motion in metres, root mean square over joints and frames. */
             sigma: number;
@@ -1694,6 +1696,7 @@ export interface components {
             level: number;
             /** @description As in Trust, in seconds. */
             duration: number;
+            stretch?: components["schemas"]["Stretch"];
             /** @description As in Trust, in metres. */
             sigma: number;
             band?: components["schemas"]["Band"];
@@ -1719,6 +1722,8 @@ export interface components {
             /** @description Whether details that no control predicts were sampled. */
             detail: boolean;
         };
+        /** @description Largest distance in time of a moment of the motion from its frame, in seconds: frames lie on targets, on the event, and on the end of a motion that has one of them and is no cycle; a loop has whole steps. At most half a frame. Absent for frames at equal times. Since 5.1.0. */
+        Stretch: number;
         /** @description Report on the motion of a user's character. Absent for the character of the model. Since 4.3.0. */
         Retargeting: {
             /** @description Name of the character. */
@@ -1794,8 +1799,9 @@ export interface components {
             take?: components["schemas"]["TakeFacts"];
             /** @description Level of detail, an index into the card's levels; 0 is the finest. */
             level: number;
-            /** @description Natural duration of the whole clip at these controls, in seconds. */
+            /** @description Duration of the whole clip at these controls, in seconds: of a clip that ends on a frame, that of its frames. */
             duration: number;
+            stretch?: components["schemas"]["Stretch"];
             /** @description Expected distance of a captured clip at these controls from this clip, root mean square over joints and frames, in metres. */
             sigma: number;
             band?: components["schemas"]["Band"];
@@ -2921,7 +2927,7 @@ export interface components {
         fps: number;
         /** @description Time of the first frame, in seconds from the start of the whole clip. */
         start: number;
-        /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. */
+        /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. With an event or a target, a clip that is no cycle ends on a frame: its time is stretched by up to half a frame. */
         end: number;
         /** @description Naming convention of the joints. */
         names: components["schemas"]["Names"];
@@ -3593,7 +3599,7 @@ export interface operations {
                 fps?: components["parameters"]["fps"];
                 /** @description Time of the first frame, in seconds from the start of the whole clip. */
                 start?: components["parameters"]["start"];
-                /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. */
+                /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. With an event or a target, a clip that is no cycle ends on a frame: its time is stretched by up to half a frame. */
                 end?: components["parameters"]["end"];
                 /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];
@@ -3752,7 +3758,7 @@ export interface operations {
                 fps?: components["parameters"]["fps"];
                 /** @description Time of the first frame, in seconds from the start of the whole clip. */
                 start?: components["parameters"]["start"];
-                /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. */
+                /** @description Latest time of the last frame, in seconds from the start of the whole clip. Default: the clip's duration. With an event or a target, a clip that is no cycle ends on a frame: its time is stretched by up to half a frame. */
                 end?: components["parameters"]["end"];
                 /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
                 extrapolate?: components["parameters"]["extrapolate"];

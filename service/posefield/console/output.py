@@ -26,9 +26,11 @@ def written_message(path: Path, answer: ClipAnswer, json: bool) -> str:
     if json:
         facts = answer.trust.document()
         return as_json({"file": str(path), "frames": frames, "rate": answer.clip.rate, **facts})
+    stretch = answer.trust.stretch
+    stretched = f", stretched by up to {1000 * stretch:.1f} ms" if stretch else ""
     return (
         f"{path}: {frames} frames at {answer.clip.rate:g} a second, {answer.trust.duration:.2f} s, "
-        f"give or take {100 * answer.trust.sigma:.1f} cm ({band(answer.trust.sigma)})"
+        f"give or take {100 * answer.trust.sigma:.1f} cm ({band(answer.trust.sigma)}){stretched}"
     )
 
 

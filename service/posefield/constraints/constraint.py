@@ -76,10 +76,14 @@ class PositionConstraint:
         frames = {"start": 0.0, "end": last, "landmark": self.at}
         return frames.get(self.moment.at or "")
 
+    def frame_of(self, scene: MotionVariables, numbers: Variables) -> float:
+        """Return the canonical frame at which a motion has the moment."""
+        return _moment_frame(scene, numbers, self.moment, self.at)
+
     def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the values and their gradients."""
         joints = self.moment.joints
-        at = _moment_frame(scene, numbers, self.moment, self.at)
+        at = self.frame_of(scene, numbers)
         pairs = [scene.position_and_gradient(numbers, joint, at) for joint in joints]
         values = np.mean([value for value, _ in pairs], axis=0)
         gradients = np.mean([gradient for _, gradient in pairs], axis=0)
@@ -100,7 +104,7 @@ class PositionConstraint:
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions values"]:
         """Return the values (n, k) of other motions."""
-        at = _moment_frame(scene, numbers, self.moment, self.at)
+        at = self.frame_of(scene, numbers)
         positions = [
             scene.evaluate_motions(numbers, motions, joint, at) for joint in self.moment.joints
         ]

@@ -32,6 +32,8 @@ CACHE_SIZE = 64
 # A speed constraint changes the duration, and so the canonical frame of a time in seconds: the most
 # iterations, and the relative change of the duration at which they stop.
 MAX_ROUNDS, DURATION_TOLERANCE = 8, 1e-6
+# Times at which the canonical frames of a motion are looked up, to find the time of one.
+WARP_STEPS = 2048
 # Canonical frames closer than this are one moment.
 FRAME_TOLERANCE = 1e-3
 
@@ -161,6 +163,28 @@ class ConstraintSolver:
                 requests, frames, poses, strict=True
             )
         ]
+
+    def target_times(
+        self,
+        question: ValidatedQuestion,
+        motion: ConstrainedMotion,
+        targets: tuple[JointTarget, ...],
+    ) -> list[float]:
+        """Return the times, s, at which a motion has the moments of targets."""
+        aims = self._target_constraints(question, targets, motion)
+        frames = np.array([aim.frame_of(motion.scene, motion.numbers) for aim in aims])
+        times = self.times(question, motion, frames).tolist()
+        return [
+            time if target.time is None else min(target.time, motion.duration)
+            for target, time in zip(targets, times, strict=True)
+        ]
+
+    def times(
+        self, question: ValidatedQuestion, motion: ConstrainedMotion, frames: Frames
+    ) -> Frames:
+        """Return the times (S,), s, of canonical frames (S,) of a motion."""
+        times = np.linspace(0.0, motion.duration, WARP_STEPS)
+        return np.interp(frames, self._frames(question, motion, times), times)
 
     def _captured_positions(
         self, moment: Measure, time: float | None

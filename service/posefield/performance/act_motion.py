@@ -8,6 +8,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Bones, Floats, Frames
+from posefield.constraints.targets import NO_CONSTRAINTS
 from posefield.feet import limbs, stance_rows
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
@@ -19,9 +20,6 @@ from posefield.question.results import PoseAnswer, Trust
 from posefield.synthesis import poses
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
-
-# Times at which the canonical frames of a motion are looked up, to find the time of its event.
-WARP_STEPS = 512
 
 
 @dataclass(frozen=True)
@@ -119,9 +117,9 @@ def _times(model: Synthesizer, question: ValidatedQuestion) -> tuple[Frames, int
     event, last = model.session.card.event, model.session.card.frames - 1
     if event is None or event.share == 1.0:
         return times_through(duration, duration)
-    moments = np.linspace(0.0, duration, WARP_STEPS)
-    state = model.session.state(question.point, moments, question.labels, question.level)
-    return times_through(float(np.interp(event.share * last, state.frames, moments)), duration)
+    motion = model.solver.solve(question, NO_CONSTRAINTS)
+    (moment,) = model.solver.times(question, motion, np.array([event.share * last]))
+    return times_through(float(moment), duration)
 
 
 def _contacts(

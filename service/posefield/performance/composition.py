@@ -37,7 +37,8 @@ from posefield.question.performance_report import (
     SegmentReport,
 )
 from posefield.question.results import ConstraintResult, FeetResult
-from posefield.synthesis import standing_feet
+from posefield.synthesis import event_frames, standing_feet
+from posefield.synthesis.event_frames import Playback
 
 
 def plan(script: Script, frame_limit: int) -> PerformanceReport:
@@ -46,9 +47,9 @@ def plan(script: Script, frame_limit: int) -> PerformanceReport:
     Raises QueryError with a pointer into the script.
     """
     timeline = compose(script)
-    times = frame_times(timeline, script.question.fps, frame_limit)
+    played = plan_frames(timeline, script.question.fps, frame_limit)
     joins = _judge_joins(script, timeline, timeline.performed)
-    return _report(script, timeline, joins, len(times), None)
+    return _report(script, timeline, joins, played, None)
 
 
 def perform(script: Script, frame_limit: int) -> PerformanceAnswer:
@@ -58,7 +59,8 @@ def perform(script: Script, frame_limit: int) -> PerformanceAnswer:
     """
     timeline = compose(script)
     question, character = script.question, script.character
-    times = frame_times(timeline, question.fps, frame_limit)
+    played = plan_frames(timeline, question.fps, frame_limit)
+    times = played.times(played.duration)
     feet: FeetResult | None = None
     feet_plan: FeetPlan | None = None
     motion = timeline.performed
@@ -76,18 +78,23 @@ def perform(script: Script, frame_limit: int) -> PerformanceAnswer:
     clip = assemble(joints, quat.normalize(rotations), roots, character.bones, question.fps)
     bone = question.root == "bone" or (question.root is None and question.names == "ue5")
     clip = replace(clip, root_bone=bone)
-    report = _report(script, timeline, joins, len(clip), feet)
-    return PerformanceAnswer(clip, report, _held_joints(timeline, clip))
+    report = _report(script, timeline, joins, played, feet)
+    return PerformanceAnswer(clip, report, _held_joints(timeline, clip, times))
 
 
-def _held_joints(timeline: Timeline, clip: Clip) -> tuple[HeldJoint, ...]:
-    joints = []
+def _held_joints(timeline: Timeline, clip: Clip, times: Frames) -> tuple[HeldJoint, ...]:
+    """Return the joints with targets and their times in the clip.
+
+    times: of its frames (F,) in the motion, s.
+    """
+    joints, last = [], float(times[-1])
     for target in timeline.targets:
         begin, end = ((frame - timeline.begin) / RATE for frame in (target.begin, target.end))
-        if end >= 0.0 and begin <= clip.duration:
+        if end >= 0.0 and begin <= last:
             x, y, z = target.position.tolist()
-            times = max(begin, 0.0), min(end, clip.duration)
-            joints.append(HeldJoint(clip.skeleton.names[target.joint], *times, (x, y, z)))
+            played = np.arange(len(times)) / clip.rate
+            begins, ends = np.interp((begin, end), times, played).tolist()
+            joints.append(HeldJoint(clip.skeleton.names[target.joint], begins, ends, (x, y, z)))
     return tuple(joints)
 
 
@@ -182,15 +189,21 @@ def _stage_ahead(script: Script, index: int) -> StagedAct | None:
         return acts.stage_after_walk(script, index + 1)
 
 
-def frame_times(timeline: Timeline, fps: float, limit: int) -> Frames:
-    """Return the times (F,), s, of the frames; InvalidField for more than `limit`."""
+def plan_frames(timeline: Timeline, fps: float, limit: int) -> Playback:
+    """Return the playback in which targets and events have frames.
+
+    Raises InvalidField for more frames than `limit`.
+    """
     seconds = (len(timeline.performed) - 1) / RATE
-    count = int(seconds * fps + 1e-6) + 1
-    if count > limit:
+    marks = [target.begin for target in timeline.targets]
+    marks += [span.event for span in timeline.spans if span.event is not None]
+    moments = [(mark - timeline.begin) / RATE for mark in marks]
+    played = event_frames.playback(fps, 0.0, seconds, moments)
+    if (count := len(played.times(played.duration))) > limit:
         raise InvalidField(
             "segments", f"{count} frames at {fps:g} a second, expected at most {limit}"
         )
-    return np.arange(count) / fps
+    return played
 
 
 def plan_feet(script: Script, timeline: Timeline) -> FeetPlan:
@@ -220,7 +233,7 @@ def _at_times(
     motion: at `RATE`, with placed feet. Times between its frames have feet placed anew.
     """
     step = round(RATE / fps)
-    if step * fps == RATE:
+    if np.abs(times * RATE - step * np.arange(len(times))).max() < event_frames.ROUNDING:
         rows = slice(0, step * len(times), step)
         return motion.rotations[rows], motion.roots[rows]
     predicted = timeline.performed
@@ -308,13 +321,14 @@ def _report(
     script: Script,
     timeline: Timeline,
     joins: Sequence[JoinFacts],
-    frames: int,
+    played: Playback,
     feet: FeetResult | None,
 ) -> PerformanceReport:
     """Return the report of a performance.
 
-    joins: judged, in order. frames: of its clip. feet: None as predicted.
+    joins: judged, in order. played: of its frames. feet: None as predicted.
     """
+    times = played.times(played.duration)
     motion, stops = timeline.performed, [later.begin for _, later in pairwise(timeline.spans)]
     misses = {
         target.pointer: miss for target, miss in zip(timeline.targets, timeline.misses, strict=True)
@@ -327,8 +341,8 @@ def _report(
     return PerformanceReport(
         script.identities,
         script.character.identity,
-        round_micrometres((len(motion) - 1) / RATE),
-        frames,
+        round_micrometres(played.duration),
+        len(times),
         round_micrometres(float(np.sqrt(np.mean(np.square(motion.sigmas))))),
         all(span.supported for span in timeline.spans),
         tuple(
@@ -338,6 +352,7 @@ def _report(
         tuple(_join(join, timeline.begin) for join in joins),
         merge_warnings([*timeline.warnings, *warnings]),
         feet,
+        stretch=played.stretch(times) or None,
     )
 
 

@@ -97,7 +97,9 @@ class PerformanceReport(
     models: name@contenthash, in the order of the script. character: of the bones. sigma: expected
     distance from captured motion, m, root mean square over frames. supported: whether similar clips
     were captured for all segments. feet: None for feet as predicted. retargeting: report on the
-    motion of a user's character; empty for that of the script.
+    motion of a user's character; empty for that of the script. stretch: largest distance in time of
+    a moment of the motion from its frame, s, which puts events and targets on frames; at most half
+    a frame, None for frames at equal times.
     """
 
     models: tuple[str, ...]
@@ -111,6 +113,7 @@ class PerformanceReport(
     script_warnings: tuple[ScriptWarning, ...]
     feet: FeetResult | None = None
     retargeting: Mapping[str, Any] = {}
+    stretch: float | None = None
 
     @property
     def model(self) -> str:

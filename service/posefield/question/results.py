@@ -124,21 +124,24 @@ class FeetResult(Struct, frozen=True, omit_defaults=True):
 class Trust(Struct, frozen=True, omit_defaults=True):
     """Provenance and uncertainty of a result.
 
-    model: name@contenthash. controls: requested values in the model's units. duration: natural
-    length of the whole clip at these controls, s. sigma: expected distance between this clip and a
-    captured clip at these controls, root mean square over joints and frames, m. warnings: one
-    sentence for each control outside its sampled range, or one for controls in a gap between the
-    samples, one for each deviation, and one for each target that is not reached. performer:
-    requested name; None for an unseen performer. level: of detail. supported: whether clips with
-    similar controls were captured. performer_seen: whether the requested performer was
-    captured; None where the model does not distinguish performers. inferred: names of the
-    controls that were not given and were set to the most typical values for the given ones.
-    measured: values in this result of the controls for which the recipe has a measure. targets:
-    residuals of the constraints. joint_sigma (J,), m: sigma of each joint; empty unless
-    requested. deviations: requested controls whose value the motion does not have. labels:
+    model: name@contenthash. controls: requested values in the model's units. duration: of the whole
+    clip at these controls, s; of a clip that ends on a frame, that of its frames. sigma: expected
+    distance between this clip and a captured clip at these controls, root mean square over joints
+    and frames, m. warnings: one sentence for each control outside its sampled range, or one for
+    controls in a gap between the samples, one for each deviation, and one for each target that is
+    not reached. performer: requested name; None for an unseen performer. level: of detail.
+    supported: whether clips with similar controls were captured. performer_seen: whether the
+    requested performer was captured; None where the model does not distinguish performers.
+    inferred: names of the controls that were not given and were set to the most typical values for
+    the given ones. measured: values in this result of the controls for which the recipe has a
+    measure. targets: residuals of the constraints. joint_sigma (J,), m: sigma of each joint; empty
+    unless requested. deviations: requested controls whose value the motion does not have. labels:
     requested names or weights besides the performer, by label set. feet: of a clip that were made
     to stand; None for feet as predicted. take: seed, variety and detail of the take; empty for the
-    prediction. retargeting: report on the motion of a user's character; empty for the model's own.
+    prediction. stretch: largest distance in time of a moment of the motion from its frame, s, which
+    puts its event, its targets and its end on frames, or gives a loop whole steps; at most half a
+    frame, None for frames at equal times. retargeting: report on the motion of a user's character;
+    empty for the model's own.
     """
 
     model: str
@@ -158,6 +161,7 @@ class Trust(Struct, frozen=True, omit_defaults=True):
     labels: Mapping[str, LabelValue] = {}
     feet: FeetResult | None = None
     take: Mapping[str, float] = {}
+    stretch: float | None = None
     retargeting: Mapping[str, Any] = {}
 
     def document(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Drafts of clips: what is known of each before and during its synthesis, and its validation."""
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import Floats
 from posefield.constraints.constrained_motion import ConstrainedMotion
-from posefield.constraints.targets import ConstraintSet
+from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
 from posefield.feet.stance_rows import Cycle
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
@@ -17,6 +17,7 @@ from posefield.question import motion_question
 from posefield.question.floor import LEVEL_FLOOR, Floor
 from posefield.question.motion_question import ClipQuestion, check_number, check_range
 from posefield.question.results import PoseAnswer
+from posefield.synthesis import event_frames
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
@@ -31,10 +32,11 @@ class ClipDraft:
     """A clip in the making; each stage of the synthesis sets what it computes.
 
     question: as received. frame_limit: largest number of frames. error: that of the first stage
-    that cannot be done. validated, skeleton (with the requested names), constraints and stands
-    (whether feet are placed): of the validation. motion: corrected motion; None for the prediction.
-    times: of the frames (F,), s. strides: cycle or line of the root, where the path of the root is
-    changed or feet stand. answer: the poses of the frames.
+    that cannot be done. rate: frames a second. validated, skeleton (with the requested names),
+    constraints and stands (whether feet are placed): of the validation. motion: corrected motion;
+    None for the prediction. target_times: of the targets in the motion, s. times: of the frames in
+    it (F,), s. duration: as it is played, s. strides: cycle or line of the root, where the path of
+    the root is changed or feet stand. answer: the poses of the frames.
 
     Of the plan of standing feet: its times (G,), s, over the whole motion; rotations (G, J, 4) and
     root positions (G, 3), m, at them; and the floor motion of a cycle, None for a motion without.
@@ -43,12 +45,15 @@ class ClipDraft:
     question: ClipQuestion
     frame_limit: int
     error: QueryError | None = None
+    rate: float = field(init=False)
     validated: ValidatedQuestion = field(init=False)
     skeleton: Skeleton = field(init=False)
     constraints: ConstraintSet | None = None
     stands: bool = False
     motion: ConstrainedMotion | None = None
+    target_times: Sequence[float] = ()
     times: Floats = field(init=False)
+    duration: float = field(init=False)
     strides: Strides | None = None
     answer: PoseAnswer[np.float64] = field(init=False)
     plan_times: Floats = field(default_factory=lambda: np.empty(0))
@@ -61,6 +66,8 @@ class ClipDraft:
         Raises InvalidField and OutsideSamples as `clips.synthesize_clip` does.
         """
         question = self.question
+        self.rate = check_number("fps", question.fps)
+        check_range("fps", self.rate, *FPS_RANGE, "frames a second")
         self.validated = model.question(question)
         if question.loop and not model.session.card.cyclic:
             raise InvalidField(
@@ -70,31 +77,72 @@ class ClipDraft:
         self.constraints = model.constraints(self.validated, question)
         self.stands = wants_standing_feet(model.session.card, question)
 
-    def set_times(self, duration: float) -> None:
+    def set_times(self, model: Synthesizer, duration: float) -> None:
         """Set the times of the frames of a clip that lasts `duration` seconds.
 
         A loop's times lack the last frame, which equals the first. Raises InvalidField for more
         frames than the limit.
         """
-        rate, start, last = time_window(self.question, duration)
+        moments, rate = self._moments(model, duration), self.rate
+        self.duration = duration
         if self.question.loop:
+            time_window(self.question, duration)
             steps = max(1, round(duration * rate))
             self.times, frames = np.arange(steps) * duration / steps, steps + 1
+            inner = [time for time in moments if 0 < round(time * steps / duration) < steps]
+            if inner:
+                played = event_frames.playback(steps / duration, 0.0, duration, inner)
+                self.times = played.times(float(self.times[-1]))
         else:
-            # Tolerance of a millionth of a frame for the rounding of duration * rate.
-            frames = math.floor((last - start) * rate + 1e-6) + 1
-            self.times = np.minimum(start + np.arange(frames) / rate, duration)
+            played = event_frames.playback(rate, self._start(duration), duration, moments)
+            if moments:
+                self.duration = played.duration
+            # Clients read the duration of the motion from poses, as it is played from clips, and
+            # may round it to single precision.
+            last = time_window(self.question, max(duration, self.duration))[1]
+            if last * (1.0 + motion_question.FLOAT32_EPSILON) >= min(duration, self.duration):
+                last = self.duration
+            self.times = np.minimum(played.times(last), duration)
+            frames = len(self.times)
         if frames > self.frame_limit:
             raise InvalidField("fps", f"{frames} frames, expected at most {self.frame_limit}")
 
+    def _start(self, duration: float) -> float:
+        """Return the time of the first frame, s, limited to the motion's."""
+        return min(max(check_number("start", self.question.start), 0.0), duration)
 
-def time_window(question: ClipQuestion, duration: float) -> tuple[float, float, float]:
-    """Return frames a second, start (s) and end (s) of a clip of at most `duration` seconds.
+    def _moments(self, model: Synthesizer, duration: float) -> list[float]:
+        """Return the times, s, that are those of frames, and set those of targets.
+
+        A cycle keeps its speed but for its targets; of another motion with a target or an event,
+        the event and the end are among them.
+        """
+        card, targets = model.session.card, self.constraints.targets if self.constraints else ()
+        if self.motion is not None and targets:
+            self.target_times = model.solver.target_times(self.validated, self.motion, targets)
+        moments, event = list(self.target_times), card.event
+        if card.cyclic or not (targets or event):
+            return moments
+        if event is not None and 0.0 < event.share < 1.0:
+            motion = self.motion or model.solver.solve(self.validated, NO_CONSTRAINTS)
+            frame = np.array([event.share * (card.frames - 1)])
+            moments += model.solver.times(self.validated, motion, frame).tolist()
+        # Less than half a frame before the end, the first pose is the only one.
+        if (duration - self._start(duration)) * self.rate > 0.5:
+            moments.append(duration)
+        return moments
+
+    @property
+    def shifts(self) -> Floats:
+        """Return by how much each frame (F,) is earlier in the motion than in the clip, s."""
+        return np.asarray(self.question.start + np.arange(len(self.times)) / self.rate - self.times)
+
+
+def time_window(question: ClipQuestion, duration: float) -> tuple[float, float]:
+    """Return start and end, s, of a clip of at most `duration` seconds.
 
     Raises InvalidField for values out of range, and for a loop with a start or an end.
     """
-    rate = check_number("fps", question.fps)
-    check_range("fps", rate, *FPS_RANGE, "frames a second")
     last = duration
     if question.end is not None:
         end = check_number("end", question.end)
@@ -104,7 +152,7 @@ def time_window(question: ClipQuestion, duration: float) -> tuple[float, float, 
     if question.loop and (start > 0.0 or question.end is not None):
         name, value = ("start", start) if start > 0.0 else ("end", last)
         raise InvalidField(name, f"{value:g} s with loop, expected none: a loop is a whole cycle")
-    return rate, start, last
+    return start, last
 
 
 def largest_frame_count(model: Synthesizer, question: ClipQuestion) -> float:
@@ -113,7 +161,8 @@ def largest_frame_count(model: Synthesizer, question: ClipQuestion) -> float:
     NaN where a field of the question is, which the synthesis refuses.
     """
     last = model.durations[1] if question.end is None else question.end
-    return (last - question.start) * question.fps + 1.0
+    # A clip that ends on a frame may be longer by half a frame.
+    return (last - question.start) * question.fps + 1.5
 
 
 def is_predicted(model: Synthesizer, question: ClipQuestion) -> bool:

@@ -22,7 +22,7 @@ from posefield.motion.clip import assemble
 from posefield.motion.curves import CurveValues
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
-from posefield.synthesis import clip_draft, poses, standing_feet
+from posefield.synthesis import clip_draft, frame_trust, poses, standing_feet
 from posefield.synthesis.clip_draft import ClipDraft
 from posefield.synthesis.poses import MAX_POSES, OutputRow
 from posefield.synthesis.synthesizer import Synthesizer, check_targets
@@ -35,9 +35,10 @@ def synthesize_clip(
 ) -> ClipAnswer:
     """Return the clip of a question; frame i is the pose at start + i / fps.
 
-    The N steps of a loop share the duration evenly, but are played at fps. Raises as
-    `poses.synthesize_poses` does, and InvalidField for a loop of a model that is not cyclic, for
-    joint names without roles and for more frames than the limit.
+    Targets, events and ends have frames, at most half a step beside (`event_frames`). The N steps
+    of a loop share the duration evenly, but are played at fps. Raises as `poses.synthesize_poses`
+    does, and InvalidField for a loop of a model that is not cyclic, for joint names without roles
+    and for more frames than the limit.
     """
     (answer,) = synthesize_clips(model, [question], frame_limit)
     if isinstance(answer, QueryError):
@@ -94,7 +95,7 @@ def _correct(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
         if draft.question.extrapolate == "refuse" and draft.constraints:
             check_targets(draft.constraints, motion.results)
         draft.motion = motion
-        draft.set_times(model.check_duration(motion.duration))
+        draft.set_times(model, model.check_duration(motion.duration))
         _set_strides(model, draft, motion.duration)
 
     corrected = _attempt(drafts, set_motion, motions)
@@ -126,7 +127,7 @@ def _predict(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
     """Set the poses of drafts without constraints."""
 
     def set_times(draft: ClipDraft, duration: float) -> None:
-        draft.set_times(model.check_duration(duration))
+        draft.set_times(model, model.check_duration(duration))
 
     for group in _groups(model, drafts):
         durations = _durations(model, [draft.validated for draft in group])
@@ -175,6 +176,7 @@ def _set_strides(model: Synthesizer, draft: ClipDraft, duration: float) -> None:
 
 def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer:
     question, answer = draft.question, draft.answer
+    trust = frame_trust.of_frames(model, draft)
     if draft.strides is not None:
         in_place = question.root == "in_place" and model.session.card.root == "travelling"
         if in_place:
@@ -185,7 +187,7 @@ def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer:
     clip = assemble(draft.skeleton, turns, path, offsets, float(question.fps))
     if answer.curves is not None:
         clip = replace(clip, curves=CurveValues(model.session.card.curves, answer.curves))
-    return ClipAnswer(replace(clip, root_bone=question.root_bone), answer.trust)
+    return ClipAnswer(replace(clip, root_bone=question.root_bone), trust)
 
 
 def _without_travel(answer: PoseAnswer[np.float64], strides: Strides) -> PoseAnswer[np.float64]:
@@ -317,7 +319,9 @@ def preview_clip(
     # Constraints can change the duration, as a target speed does.
     strict = question.extrapolate == "refuse" or model.session.card.cyclic
     if constraints and (constraints.targets or strict):
-        motion = model.solve_constraints(validated, constraints, question.extrapolate)
+        draft.motion = motion = model.solve_constraints(
+            validated, constraints, question.extrapolate
+        )
         _, targets = split_results(motion.results, len(constraints.targets))
         misses_target = question.extrapolate != "ok" and not all(
             target.reached for target in targets
@@ -325,7 +329,7 @@ def preview_clip(
         duration = motion.duration
     else:
         (duration,) = _durations(model, [validated])
-    draft.set_times(model.check_duration(duration))
+    draft.set_times(model, model.check_duration(duration))
     warnings = question_validation.merge_warnings(
         validated.warnings, validated.deviations, question.extrapolate
     )

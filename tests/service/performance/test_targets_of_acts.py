@@ -91,10 +91,24 @@ def test_an_act_is_left_after_its_last_target(find, own_hand):
 def test_a_target_at_a_moment_of_the_motion_is_met_by_the_character(find, own_hand, when):
     frame = {"highest": 86, "lowest": 0, "farthest": 86}[when]
     wanted = own_hand[frame] + [0.02, 0.03, 0.02]
-    answer = performed(find, reach(wanted, at=when), PLAIN)
-    (target,) = answer.trust.segments[0].targets
-    assert target.reached
-    assert np.linalg.norm(path(answer) - wanted, axis=-1).min() < EXACT
+    for fps in (24.0, 30.0, 60.0):
+        answer = performed(find, reach(wanted, at=when), PLAIN, fps=fps)
+        (target,) = answer.trust.segments[0].targets
+        assert target.reached and (answer.trust.stretch or 0.0) <= 0.5 / fps + 1e-6
+        assert np.linalg.norm(path(answer) - wanted, axis=-1).min() < EXACT
+
+
+def test_the_event_at_the_end_of_a_performance_is_its_last_frame(find, own_hand):
+    wanted = own_hand[-1] + [0.02, 0.03, 0.02]
+    for fps in (24.0, 30.0):
+        answer = performed(find, reach(wanted, "reach", at="event"), fps=fps)
+        assert np.linalg.norm(path(answer)[-1] - wanted) < EXACT
+        assert answer.trust.duration == pytest.approx((len(path(answer)) - 1) / fps, abs=1e-6)
+        # The event is told in the time of the motion, whose nearest frame it has.
+        assert round(fps * answer.trust.segments[0].event) == len(path(answer)) - 1
+    # Without an event there are frames at equal times until the end at most.
+    plain = performed(find, PLAIN, fps=24.0)
+    assert plain.trust.stretch is None and plain.trust.duration > (len(path(plain)) - 1) / 24.0
 
 
 def test_a_hold_that_would_cut_off_a_target_is_refused(find, own_hand):

@@ -9,6 +9,7 @@ import pytest
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.question.motion_question import replace as changed
 from posefield.registry import model_registry
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -212,7 +213,8 @@ def test_a_gap_of_what_was_sampled_is_told_by_a_flag_and_as_it_was_asked_to(mode
 def test_sigma_of_each_joint_is_its_share_of_sigma(model):
     trust = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0])).trust
     assert trust.joint_sigma == () and "joint_sigma" not in trust.facts()
-    found = clips.synthesize_clip(model, ClipQuestion(controls=POINT, joint_sigma=True)).trust
+    asked = ClipQuestion(controls=POINT, joint_sigma=True, fps=20.0 / trust.duration)
+    found = clips.synthesize_clip(model, asked).trust
     card = model.session.card
     assert len(found.joint_sigma) == len(card.skeleton) == len(card.joint_sigma)
     shares = np.array(found.joint_sigma) / trust.sigma
@@ -227,12 +229,15 @@ def test_sigma_of_each_joint_is_its_share_of_sigma(model):
 
 @pytest.mark.parametrize("rate", [24.0, 30.0, 29.97, 120.0, 1.0])
 def test_frame_i_is_the_pose_at_i_over_the_rate(model, duration, rate):
+    # The last frame is the end, so that none is moved.
+    rate = (round(duration * rate) + 1) / duration
     answer = clips.synthesize_clip(
         model, ClipQuestion(controls=POINT, fps=rate, extrapolate="warn")
     )
     frames = len(answer.clip)
     assert answer.clip.rate == rate
-    assert (frames - 1) / rate <= duration + 1e-6 < frames / rate + 2e-6
+    assert (frames - 1) / rate == pytest.approx(duration) == answer.trust.duration
+    assert answer.trust.stretch is None
     for frame in {0, frames // 2, frames - 1}:
         pose = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[frame / rate]))
         assert np.abs(answer.clip.rotations[frame] - pose.rotations[0]).max() < FLOAT32
@@ -300,7 +305,8 @@ def test_an_end_that_is_the_clips_own_is_known_to_be_one(model, rng, level):
             model, PoseQuestion(controls=moved, times=[0.0], level=level)
         ).trust.duration
         clips.preview_clip(model, ClipQuestion(controls=moved, end=own, level=level))
+        asked = ClipQuestion(controls=moved, level=level)
+        own = max(own, clips.synthesize_clip(model, asked).trust.duration)
+        clips.preview_clip(model, changed(asked, end=own))
         with pytest.raises(InvalidField, match="end: "):
-            clips.preview_clip(
-                model, ClipQuestion(controls=moved, end=own * (1.0 + 2.0**-22), level=level)
-            )
+            clips.preview_clip(model, changed(asked, end=own * (1.0 + 2.0**-22)))

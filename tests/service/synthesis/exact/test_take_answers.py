@@ -98,17 +98,17 @@ def test_a_take_is_a_smooth_function_of_the_controls(model):
 
 
 def test_a_pose_of_a_take_is_the_frame_of_its_clip(model):
+    asked = {"controls": middle(model), "take": SEED, "detail": True}
+    end = poses.synthesize_poses(model, PoseQuestion(**asked, times=[0.0])).trust.duration
+    # The last frame is the end, so that none is moved.
     answer = clips.synthesize_clip(
-        model,
-        ClipQuestion(controls=middle(model), fps=20.0, take=SEED, detail=True, feet="as_predicted"),
+        model, ClipQuestion(**asked, fps=20.0 / end, feet="as_predicted")
     )
-    pose = poses.synthesize_poses(
-        model, PoseQuestion(controls=middle(model), times=[0.2], take=SEED, detail=True)
-    )
+    pose = poses.synthesize_poses(model, PoseQuestion(**asked, times=[0.2 * end]))
     # Products of matrices of other sizes round differently.
     assert np.allclose(pose.rotations[0], answer.clip.rotations[4], rtol=0.0, atol=1e-12)
     assert np.allclose(pose.root_position[0], answer.clip.root_path[4], rtol=0.0, atol=1e-12)
-    plain = poses.synthesize_poses(model, PoseQuestion(controls=middle(model), times=[0.2]))
+    plain = poses.synthesize_poses(model, PoseQuestion(controls=middle(model), times=[0.2 * end]))
     assert not np.allclose(plain.rotations[0], answer.clip.rotations[4], atol=1e-4)
 
 
