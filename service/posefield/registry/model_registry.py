@@ -57,7 +57,7 @@ class ModelRegistry:
         name = key.partition("@")[0]
         versions = self.versions(name)
         for model in versions:
-            if key in (model.name, model.identity):
+            if key in (name, model.identity):
                 return model
         identities = ", ".join(model.identity for model in versions or self.models.values())
         hint = "" if versions else did_you_mean(name, self.models)
