@@ -111,6 +111,13 @@ def calibration() -> Rows:
     unreachable = [_percent(own.get("out_of_reach")) for own in exact]
     yield ["captured targets reported as out of reach", *unreachable, "at most 5 %"]
     yield ["acceleration over that of the captures", *_numbers(ours, "acceleration_ratio"), ""]
+    if any(peaks := [_peak(own) for own in ours]):
+        yield ["peak acceleration of a frame, mean (worst)", *peaks, "1.3, 1.1"]
+        biased = [own["methods"].get("posefield_uncorrected", {}) for own in found.values()]
+        yield ["the same without the correction of time functions", *map(_peak, biased), ""]
+        first, last = (_numbers(ours, f"{end}_frames_ratio") for end in ("first", "last"))
+        yield ["acceleration of the first three frames", *first, "1.4, 1.1"]
+        yield ["acceleration of the last three frames", *last, ""]
     yield ["speed of feet on the ground, the same", *_numbers(ours, "skate_ratio"), ""]
     named = [protocols(f)["first"].get("performers", {}).get("named_nearer") for f in FAMILIES]
     yield ["nearer by the performer's name", *map(_percent, named), ""]
@@ -118,6 +125,12 @@ def calibration() -> Rows:
 
 def _numbers(found: list[Found], key: str) -> list[str]:
     return [_number(own.get(key)) for own in found]
+
+
+def _peak(own: Found) -> str:
+    if own.get("peak_ratio") is None:
+        return ""
+    return f"{own['peak_ratio']:.2f} ({own['worst_peak_ratio']:.1f})"
 
 
 def _number(value: float | None) -> str:

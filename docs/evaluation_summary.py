@@ -17,7 +17,8 @@ from rows import compact
 TARGET = Path(__file__).parent / "results/evaluation"
 PROTOCOL = ("protocol", "clips", "sigma_ratio", "support", "feet", "takes", "performers")
 METHOD = ("relative_cm", "global_cm", "effector_cm")
-MOVEMENT = ("duration_error", "acceleration_ratio", "skate_ratio", "exact")
+ENDS = ("peak_ratio", "worst_peak_ratio", "first_frames_ratio", "last_frames_ratio")
+MOVEMENT = ("duration_error", "acceleration_ratio", *ENDS, "skate_ratio", "exact")
 POOLED = ("relative", "global", "effector")
 PEER = ("posefield", "error", "standard_error")
 

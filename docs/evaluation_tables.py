@@ -187,11 +187,26 @@ def feet() -> Rows:
     """Yield the feet of clips held out, as predicted and standing, and what standing costs."""
     found = [protocols(family)[CLIPS]["feet"] for family in feet_families()]
     for name, text, goal in FEET_ROWS:
-        yield [name, *(text(own) for own in found), goal]
+        if any(cells := [text(own) for own in found]):
+            yield [name, *cells, goal]
 
 
 def _change(key: str) -> Callable[[Found], str]:
-    return lambda own: f"{own[key]['predicted']:.2f} → {own[key]['standing']:.2f}"
+    """Return the text of a ratio, as predicted and standing; empty where it was not measured."""
+    return lambda own: (
+        f"{own[key]['predicted']:.2f} → {own[key]['standing']:.2f}" if key in own else ""
+    )
+
+
+def _worst_peak(own: Found) -> str:
+    """Return the mean and worst ratio of peaks, as predicted and standing; empty if unmeasured."""
+    if "peak" not in own:
+        return ""
+    peaks = (
+        f"{own['peak'][name]:.2f} ({own['worst_peak'][name]:.1f})"
+        for name in ("predicted", "standing")
+    )
+    return " → ".join(peaks)
 
 
 def _locked(key: str) -> Callable[[Found], str]:
@@ -214,6 +229,9 @@ FEET_ROWS: tuple[tuple[str, Callable[[Found], str], str], ...] = (
         "+0.15, +0.05",
     ),
     ("acceleration over captured", _change("acceleration"), "× 1.15, × 1.05"),
+    ("peak acceleration of a frame over captured, mean (worst)", _worst_peak, "1.3, 1.1"),
+    ("acceleration of the first three frames over captured", _change("first_frames"), "1.4, 1.1"),
+    ("acceleration of the last three frames over captured", _change("last_frames"), ""),
     ("99th percentile of the knees' acceleration over captured", _change("knee_peak"), "3, 1.5"),
     (
         "pelvis lowered, worst clip, cm",

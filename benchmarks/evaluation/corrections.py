@@ -204,8 +204,8 @@ def _correct_far(
 
 
 def _acceleration_ratio(after: ComparedMotion, before: ComparedMotion) -> float:
-    before_it = motion_errors.acceleration(before.points)
-    return float(motion_errors.acceleration(after.points) / before_it)
+    one, other = (motion_errors.frame_accelerations(own.points).mean() for own in (after, before))
+    return float(one / other)
 
 
 def _is_reachable(corrected: ConstrainedMotion) -> bool:

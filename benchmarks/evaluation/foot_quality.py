@@ -8,6 +8,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import contact_detection
 from posefield.motion.clip import Clip
 from posefield_train.align import time_alignment
+from posefield_train.evaluate.motion_errors import END_FRAMES
 
 # Highest frame rate at which motions are measured, frames a second.
 HIGHEST_RATE = 60.0
@@ -22,6 +23,7 @@ class FootQuality:
 
     skate: mean speed of planted feet (`mean_skate_speed`), m/s. weighted_skate: mean speed of low
     feet, weighted by height (MANN), m/s. acceleration: mean over joints relative to the root, m/s².
+    peak, first, last: the largest of a frame, that of the first and of the last three, m/s².
     knee_peak, knee_mean: 99th percentile and mean of the knees' acceleration relative to the root,
     m/s². lowest: height of the lowest foot in any frame, m.
     """
@@ -29,6 +31,9 @@ class FootQuality:
     skate: float
     weighted_skate: float
     acceleration: float
+    peak: float
+    first: float
+    last: float
     knee_peak: float
     knee_mean: float
     lowest: float
@@ -43,11 +48,16 @@ def measure(clip: Clip, rate: float, feet: tuple[int, ...], knees: tuple[int, ..
     relative = positions - positions[:, :1]
     bends = np.linalg.norm(np.diff(relative, n=2, axis=0), axis=-1) * rate**2
     down = positions[:, list(feet)]
+    of_frames = bends[:, 1:].mean(axis=1)
+    first, last = of_frames[:END_FRAMES], of_frames[-END_FRAMES:]
     of_knees = bends[:, list(knees)]
     return FootQuality(
         float(contact_detection.mean_skate_speed(down, rate)),
         weighted_skate_speed(down, rate),
-        float(bends[:, 1:].mean()),
+        float(of_frames.mean()),
+        float(of_frames.max()),
+        float(first.mean()),
+        float(last.mean()),
         float(np.percentile(of_knees, 99.0)),
         float(of_knees.mean()),
         float((down @ UP).min()),

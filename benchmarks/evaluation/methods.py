@@ -24,6 +24,7 @@ from posefield_train.tensor import truncation_error
 OPEN = "_no_performer"
 """End of the name of a method that is not told the performer, where others are."""
 EXACT, NAIVE, SAME_PERFORMER = "posefield_exact", "naive", "nearest_same_performer"
+UNCORRECTED = OURS + "_uncorrected"
 NO_PERFORMER, ASKED_OPEN = OURS + OPEN, "posefield_open"
 """Posefield trained without performers, and trained with them but asked without one."""
 ADAPTATION_COUNTS = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
@@ -34,6 +35,8 @@ DEFINITIONS = {
     **predictions.DEFINITIONS,
     EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
     "captured position at the event",
+    UNCORRECTED: "the same without the correction that makes predicted time functions the "
+    "identity in the mean; a negative control of the acceleration at the ends",
     NO_PERFORMER: "a model of the same recipe, trained without performers",
     ASKED_OPEN: "the model trained with performers, asked with the performer left open: it "
     "then answers for a person whom it has not seen",

@@ -14,7 +14,7 @@ from evaluation import (
     takes,
 )
 from evaluation.corrections import Correction, EventTarget
-from evaluation.methods import EXACT, NO_PERFORMER, OPEN
+from evaluation.methods import EXACT, NO_PERFORMER, OPEN, UNCORRECTED
 from evaluation.standing_feet import FeetAnswer
 from evaluation.takes import TakeResults
 from posefield.common.units import Floats
@@ -135,7 +135,12 @@ def _predict(
 ) -> tuple[Predictions, Sequence[Correction]]:
     """Return the predictions of all methods, posefield's first, and of the corrections."""
     predicted = methods.predict(recipe, trained, queries)
-    ours: dict[str, Any] = {OURS: predicted.motions[OURS]}
+    timing = replace(trained.model.timing, correction=None)
+    uncorrected = replace(trained, model=replace(trained.model, timing=timing))
+    ours: dict[str, Any] = {
+        OURS: predicted.motions[OURS],
+        UNCORRECTED: predictions.predict_posefield(uncorrected, queries),
+    }
     corrected: Sequence[Correction] = ()
     if targets:
         ours[EXACT], corrected = corrections.correct_motions(

@@ -27,6 +27,8 @@ RATIOS: dict[str, Callable[[FootQuality], float]] = {
     "skate": lambda quality: quality.skate,
     "weighted_skate": lambda quality: quality.weighted_skate,
     "acceleration": lambda quality: quality.acceleration,
+    "first_frames": lambda quality: quality.first,
+    "last_frames": lambda quality: quality.last,
     "knee_peak": lambda quality: quality.knee_peak,
     "knee_mean": lambda quality: quality.knee_mean,
 }
@@ -165,6 +167,10 @@ def facts(answers: Sequence[FeetAnswer]) -> dict[str, Any]:
             name: round_number(np.mean([value(getattr(one, name)) for one in answers]) / captured)
             for name in NAMES
         }
+    for name in NAMES:
+        peaks = [getattr(one, name).peak / max(one.captured.peak, 1e-9) for one in answers]
+        figures.setdefault("peak", {})[name] = round_number(np.mean(peaks))
+        figures.setdefault("worst_peak", {})[name] = round_number(max(peaks))
     return figures
 
 

@@ -13,7 +13,8 @@ TAKES = (0, 0, 0, 1, 1, 2, 2, 3)
 
 def error(relative, duration=0.0, effector=0.01):
     own = DistanceStatistics(relative, relative, relative, relative, relative)
-    return MotionErrors(*[own] * 5, effector, 1.0, 0.0, 0.0, duration, np.full(2, relative**2))
+    ends, squares = np.ones(2), np.full(2, relative**2)
+    return MotionErrors(*[own] * 5, effector, 1.0, 1.0, ends, ends, 0.0, 0.0, duration, squares)
 
 
 def result(rows, takes=TAKES):

@@ -33,7 +33,8 @@ def test_a_motion_lies_nowhere_from_itself(captured):
     for name in ("relative", "absolute", "plain_relative", "plain_absolute", "shell"):
         assert getattr(found, name).largest < ROUNDING
     assert found.duration == found.effector == 0.0
-    assert found.acceleration == pytest.approx(1.0)
+    assert found.acceleration == found.peak == pytest.approx(1.0)
+    assert found.ends == pytest.approx(found.ends_captured)
     assert found.skate == found.skate_captured > 0.0
 
 
@@ -91,6 +92,16 @@ def test_a_foot_that_slides_at_a_known_speed_does():
 def test_jerks_are_counted(captured, rng):
     shaken = made(captured.points + 0.01 * rng.standard_normal((FRAMES, 4, 1, 3)), 1.5)
     assert motion_errors.compare_motions(shaken, captured, FEET).acceleration > 3.0
+
+
+def test_a_snap_is_seen_at_its_end_and_a_hurry_in_seconds_alone(captured):
+    points = captured.points.copy()
+    points[:2, 2:] += 0.3
+    found = motion_errors.compare_motions(made(points, 1.5), captured, FEET)
+    assert found.peak > 5.0 and found.ends[0] > 3.0 * found.ends_captured[0]
+    assert found.ends[1] == pytest.approx(found.ends_captured[1])
+    hurried = motion_errors.compare_motions(made(captured.points, 0.75), captured, FEET)
+    assert hurried.acceleration == pytest.approx(1.0) and hurried.peak == pytest.approx(4.0)
 
 
 def test_without_an_event_there_is_no_effector(captured):

@@ -16,6 +16,8 @@ from posefield_train.tensor.motion_tensor import FRAMES, UNIFORM_SHARES
 
 # Distance of three points at right angles from a joint, m, as in the Animation Compression Library.
 SHELL_RADIUS = 0.03
+# Frames at either end whose acceleration is told apart: a motion that snaps does so there.
+END_FRAMES = 3
 
 
 @dataclass(frozen=True)
@@ -125,11 +127,12 @@ class MotionErrors:
     relative, absolute: after time warping, without and with the root's position; plain_…: at equal
     shares of the duration. shell: largest of three points around each joint, after time warping,
     without the root's position. effector: distance at the event, m; NaN without an event.
-    acceleration: mean magnitude, synthesized over captured, at equal durations. skate,
-    skate_captured: mean speed of feet on the ground, m/s. duration: logarithm of synthesized over
-    captured. joints: mean squared absolute distance (J,) of each joint, m². curves: mean squared
-    error (C,) of each curve after time warping, in the square of its own unit. counted: the same as
-    the distances that curves count as, m².
+    acceleration: mean magnitude, synthesized over captured, at equal durations. peak: largest of a
+    frame, the same, each in its own duration. ends, ends_captured: acceleration (2,) of the first
+    and of the last three frames, m/s². skate, skate_captured: mean speed of feet on the ground,
+    m/s. duration: logarithm of synthesized over captured. joints: mean squared absolute distance
+    (J,) of each joint, m². curves: mean squared error (C,) of each curve after time warping, in the
+    square of its own unit. counted: the same as the distances that curves count as, m².
     """
 
     relative: DistanceStatistics
@@ -139,6 +142,9 @@ class MotionErrors:
     shell: DistanceStatistics
     effector: float
     acceleration: float
+    peak: float
+    ends: Floats
+    ends_captured: Floats
     skate: float
     skate_captured: float
     duration: float
@@ -185,7 +191,13 @@ def compare_all(
         _distances(shell[..., 1:].max(axis=-1)),
         strict=True,
     )
-    jerks = _ratios(acceleration(points), acceleration(true))
+    sizes, true_sizes = frame_accelerations(points), frame_accelerations(true)
+    jerks = _ratios(sizes.mean(axis=-1), true_sizes.mean())
+    durations = np.array([motion.duration for motion in synthesized])
+    sizes *= ((FRAMES - 1) / durations[:, None]) ** 2
+    true_sizes *= ((FRAMES - 1) / captured.duration) ** 2
+    peaks = _ratios(sizes.max(axis=-1), true_sizes.max())
+    movements = zip(jerks.tolist(), peaks.tolist(), map(_ends, sizes), strict=True)
     slid = skate(captured, feet)
     channels = [_curve_errors(*pair, captured) for pair in zip(synthesized, phases, strict=True)]
     squares = np.mean(np.square(distances), axis=1)
@@ -193,15 +205,16 @@ def compare_all(
         MotionErrors(
             *statistics,
             _effector(motion.event, captured.event),
-            float(jerk),
+            *movement,
+            _ends(true_sizes),
             skate(motion, feet),
             slid,
             float(np.log(motion.duration / captured.duration)),
             joints,
             *errors,
         )
-        for motion, statistics, jerk, joints, errors in zip(
-            synthesized, spreads, jerks, squares, channels, strict=True
+        for motion, statistics, movement, joints, errors in zip(
+            synthesized, spreads, movements, squares, channels, strict=True
         )
     ]
 
@@ -288,15 +301,20 @@ def _distances(distances: Floats) -> list[DistanceStatistics]:
     return [DistanceStatistics(*map(float, row)) for row in rows]
 
 
-def acceleration(points: Floats) -> Floats:
-    """Return mean sizes (...) of second differences of points (..., FRAMES, J, 4, 3), m.
+def frame_accelerations(points: Floats) -> Floats:
+    """Return mean sizes (..., FRAMES - 2) of second differences of points (..., FRAMES, J, 4, 3).
 
-    The points are taken relative to the root. Zero for a single joint.
+    In metres; the points are taken relative to the root. Zero for a single joint.
     """
     joints = _root_relative(points)[..., 1:, 0, :]
     if not joints.shape[-2]:
-        return np.zeros(points.shape[:-4])
-    return np.linalg.norm(np.diff(joints, n=2, axis=-3), axis=-1).mean(axis=(-2, -1))
+        return np.zeros((*points.shape[:-4], points.shape[-4] - 2))
+    return np.linalg.norm(np.diff(joints, n=2, axis=-3), axis=-1).mean(axis=-1)
+
+
+def _ends(sizes: Floats) -> Floats:
+    """Return the means (2,) of the first and of the last values (FRAMES - 2,)."""
+    return np.array([sizes[:END_FRAMES].mean(), sizes[-END_FRAMES:].mean()])
 
 
 def skate(motion: ComparedMotion, feet: tuple[int, ...]) -> float:
@@ -328,6 +346,9 @@ def mean(errors: Sequence[MotionErrors]) -> MotionErrors:
         shell=pooled("shell"),
         effector=average("effector"),
         acceleration=average("acceleration"),
+        peak=average("peak"),
+        ends=np.mean([error.ends for error in errors], axis=0),
+        ends_captured=np.mean([error.ends_captured for error in errors], axis=0),
         skate=average("skate"),
         skate_captured=average("skate_captured"),
         duration=float(np.sqrt(np.mean(np.square([error.duration for error in errors])))),

@@ -28,6 +28,8 @@ COLUMNS = (
     ("glob. unwarped", "global distance at equal shares of the duration, without time warping"),
     ("duration", "RMS of the logarithm of synthesised over captured duration"),
     ("accel.", "mean acceleration, synthesised over captured"),
+    ("peak accel.", "largest acceleration of a frame, synthesised over captured: mean and worst"),
+    ("ends", "acceleration of the first and of the last three frames, synthesised over captured"),
     ("skate", "speed of feet on the ground, synthesised over captured"),
 )
 """Titles of the table's columns, and their meanings."""
@@ -54,7 +56,8 @@ ALONE = (
 class MethodSummary:
     """Errors of one method over all clips that it predicted.
 
-    clips: number of those. left_out: number of all others. mean: its errors. standard_error: of the
+    clips: number of those. left_out: number of all others. mean: its errors. worst_peak: largest
+    ratio of a clip's peak acceleration to the captured one. standard_error: of the
     mean distance of `clip_distances`, m. worse: mean difference of that distance from posefield's
     with equal information on the same clips, m. worse_error: standard error of that difference, m.
     """
@@ -63,6 +66,7 @@ class MethodSummary:
     clips: int
     left_out: int
     mean: MotionErrors
+    worst_peak: float
     standard_error: float
     worse: float
     worse_error: float
@@ -71,6 +75,12 @@ class MethodSummary:
     def curve_distance(self) -> float:
         """Return the RMS error of all curves, as the distance that they count as, m."""
         return float(np.sqrt(np.mean(self.mean.counted)))
+
+    @property
+    def ends(self) -> Floats:
+        """Return the acceleration (2,) of first and last frames over captured; NaN at rest."""
+        captured = self.mean.ends_captured
+        return np.divide(self.mean.ends, np.where(captured > 0.0, captured, np.nan))
 
     @property
     def skate(self) -> float:
@@ -120,6 +130,7 @@ def _summary(result: EvaluationResult, name: str) -> MethodSummary:
         len(clips),
         len(result.clips) - len(clips),
         motion_errors.mean(errors),
+        max(error.peak for error in errors),
         clustered_standard_error(distances, recordings),
         float((distances - ours).mean()),
         clustered_standard_error(distances - ours, recordings),
@@ -174,9 +185,11 @@ def method_facts(result: EvaluationResult, summary: MethodSummary) -> dict[str, 
         "standard_error_cm": centimetres(summary.standard_error),
         "difference_cm": centimetres(summary.worse),
         "difference_standard_error_cm": centimetres(summary.worse_error),
-        "acceleration_ratio": None
-        if np.isnan(mean.acceleration)
-        else round_number(mean.acceleration),
+        "acceleration_ratio": _rounded(mean.acceleration),
+        "peak_ratio": _rounded(mean.peak),
+        "worst_peak_ratio": _rounded(summary.worst_peak),
+        "first_frames_ratio": _rounded(summary.ends[0]),
+        "last_frames_ratio": _rounded(summary.ends[1]),
         "skate_ratio": round_number(summary.skate) if mean.skate_captured else None,
         "skate_cm_per_s": centimetres(mean.skate),
         "distances_cm": {
@@ -196,6 +209,11 @@ def method_facts(result: EvaluationResult, summary: MethodSummary) -> dict[str, 
         figures["curves_cm"] = centimetres(summary.curve_distance)
         figures["curves"] = dict(zip(result.curves, errors, strict=True))
     return figures
+
+
+def _rounded(ratio: float) -> float | None:
+    """Return a rounded ratio; None for NaN."""
+    return None if np.isnan(ratio) else round_number(ratio)
 
 
 def centimetres(metres: float) -> float | None:
@@ -251,7 +269,15 @@ def _cells(result: EvaluationResult, summary: MethodSummary) -> tuple[str, ...]:
         f"{100 * mean.plain_relative.mean:.2f}",
         f"{100 * mean.plain_absolute.mean:.2f}",
         f"{100 * mean.duration:.1f} %",
-        NOT_APPLICABLE if np.isnan(mean.acceleration) else f"{mean.acceleration:.2f}",
+        *(
+            [NOT_APPLICABLE] * 3
+            if np.isnan(mean.acceleration)
+            else [
+                f"{mean.acceleration:.2f}",
+                f"{mean.peak:.2f} ({summary.worst_peak:.1f})",
+                ", ".join(f"{ratio:.2f}" for ratio in summary.ends),
+            ]
+        ),
         f"{summary.skate:.2f}" if mean.skate_captured else "",
         *curves,
     )
