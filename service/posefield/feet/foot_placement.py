@@ -257,7 +257,8 @@ class _Placing:
             order = np.argsort(at, kind="stable")
             begin = np.searchsorted(at, first[stances] - 1e-9, "left", order)
             counts = np.searchsorted(at, last[stances] + 1e-9, "right", order) - begin
-            standing = FrameGroups(counts)
+            # A stance that ends before its foot is flat has no frames.
+            standing = FrameGroups(np.maximum(counts, 0))
             rows = groups.starts[motion] + order[begin[standing.group] + standing.frame]
             anchored[rows, ::2] = anchors[stances[standing.group], ::2]
         return anchored
