@@ -218,6 +218,7 @@ class _FittedModels:
 
     timing: of predictions. values: sample values (N, m) by name. left_out_errors: mean squared
     leave-one-out distance (N,), m². warped_errors: the same of whole motions after time warping.
+    acceleration: that of left-out predictions over that of captured clips.
     """
 
     proportions: Proportions
@@ -227,6 +228,7 @@ class _FittedModels:
     other_models: dict[str, FittedModel]
     left_out_errors: Floats
     warped_errors: Floats
+    acceleration: float
     power_law: PowerLaw | None
     event: TunedKriging | None
 
@@ -289,10 +291,21 @@ def _fit_models(
         return captured, predicted, len(tensor.curves)
 
     compared = map(motions_of, canonical.clip_blocks(len(examples)))
-    warped = np.concatenate(ordered_results(jobs, warped_errors.mean_squared_errors, compared))
+    results = np.concatenate(ordered_results(jobs, warped_errors.compare, compared))
+    warped, predicted, captured = results.T
+    acceleration = float(predicted.sum() / captured.sum()) if captured.any() else 1.0
     event = _fit_event(recipe, samples, reference, full, pose, effector)
     return _FittedModels(
-        proportions, timing, values, pose, fitted, left_out_errors, warped, power_law, event
+        proportions,
+        timing,
+        values,
+        pose,
+        fitted,
+        left_out_errors,
+        warped,
+        acceleration,
+        power_law,
+        event,
     )
 
 
@@ -416,6 +429,7 @@ def _fit_and_truncate(
         fits.values,
         fits.left_out_errors,
         fits.warped_errors,
+        fits.acceleration,
         {"pose": 1.0 - fits.pose.unexplained, **explained},
         clips.findings,
         residuals,

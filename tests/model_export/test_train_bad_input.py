@@ -9,6 +9,7 @@ from minimal import recipe_with, small_clip, write_clips
 
 import posefield_train
 from posefield.common.errors import RecipeError, TrainingError
+from posefield.motion import quat
 from posefield_train.graph import onnx_export, trained_card
 from posefield_train.graph.trained_model import Outlier
 from posefield_train.source import ingest, recipe
@@ -147,6 +148,26 @@ def test_equal_controls_with_quite_different_motion_are_noted(model):
     pairs = [small_clip(0.5 * (i // 2) + 0.05 * (i % 2), 21 + i % 3) for i in range(8)]
     _, exported = model(pairs, speeds(0, 0, 1, 1, 2, 2, 3, 3))
     assert [note for note in notes(exported) if "share their controls" in note] == []
+
+
+def shake(count, phase):
+    """A body that raises an arm, shakes it some times and lowers it."""
+    clip, t = small_clip(0.0, 121), np.linspace(0.0, 1.0, 121)
+    angles = (0.8 + 0.3 * np.sin(2.0 * np.pi * count * t + phase)) * np.sin(np.pi * t) ** 2
+    rotations = np.tile([1.0, 0.0, 0.0, 0.0], (121, 5, 1))
+    rotations[:, 3] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), angles)
+    return replace(clip, rotations=rotations)
+
+
+def test_gestures_of_unlike_number_and_phase_that_average_out_are_noted(model):
+    rng = np.random.default_rng(7)
+    counts, phases = rng.permutation(np.linspace(8.0, 20.0, 12)), rng.uniform(0.0, 6.3, 12)
+    _, exported = model(list(map(shake, counts, phases)), motion={"frames": 60})
+    (said,) = [note for note in notes(exported) if "average out" in note]
+    assert 30 < int(re.match(r"predictions of left-out clips have (\d+) % ", said)[1]) < 60
+    # Negative control: all shake alike.
+    _, exported = model([shake(14.0, 0.05 * i) for i in range(12)], motion={"frames": 60})
+    assert [note for note in notes(exported) if "average out" in note] == []
 
 
 def test_what_is_the_same_in_many_clips_is_one_note_and_the_worst_come_first(model):

@@ -46,6 +46,9 @@ SAME_MOTION = 0.7
 LEAST_DIFFERENCE = 0.01
 """Smallest differences between clips of equal controls that are noted, m."""
 
+WASHED_OUT = 0.6
+"""Share of the captured acceleration that left-out predictions have, below which it is noted."""
+
 LARGEST_DISAGREEMENT = 0.02
 """Difference of the errors of two tunings of a large family from which it is noted."""
 
@@ -63,6 +66,7 @@ def training_notes(trained: TrainedModel) -> list[str]:
     """Return all notes of a training, the most consequential first."""
     return [
         *trained.outlier_notes(),
+        *movement_notes(trained),
         *repeat_notes(trained),
         *disagreement_notes(trained),
         *sample_points.data_notes(trained.recipe, trained.examples),
@@ -70,6 +74,20 @@ def training_notes(trained: TrainedModel) -> list[str]:
         *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
         *phase_alignment.shift_notes(trained.examples),
         *trained.contact_notes,
+    ]
+
+
+def movement_notes(trained: TrainedModel) -> list[str]:
+    """Return a note if movements average out in left-out predictions; none for a cycle.
+
+    A cycle has detail in place of what is lost.
+    """
+    if "travel" in trained.residuals or trained.acceleration >= WASHED_OUT:
+        return []
+    return [
+        f"predictions of left-out clips have {100 * trained.acceleration:.0f} % of the captured "
+        "acceleration: movements whose phase or number differs from clip to clip average out; "
+        "landmarks bring phases together, and posefield discover --like cuts single repetitions"
     ]
 
 

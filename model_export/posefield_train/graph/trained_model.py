@@ -46,7 +46,8 @@ class TrainedModel:
     each quantity, the pose's full motions in the coordinates of the sample mode. left_out_errors:
     mean squared joint distance (N,), m², of each clip from its leave-one-out prediction on
     canonical time. warped_errors: the same of whole motions after time warping, by which sigma is
-    scaled. explained: share of the variation between clips that leave-one-out predicts from the
+    scaled. acceleration: that of left-out predictions over that of captured clips, at equal
+    durations. explained: share of the variation between clips that leave-one-out predicts from the
     controls, by quantity; one that they do not explain is constant. residuals:
     leave-one-out residuals (N, m) of each quantity but the pose. truncation_errors: of the reduced
     tensor. joints: leave-one-out error (J,) of each joint as a share of the root mean square of
@@ -66,6 +67,7 @@ class TrainedModel:
     values: dict[str, Floats]
     left_out_errors: Floats
     warped_errors: Floats
+    acceleration: float
     explained: dict[str, float]
     findings: list[Finding]
     residuals: dict[str, Floats]

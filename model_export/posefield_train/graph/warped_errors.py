@@ -19,18 +19,27 @@ from posefield_train.tensor.decoder import Proportions
 from posefield_train.tensor.motion_tensor import UNIFORM_SHARES, MotionTensor
 
 
-def mean_squared_errors(captured: Floats, predicted: Floats, curve_count: int = 0) -> Floats:
-    """Return the mean squared joint distances (N,), m², after time warping.
+def compare(captured: Floats, predicted: Floats, curve_count: int = 0) -> Floats:
+    """Return mean squared joint distances after time warping, m², and accelerations (N, 3).
 
-    captured, predicted: joint positions (N, FRAMES, J, 3), m; the last `curve_count` points are
-    those of curves. Motions are warped by their positions relative to the root, and compared with
-    it.
+    The accelerations are those of predicted and of captured joints relative to the root, in metres
+    for a step of time each. captured, predicted: joint positions (N, FRAMES, J, 3), m; the last
+    `curve_count` points are those of curves. Motions are warped by their positions relative to the
+    root, and compared with it.
     """
     phases = dtw.warp(_features(captured, curve_count), _features(predicted, curve_count))
     pairs = zip(predicted.reshape(*predicted.shape[:2], -1), phases, strict=True)
     warped = np.stack([time_alignment.interpolate(*pair) for pair in pairs])
     squares = np.sum(np.square(warped.reshape(captured.shape) - captured), axis=-1)
-    return np.asarray(np.mean(squares, axis=(1, 2)))
+    accelerations = (_accelerations(one, curve_count) for one in (predicted, captured))
+    return np.stack([np.mean(squares, axis=(1, 2)), *accelerations], axis=1)
+
+
+def _accelerations(positions: Floats, curve_count: int) -> Floats:
+    joints = positions[:, :, 1 : positions.shape[2] - curve_count] - positions[:, :, :1]
+    if not joints.shape[2]:
+        return np.zeros(len(positions))
+    return np.linalg.norm(np.diff(joints, n=2, axis=1), axis=-1).mean(axis=(1, 2))
 
 
 def _features(positions: Floats, curve_count: int) -> Floats:
