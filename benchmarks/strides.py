@@ -115,7 +115,9 @@ MOTIONS: dict[str, Callable[[Synthesizer, float, FeetMode], Clip]] = {
 def balls_down() -> Iterator[None]:
     """Plan stances as before: balls on the floor at heel strike, and no lifted heels."""
     flat = mock.patch.object(
-        heel_roll, "flat_pitches", lambda feet, contacts: np.full(len(feet.height), np.pi)
+        heel_roll,
+        "flat_pitches",
+        lambda vectors, contacts, rows: np.full(len(rows.counts), np.pi / 2),
     )
     still = mock.patch.object(heel_roll, "trimmed", lambda stances, feet: stances)
     with (

@@ -5,6 +5,7 @@ of a motion depends on the others: sums are over its own frames, and products ar
 element.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -17,7 +18,7 @@ from posefield.common.units import UP, Booleans, Floats, Frames
 from posefield.feet import ball_path, footsteps, heel_roll, limbs, stance_rows, two_bone
 from posefield.feet.footsteps import FeetPlan, Footsteps, PlanRequest
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import UNEVEN, FootRows, Interval, Runs
+from posefield.feet.stance_rows import SUNK, UNEVEN, FootRows, Interval, Runs
 from posefield.locomotion import floor_plane
 from posefield.motion import quat
 from posefield.motion.contact_detection import FootContact
@@ -101,16 +102,33 @@ class _Bodies:
         feet = replace(
             feet,
             heights=feet.heights - lowered[feet.rows.groups.group],
-            height=feet.height + np.clip(above - lowered, -UNEVEN, UNEVEN),
-            flat_pitch=heel_roll.flat_pitches(feet, down),
+            height=feet.height + np.clip(above - lowered, -SUNK, UNEVEN),
+            flat_pitch=heel_roll.flat_pitches(feet.arms, down, feet.rows),
         )
+        toe_heights = feet.height + self._toe_drops(down, feet.rows)
         stances = heel_roll.trimmed(stance_rows.discipline(down, feet), feet)
         stances = self._led_stances(stances, feet)
         followed = self._follow(grounded)
         reachable, paths, lowered = self._reachable_steps(feet, grounded, followed, stances)
         before = stances.by_row(len(feet.height))
         after = self._footsteps(feet, paths, reachable)
-        return list(self._split(paths, before, after, grounded, followed, lowered))
+        return list(self._split(paths, before, after, toe_heights, grounded, followed, lowered))
+
+    def _toe_drops(self, contacts: Runs, rows: FrameRows) -> Annotated[Floats, "rows"]:
+        """Return how far the ends of toes are above the balls of flat feet (R,), m.
+
+        Minus infinity for legs without toes.
+        """
+        drops = np.full((len(self.legs), len(self.requests)), -np.inf)
+        toes = [np.zeros((0, 3))]
+        for leg in self.legs:
+            toe = np.broadcast_to(leg.toe or (0.0, 0.0, 0.0), self.roots.shape)
+            toes.append(quat.rotate(self.poses.orientation(leg.tip), toe))
+        pitches = heel_roll.flat_pitches(np.concatenate(toes), contacts, rows)
+        for drop, leg, pitch in zip(drops, self.legs, pitches.reshape(drops.shape), strict=True):
+            if leg.toe is not None:
+                drop[:] = math.hypot(*leg.toe) * np.sin(pitch)
+        return drops.ravel()
 
     def _footsteps(self, feet: FootRows, paths: FootPaths, stances: Runs) -> list[Footsteps]:
         """Return the footsteps of each row."""
@@ -127,6 +145,7 @@ class _Bodies:
         paths: FootPaths,
         before: Sequence[tuple[Interval, ...]],
         after: Sequence[Footsteps],
+        toe_heights: Annotated[Floats, "rows"],
         grounded: PerMotion,
         followed: Frames,
         lowered: Frames,
@@ -154,6 +173,7 @@ class _Bodies:
                 float(grounded[motion]),
                 poses,
                 request.leads,
+                toe_heights[motion :: len(groups)],
                 request.floor,
                 _unreached(request.floor, before[motion :: len(groups)], steps),
             )
@@ -220,7 +240,7 @@ class _Bodies:
         if not len(above):
             return np.zeros(len(self.requests))
         mean, (up, down), groups = above.mean(axis=0), self.room, self.rows.groups
-        lowered = np.sign(mean) * np.maximum(np.abs(mean) - UNEVEN, 0.0)
+        lowered = mean - np.clip(mean, -SUNK, UNEVEN)
         lowered = np.clip(lowered, -groups.smallest(up), groups.smallest(down))
         return np.where(self.fixed, 0.0, lowered)
 

@@ -4,7 +4,7 @@ Motions with the same limbs are placed at once; each has the same bytes as if it
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -137,12 +137,14 @@ class _LimbEnd:
 
     end: from the upper joint to it (N, 3), m. foot: turns of the foot (N, 4) against the poses;
     None for none. arm: from the end to the joint that stands (N, 3), m, of a turned foot.
+    lowest_toe: least height of the end of the toes above that joint (N,), m; None without toes.
     """
 
     limb: Limb
     end: Points
     foot: Turns | None
     arm: Points
+    lowest_toe: Annotated[Floats, "frames"] | None = None
 
 
 @dataclass(frozen=True)
@@ -196,7 +198,13 @@ class _Placing:
         for foot, leg in enumerate(body.legs):
             change = np.concatenate([plan.changes[foot] for plan in self.plans])
             path = self.poses.position(leg.tip) + self._interpolated_change(change)
-            yield self._leg_end(leg, self._anchored(foot, path))
+            ball = self._anchored(foot, path)
+            leg_end = self._leg_end(leg, ball)
+            if leg.toe is not None:
+                toes = np.array([plan.toe_heights[foot] for plan in self.plans])[self.groups.group]
+                lowest = toes + self.floors.heights(ball) - ball @ UP
+                leg_end = replace(leg_end, lowest_toe=lowest)
+            yield leg_end
         for index, limb in enumerate(body.kept):
             # Where it is not led, the end moves with the root.
             share = np.concatenate([plan.led.limbs[index] for plan in self.plans])
@@ -232,6 +240,12 @@ class _Placing:
             orientations = self.poses.orientation(limb.lower)
             local = quat.mul(quat.conj(orientations), quat.mul(foot, orientations))
             turns.lower[:] = quat.mul(turns.lower, local)
+            if limb.toe is not None and limb_end.lowest_toe is not None:
+                tip = quat.mul(foot, self.poses.orientation(limb.tip))
+                toe = quat.rotate(tip, np.broadcast_to(limb.toe, limb_end.end.shape))
+                bent = quat.mul(heel_roll.toe_bends(toe, limb_end.lowest_toe), tip)
+                ankle = quat.mul(foot, orientations)
+                turns = replace(turns, tip=quat.mul(quat.conj(ankle), bent))
         return turns
 
     def foot_path(self, leg_end: _LimbEnd) -> tuple[Points, Points]:

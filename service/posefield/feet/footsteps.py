@@ -5,8 +5,9 @@ the frames that a question asks for. `body_plans` makes it, and `foot_placement`
 frames.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Annotated, TypeVar
 
 import numpy as np
@@ -31,6 +32,8 @@ from posefield.question.floor import LEVEL_FLOOR, Floor
 
 # A foot that is led to two places that are farther apart does not stand on both, m.
 SAME_PLACE = 1e-3
+
+NO_TIPS: Mapping[int, tuple[float, float, float]] = MappingProxyType({})
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -176,7 +179,8 @@ class FeetPlan:
     path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m. followed: the
     part of it that follows the floor (F,), m; the rest is the pelvis. grounded: how much a
     character that floats was lowered to the level on which it was captured, m. poses: predicted, of
-    the limbs. led: what keeps its predicted path, and when. floor: on which the feet stand.
+    the limbs. led: what keeps its predicted path, and when. toe_heights: least heights of the ends
+    of toes above the floor (K,), m; minus infinity without toes. floor: on which the feet stand.
     unreached: legs, by place, none of whose stances reaches it.
     """
 
@@ -190,6 +194,7 @@ class FeetPlan:
     grounded: float
     poses: LimbPoses
     led: Led
+    toe_heights: Annotated[Floats, "feet"]
     floor: Floor = LEVEL_FLOOR
     unreached: tuple[int, ...] = ()
 
@@ -250,11 +255,13 @@ def choose_limbs(
     feet: Sequence[int],
     exact_joints: Iterable[int],
     hinges: Sequence[Hinge] = (),
+    tips: Mapping[int, tuple[float, float, float]] = NO_TIPS,
 ) -> LimbChoice:
     """Return the legs of feet, and the limbs that keep the paths of joints with constraints.
 
     exact_joints: joints whose positions are exact. A leg with such a joint keeps its path; a joint
-    of the trunk keeps the root at its height. hinges: of the skeleton, as far as known.
+    of the trunk keeps the root at its height. hinges: of the skeleton, as far as known. tips: end
+    sites of the skeleton, of which those of feet are toes.
     """
     joints = set(exact_joints)
     legs: dict[int, Limb] = {}
@@ -275,7 +282,8 @@ def choose_limbs(
             kept_limbs.append(leg)
             joints -= below
         else:
-            legs[index] = leg
+            has_toes = parents[foot] == leg.lower
+            legs[index] = replace(leg, toe=tips.get(foot)) if has_toes else leg
         used |= chain
     arms, fixed = _arms(parents, bones, joints, used, hinges)
     character = Character(

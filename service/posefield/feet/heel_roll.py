@@ -2,7 +2,8 @@
 
 A foot is flat at the pitch above which it is in a quarter of its standing frames. While the toes
 are higher than that, the heel keeps its place; from then on the ball does, until the toes leave the
-floor. A leg that would be stretched lifts its heel: the foot turns about its ball.
+floor. A leg that would be stretched lifts its heel: the foot turns about its ball. Toes bend where
+their ends would be below the floor.
 """
 
 from dataclasses import dataclass
@@ -10,10 +11,11 @@ from typing import Annotated
 
 import numpy as np
 
+from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Floats
 from posefield.feet import stance_rows
 from posefield.feet.limbs import Points, Turns, Values
-from posefield.feet.stance_rows import UNEVEN, FootRows, PerRow, PerRun, Runs
+from posefield.feet.stance_rows import SUNK, UNEVEN, FootRows, PerRow, PerRun, Runs
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import contact_detection, quat
@@ -22,8 +24,6 @@ from posefield.motion import contact_detection, quat
 FLAT = 75.0
 # Distance of the heel behind the ankle, as a share of that from the ankle to the ball.
 HEEL = 0.4
-# A sole is no deeper below the floor than this, m.
-SUNK = 0.005
 # A heel is lifted by this angle at most so that a leg reaches, rad.
 MOST_LIFT = 0.35
 
@@ -41,15 +41,15 @@ class Roll:
     flats: PerRun
 
 
-def flat_pitches(feet: FootRows, contacts: Runs) -> PerRow:
-    """Return the pitch of the arm of each row's foot while it is flat (R,), rad.
+def flat_pitches(vectors: Annotated[Floats, "frames 3"], contacts: Runs, rows: FrameRows) -> PerRow:
+    """Return the pitches of vectors of feet (N, 3) while these are flat (R,), rad, toes up.
 
     Zero without contacts.
     """
     run, frames = contacts.frames()
     row = contacts.rows[run]
-    pitches = _pitches(feet.arms[feet.rows.flat(row, frames)])
-    return stance_rows.row_percentiles(pitches, row, len(feet.rows.counts), FLAT)
+    pitches = _pitches(vectors[rows.flat(row, frames)])
+    return stance_rows.row_percentiles(pitches, row, len(rows.counts), FLAT)
 
 
 def _pitches(arms: Annotated[Floats, "values 3"]) -> Annotated[Floats, "values"]:
@@ -144,3 +144,17 @@ def heel_turns(offset: Points, arm: Points, chord: Values) -> Turns:
     axis = quat.cross(offset, arm)
     axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-12)
     return quat.exp(axis * np.clip(angle, -MOST_LIFT, MOST_LIFT)[:, None])
+
+
+def toe_bends(toe: Points, lowest: Annotated[Floats, "frames"]) -> Turns:
+    """Return the turns (N, 4) of toes with which their ends are no lower than wanted.
+
+    toe: from the balls to the ends of the toes (N, 3), m. lowest: heights of the ends above the
+    balls (N,), m.
+    """
+    size = np.linalg.norm(toe, axis=-1)
+    sines = np.clip(np.stack([toe @ UP, lowest]) / np.maximum(size, 1e-9), -1.0, 1.0)
+    present, wanted = np.arcsin(sines)
+    axis = quat.cross(toe, np.broadcast_to(UP, toe.shape))
+    axis /= np.maximum(np.linalg.norm(axis, axis=-1, keepdims=True), 1e-9)
+    return quat.exp(axis * np.maximum(wanted - present, 0.0)[:, None])

@@ -25,7 +25,7 @@ class Limb:
 
     upper, middle, lower: indices; each is the parent of the next. tip: the joint that is placed;
     `lower`, or a descendant of it that moves with it. hinge: limits of the middle joint; None where
-    they are unknown.
+    they are unknown. toe: from the tip to the end of the toes, m; None where that is unknown.
     """
 
     upper: int
@@ -33,6 +33,7 @@ class Limb:
     lower: int
     tip: int
     hinge: Hinge | None = None
+    toe: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)

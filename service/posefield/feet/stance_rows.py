@@ -26,8 +26,8 @@ SHORTEST_GAP = contact_detection.DEFAULT.shortest_gap
 SHORTEST_STEP = 0.03
 # A foot that is higher above the place where it stands is in the air whatever the plan says, m.
 LIFTED = contact_detection.DEFAULT.grown_height
-# A foot may stand this much higher or lower than captured feet do, m: soles differ.
-UNEVEN = 0.01
+# A foot may stand this much higher, or lower, than captured feet do, m: soles differ.
+UNEVEN, SUNK = 0.01, 0.005
 
 FRAME_FIELDS = ("floor", "heights", "walking", "arms")
 

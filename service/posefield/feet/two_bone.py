@@ -38,17 +38,20 @@ LEAST_ACROSS = 0.3
 
 @dataclass(frozen=True)
 class LimbTurns:
-    """Local rotations (F, 4) of the three joints of a limb."""
+    """Local rotations (F, 4) of the three joints of a limb, and of bent toes; None where not."""
 
     upper: Turns
     middle: Turns
     lower: Turns
+    tip: Turns | None = None
 
     def apply(self, limb: Limb, rotations: Annotated[Floats, "frames joints 4"]) -> None:
         """Write the rotations of the limb's joints into poses (F, J, 4)."""
         rotations[..., limb.upper, :] = self.upper
         rotations[..., limb.middle, :] = self.middle
         rotations[..., limb.lower, :] = self.lower
+        if self.tip is not None:
+            rotations[..., limb.tip, :] = self.tip
 
 
 def firm_reach(poses: LimbPoses, limb: Limb) -> Values:

@@ -54,6 +54,12 @@ class Skeleton:
         if max(self.tip_joints, default=0) >= count:
             raise ValueError(f"a tip at joint {max(self.tip_joints)}, expected 0 to {count - 1}")
 
+    @property
+    def tips(self) -> dict[int, tuple[float, float, float]]:
+        """Return the translation of a joint's end site, m, by joint."""
+        offsets = [(x, y, z) for x, y, z in self.tip_offsets.tolist()]
+        return dict(zip(self.tip_joints, offsets, strict=True))
+
     def _children(self) -> list[tuple[int, int]]:
         return list(enumerate(self.parents))[1:]
 

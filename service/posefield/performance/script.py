@@ -326,7 +326,12 @@ def _script_character(
     foot_contacts = [contact for contact in card.contacts if contact.joint in card.feet]
     limits = shared_hinges(card, [other.session.card for other in others if other is not None])
     choice = footsteps.choose_limbs(
-        card.skeleton.parents, bones, [contact.joint for contact in foot_contacts], (), limits
+        card.skeleton.parents,
+        bones,
+        [contact.joint for contact in foot_contacts],
+        (),
+        limits,
+        card.skeleton.tips,
     )
     contacts = tuple(foot_contacts[index] for index in choice.feet)
     feet = tuple(contact.joint for contact in contacts)

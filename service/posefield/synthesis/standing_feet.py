@@ -60,6 +60,7 @@ def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
             feet,
             _held_joints(draft),
             card.hinges,
+            card.skeleton.tips,
         )
         if limbs_of_draft.feet:
             placed.append(draft)

@@ -273,7 +273,9 @@ def choose_legs(card: ModelCard) -> LimbChoice:
     """Return the legs of the feet whose contacts are known; those of the skeleton at rest."""
     skeleton = card.skeleton
     feet = [contact.joint for contact in foot_contacts(card)]
-    return footsteps.choose_limbs(skeleton.parents, skeleton.offsets, feet, (), card.hinges)
+    return footsteps.choose_limbs(
+        skeleton.parents, skeleton.offsets, feet, (), card.hinges, skeleton.tips
+    )
 
 
 def standing_motions(

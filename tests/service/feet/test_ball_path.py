@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from few_feet import FootPath, change_smoothly, foot_rows, plan_path
 
-from posefield.feet import ball_path, heel_roll, smooth_change, stance_rows
+from posefield.feet import ball_path, smooth_change, stance_rows
 from posefield.feet.stance_rows import Cycle, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.contact_detection import FootContact
@@ -60,7 +60,7 @@ def test_a_foot_keeps_one_place_in_each_stance(rng):
         assert not apart[:, ::2].any()
         # Heights follow the prediction, within bounds.
         assert np.abs(anchor[1] + apart[:, 1] - FOOT.height).max() <= stance_rows.UNEVEN
-    assert (found.positions[:, 1] >= FOOT.height - heel_roll.SUNK).all()
+    assert (found.positions[:, 1] >= FOOT.height - stance_rows.SUNK).all()
 
 
 def test_a_long_path_is_that_of_its_parts():

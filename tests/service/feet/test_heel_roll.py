@@ -53,7 +53,7 @@ def test_a_foot_is_flat_at_the_pitch_that_it_keeps():
     ball, arms, _ = rolling()
     feet = foot_rows([FootPath(ball, RATE)], FOOT, arms)
     contacts = stance_rows.from_intervals([[Interval(0, 50)]])
-    assert heel_roll.flat_pitches(feet, contacts) == pytest.approx(FLAT, abs=0.02)
+    assert heel_roll.flat_pitches(arms, contacts, feet.rows) == pytest.approx(FLAT, abs=0.02)
 
 
 def test_frames_in_which_the_foot_moves_are_no_stance():
@@ -107,3 +107,12 @@ def test_a_lifted_heel_leaves_the_ball_and_gives_the_leg_its_length():
     assert np.linalg.norm(offset + lifted, axis=-1) == pytest.approx(chord, abs=1e-9)
     assert (-lifted @ UP)[1:].min() > (-arm @ UP).max()
     assert np.linalg.norm(offset + arm, axis=-1)[-1] > chord[-1] + 5e-3
+
+
+def test_ends_of_toes_are_not_below_the_floor():
+    pitch = np.array([-1.2, -0.4, 0.0, 0.5])
+    toe = 0.06 * floor_plane.at_height(np.cos(pitch) * np.exp(0.3j), np.sin(pitch))
+    bent = quat.rotate(heel_roll.toe_bends(toe, np.full(4, -0.01)), toe)
+    assert bent @ UP == pytest.approx(np.maximum(toe @ UP, -0.01), abs=1e-9)
+    assert np.linalg.norm(bent, axis=-1) == pytest.approx(0.06)
+    assert bent[2:] == pytest.approx(toe[2:])

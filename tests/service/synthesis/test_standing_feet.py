@@ -84,7 +84,7 @@ def test_bones_keep_their_lengths_and_other_joints_their_rotations(walker):
     assert level.max() < 1e-12
     turned = np.abs(placed.clip.rotations - free.clip.rotations).max(axis=(0, 2))
     assert {names[j] for j in np.flatnonzero(turned)} <= {
-        side + part for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot")
+        side + part for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "ToeBase")
     }
 
 

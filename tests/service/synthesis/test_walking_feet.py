@@ -76,7 +76,7 @@ def test_a_standing_foot_stays_in_one_place_on_the_floor(model, own):
     _, free, _ = built(model, own, count=3, feet="as_predicted")
     heights = np.array([contact.height for contact in card.contacts])
     placed = joints(card, stood)[:, :, list(card.feet)]
-    assert (placed[..., 1] - heights).min() > -0.015
+    assert (placed[..., 1] - heights).min() > -0.01 - 1e-5
     free = joints(card, free)[:, :, list(card.feet)]
     level = [np.diff(paths[..., [0, 2]], axis=1) for paths in (placed, free)]
     still, slow = (np.linalg.norm(steps, axis=-1) < 2e-6 for steps in level)
