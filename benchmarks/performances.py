@@ -200,21 +200,26 @@ def flag_rows(find: Find) -> list[Row]:
     """Return the share of joins of a squat and a stoop that no flag tells of."""
     heights = [(low, high) for low in (0.45, 0.5, 0.55) for high in (0.85, 0.9, 0.95)]
     pairs = [*heights, *(pair[::-1] for pair in heights)]
-    joins = [make(_deposited(*pair), find).answer.trust.joins[0] for pair in pairs]
+    joins = [make(_deposited(find, *pair), find).answer.trust.joins[0] for pair in pairs]
     unflagged = 100.0 * float(np.mean([not join.hard for join in joins]))
     note = f"of {len(joins)} joins of models"
     return [Figure("squat into stoop: joins not flagged", unflagged, "%", note, None, 0.0)]
 
 
-def _deposited(first: float, second: float) -> Document:
+def _deposited(find: Find, first: float, second: float) -> Document:
+    """Return a deposit and a return at two heights of the root, and else typical controls."""
     acts = [("hdm05_deposit_floor", first), ("hdm05_deposit_return", second)]
     return {
         "fps": RATE,
         "segments": [
-            {"kind": "act", "model": name, "controls": {"root_height": height}}
-            for name, height in acts
+            {"kind": "act", "model": name, "controls": {**_typical(find(name)), "root_height": own}}
+            for name, own in acts
         ],
     }
+
+
+def _typical(model: Synthesizer) -> dict[str, float]:
+    return {control.name: control.default for control in model.session.card.controls}
 
 
 def random_rows(models: Mapping[str, Synthesizer], count: int) -> list[Row]:
@@ -272,10 +277,9 @@ def _spoiled(document: Document, cast: Cast) -> Document:
         model = segment.get("model", "")
         if model == random_scripts.RETURNS["hdm05_kick"]:
             continue
-        card = cast.find(model).session.card if model else None
-        typical = {own.name: own.default for own in card.controls} if card else {}
         is_return = model in random_scripts.RETURNS.values()
-        segments.append({**segment, "controls": typical} if is_return else segment)
+        typical = {"controls": _typical(cast.find(model))} if is_return else {}
+        segments.append({**segment, **typical})
     return {**document, "segments": segments}
 
 

@@ -3,9 +3,9 @@
 posefield perform SCRIPT.json --model GRAB.onnx --model RETURN.onnx -o MOTION.usdc
 posefield perform SCRIPT.json --model GRAB.onnx --model RETURN.onnx -o MOTION.npz
 .venv-blender/bin/python docs/draw_performance.py MOTION.usdc MOTION.npz SCRIPT.json LARGE.png
-.venv/bin/python docs/draw_performance.py LARGE.png PICTURE.png
+.venv/bin/python docs/draw_performance.py LARGE.png [LARGE.png ...] PICTURE.png
 
-The script is the last one of docs/guide/performances.md. A ball on a post shows its target. The
+The scripts are the last ones of docs/guide/performances.md. A ball on a post shows its target. The
 README shows the picture, too.
 """
 
@@ -18,7 +18,11 @@ import numpy as np
 
 WALKING, ARRIVING = 0.9, 0.45
 """Distance along the path between two figures that walk, and least one to an act, m."""
+HOP = 0.1
+"""Rise of the root from which on an act is a hop, m."""
 WIDE, HIGH = 1200, 440
+FIGURES, SMALL = (150, 20, 1150, 340), (640, 205)
+"""Part of a picture that has figures, and its size where several are one picture."""
 BALL, POST = 0.07, 0.012
 """Radii of a target, m."""
 SEGMENTS = (
@@ -41,7 +45,9 @@ def draw(clip: str, numbers: str, script: str, picture: str) -> None:
     with np.load(numbers) as found:
         segments = json.loads(str(found["trust"]))["segments"]
         rate, roots = float(found["rate"]), z_up(found["root_position"])
-    paints = [paint(bpy, colour) for colour in SEGMENTS[: len(segments)]]
+    # The last segment is a walk in all pictures.
+    colours = *SEGMENTS[: len(segments) - 1], SEGMENTS[-1]
+    paints = [paint(bpy, colour) for colour in colours]
     own = np.array([segment_at(segments, frame / rate) for frame in range(len(roots))])
     body = next(thing for thing in bpy.data.objects if thing.type == "MESH")
     for frame in moments(segments, own, roots, rate):
@@ -72,7 +78,14 @@ def segment_at(segments, time: float) -> int:
 
 def moments(segments, own, roots, rate: float) -> list[int]:
     """Return the frames that are shown: events of acts, and walks at equal distances."""
-    shown = [round(each["event"] * rate) for each in segments if "event" in each]
+    # A hop is seen at its highest, and other acts at their events.
+    shown = [
+        highest if roots[highest, 2] - roots[rows[0], 2] > HOP else round(each["event"] * rate)
+        for index, each in enumerate(segments)
+        if "event" in each
+        for rows in [np.flatnonzero(own == index)]
+        for highest in [int(rows[np.argmax(roots[rows, 2])])]
+    ]
     places = roots[:, :2]
     for index, each in enumerate(segments):
         rows = np.flatnonzero(own == index)
@@ -155,12 +168,19 @@ def light_and_look(bpy, scene, middle) -> None:
     scene.render.resolution_x, scene.render.resolution_y = WIDE, HIGH
 
 
-def reduce(large: str, picture: str) -> None:
-    """Write the picture in 96 colours."""
+def reduce(*paths: str) -> None:
+    """Write large pictures as one, the last path: one above another, smaller, in 96 colours."""
     from PIL import Image
 
-    small = Image.open(large).convert("RGB").quantize(96, dither=Image.Dither.NONE)
-    small.save(picture, optimize=True)
+    *large, picture = paths
+    pictures = [Image.open(path).convert("RGB") for path in large]
+    if len(pictures) > 1:
+        pictures = [each.crop(FIGURES).resize(SMALL) for each in pictures]
+    wide, high = pictures[0].size
+    whole = Image.new("RGB", (wide, high * len(pictures)))
+    for row, each in enumerate(pictures):
+        whole.paste(each, (0, row * high))
+    whole.quantize(96, dither=Image.Dither.NONE).save(picture, optimize=True)
 
 
-(reduce if len(sys.argv) == 3 else draw)(*sys.argv[1:])
+(reduce if sys.argv[1].endswith(".png") else draw)(*sys.argv[1:])
