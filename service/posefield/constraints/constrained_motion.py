@@ -23,6 +23,7 @@ class ConstrainedMotion:
     numbers: the motion as the variables of the correction. state: the model's prediction.
     results: error of each constraint. steps: of the correction. distance: Mahalanobis distance of
     the constraints from the prediction. is_take: whether it deviates from the prediction at random.
+    duration_factor: duration over the predicted one, of a take of a motion without cycle.
     """
 
     scene: MotionVariables
@@ -32,12 +33,13 @@ class ConstrainedMotion:
     steps: int = 0
     distance: float = 0.0
     is_take: bool = False
+    duration_factor: float = 1.0
 
     @property
     def duration(self) -> float:
         """Duration of the clip, s."""
-        # Motions without cycles keep the predicted duration.
-        fixed = 1.0 if self.scene.cyclic else self.state.duration
+        # The duration of motions without cycles is no variable of the correction.
+        fixed = 1.0 if self.scene.cyclic else self.state.duration * self.duration_factor
         return float(np.exp(self.scene.duration_and_travel(self.numbers)[0])) * fixed
 
     @property

@@ -4,6 +4,7 @@ A take is a conditional simulation of the kriged coefficients: a seed stands for
 of the controls and labels, which is zero at captured clips up to the nugget.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -35,6 +36,8 @@ POINTS_TOGETHER = 512
 """Number of points at which a field is evaluated at once."""
 FIELDS_TOGETHER = 8
 """Number of fields that are drawn at once: more of them outgrow a core's cache."""
+DURATION_STREAM = 4
+"""Stream of a seed for the duration, besides those of `random_field` and `reduced_motion`."""
 EVENTFUL_TIMES = 3
 """Time functions of a motion without cycle that a take varies, the first ones. Residuals of further
 ones are differences in footing and timing, which are no independent Gaussian numbers.
@@ -46,12 +49,14 @@ class TakeSettings:
     """Deviation of a motion from its prediction.
 
     seed: of the take; 0 for none. variety: its size; 1 for that of captured clips. detail: whether
-    details that no control predicts are added.
+    details that no control predicts are added. is_timed: whether a target at a time fixes the
+    duration.
     """
 
     seed: int
     variety: float
     detail: bool
+    is_timed: bool = False
 
 
 _SeedPoint = tuple[int, bytes]
@@ -90,11 +95,27 @@ class TakeVariation:
             seeds = np.array([take.seed])
             changes = self.changes(corrector, question.point, question.labels, seeds)
             numbers = motion.numbers + take.variety * changes[0]
-            motion = replace(motion, numbers=numbers, is_take=True)
+            duration_factor = self.duration_factor(take, motion.state.duration)
+            motion = replace(motion, numbers=numbers, is_take=True, duration_factor=duration_factor)
         if not take.detail:
             return motion
         detailed = replace(corrector.reduced, detail=self.detail(corrector, take.seed))
         return replace(motion, scene=replace(motion.scene, reduced=detailed))
+
+    def duration_factor(self, take: TakeSettings, predicted: float) -> float:
+        """Return the duration of a take over the predicted one, s; 1 for cycles.
+
+        A seed is as slow or as fast at all controls, but no take lasts shorter or longer than
+        captured clips, unless the prediction does.
+        """
+        card = self._session.card
+        spread, (shortest, longest) = card.making.repeat_duration, card.durations
+        if take.is_timed or not (take.seed and spread):
+            return 1.0
+        (normal,) = random_field.normals(take.seed, DURATION_STREAM, 1, 1)[0]
+        factor = math.exp(take.variety * spread * normal)
+        limits = min(shortest / predicted, 1.0), max(longest / predicted, 1.0)
+        return min(max(factor, limits[0]), limits[1])
 
     def changes(
         self,
@@ -212,6 +233,9 @@ def change_coefficients(
 def settings(card: ModelCard, question: MotionQuestion) -> TakeSettings | None:
     """Return the take of a question, or None for the prediction."""
     take = TakeSettings(
-        question.take, question.variety, question.detail and bool(card.making.detail)
+        question.take,
+        question.variety,
+        question.detail and bool(card.making.detail),
+        any(not isinstance(target.when, str) for target in question.targets),
     )
     return take if take.seed or take.detail else None

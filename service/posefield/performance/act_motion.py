@@ -8,6 +8,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Bones, Floats, Frames
+from posefield.constraints import take_variation
 from posefield.constraints.targets import NO_CONSTRAINTS
 from posefield.feet import limbs, stance_rows
 from posefield.inference.onnx_runtime import CONTACTS
@@ -77,13 +78,15 @@ def act_passage(model: Synthesizer, act_question: MotionQuestion) -> Act:
     card = model.session.card
     if card.cyclic:
         raise InvalidField("act", f"{model.name} is a cycle, expected a model of another motion")
-    times, event = _times(model, model.question(act_question))
+    question = model.question(act_question)
+    duration, duration_factor = _duration(model, question, act_question)
+    times, event = _times(model, question, duration, duration_factor)
     fields = {name: getattr(act_question, name) for name in MotionQuestion.__struct_fields__}
     answer = poses.synthesize_poses(model, PoseQuestion(**fields, times=times.tolist()))
     passage = Passage(
         quat.normalize(answer.rotations.astype(np.float64)),
         answer.root_position.astype(np.float64),
-        _contacts(model, model.question(act_question), answer),
+        _contacts(model, question, answer, duration_factor),
         np.full(len(times), answer.trust.sigma),
     )
     return Act(
@@ -108,22 +111,32 @@ def times_through(moment: float, duration: float) -> tuple[Frames, int]:
     return np.clip(times, 0.0, duration), before
 
 
-def _times(model: Synthesizer, question: ValidatedQuestion) -> tuple[Frames, int]:
-    """Return the times (F,), s, of an act's frames, and the frame of the event, or the last."""
+def _duration(
+    model: Synthesizer, question: ValidatedQuestion, act_question: MotionQuestion
+) -> tuple[float, float]:
+    """Return the duration of an act, s, and the share of it by which a take lengthens it."""
     (durations,) = model.session.run(
         question.point, None, "duration", labels=question.labels, level=question.level
     )
-    duration = model.check_duration(float(durations[0]))
+    predicted, take = float(durations[0]), take_variation.settings(model.session.card, act_question)
+    duration_factor = model.solver.variation.duration_factor(take, predicted) if take else 1.0
+    return model.check_duration(predicted * duration_factor), duration_factor
+
+
+def _times(
+    model: Synthesizer, question: ValidatedQuestion, duration: float, duration_factor: float
+) -> tuple[Frames, int]:
+    """Return the times (F,), s, of an act's frames, and the frame of the event, or the last."""
     event, last = model.session.card.event, model.session.card.frames - 1
     if event is None or event.share == 1.0:
         return times_through(duration, duration)
     motion = model.solver.solve(question, NO_CONSTRAINTS)
     (moment,) = model.solver.times(question, motion, np.array([event.share * last]))
-    return times_through(float(moment), duration)
+    return times_through(float(moment) * duration_factor, duration)
 
 
 def _contacts(
-    model: Synthesizer, question: ValidatedQuestion, answer: PoseAnswer[Any]
+    model: Synthesizer, question: ValidatedQuestion, answer: PoseAnswer[Any], duration_factor: float
 ) -> Annotated[Floats, "frames feet"]:
     """Return the probabilities (F, K) that the feet of the card contact the ground.
 
@@ -135,7 +148,7 @@ def _contacts(
     if columns:
         (likely,) = model.session.run(
             question.point,
-            answer.times[None],
+            answer.times[None] / duration_factor,
             CONTACTS,
             labels=question.labels,
             level=question.level,

@@ -316,9 +316,9 @@ def preview_clip(
     draft = ClipDraft(question, frame_limit)
     draft.validate(model)
     validated, constraints, misses_target = draft.validated, draft.constraints, False
-    # Constraints can change the duration, as a target speed does.
+    # Constraints can change the duration, as a target speed or a take does.
     strict = question.extrapolate == "refuse" or model.session.card.cyclic
-    if constraints and (constraints.targets or strict):
+    if constraints and (constraints.targets or constraints.take or strict):
         draft.motion = motion = model.solve_constraints(
             validated, constraints, question.extrapolate
         )

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.constraints.take_variation import TakeVariation
+from posefield.constraints.take_variation import TakeSettings, TakeVariation
 from posefield.inference import reduced_motion, session
+from posefield.performance import act_motion, passage
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
@@ -163,7 +164,58 @@ def test_a_spherical_covariance_has_no_takes(walk):
         clip(model, take=SEED)
 
 
-DEVIATIONS = np.outer([0.0, 0.02, 0.0, 0.01], np.linspace(1.0, 0.5, 12))
+def lasting(reach, spread, durations):
+    """The model of reaches with a spread of the durations of repeats."""
+    card = reach.session.card
+    making = replace(card.making, repeat_duration=spread)
+    changed = replace(card, making=making, durations=durations)
+    return Synthesizer("reach", replace(reach.session, card=changed))
+
+
+def test_durations_of_takes_vary_as_those_of_repeats(reach):
+    model, mean = lasting(reach, 0.2, (0.01, 100.0)), clip(reach)[1].duration
+    variation = model.solver.variation
+
+    def spread(variety):
+        takes = [TakeSettings(seed, variety, detail=False) for seed in range(1, 401)]
+        return np.std([np.log(variation.duration_factor(take, mean)) for take in takes])
+
+    assert spread(1.0) == pytest.approx(0.2, rel=0.1)
+    assert spread(0.5) == pytest.approx(0.5 * spread(1.0))
+    narrow = lasting(reach, 0.2, (0.9 * mean, 1.05 * mean)).solver.variation
+    found = [
+        narrow.duration_factor(TakeSettings(seed, 1.0, detail=False), mean) for seed in range(1, 99)
+    ]
+    assert min(found) == pytest.approx(0.9) and max(found) == pytest.approx(1.05)
+    # A motion of an older file, and one whose target is at a time, last as predicted.
+    assert clip(lasting(reach, 0.0, (0.01, 100.0)), take=SEED)[1].duration == mean
+    target = Target("RightHand", (0.3, 1.2, 0.4), 0.5 * mean)
+    timed = clip(model, take=SEED, targets=(target,), extrapolate="ok")[1]
+    assert timed.duration == pytest.approx(mean) and clip(model, take=SEED)[1].duration != mean
+
+
+def test_a_slower_take_has_the_poses_of_the_same_shares_of_its_duration(reach):
+    model = lasting(reach, 0.2, (0.01, 100.0))
+    unvaried = lasting(reach, 0.0, (0.01, 100.0))
+
+    def pose(model, seconds):
+        asked = PoseQuestion(controls=middle(model), times=[seconds], take=SEED)
+        return poses.synthesize_poses(model, asked)
+
+    at = pose(unvaried, 0.4)
+    duration = pose(model, 0.0).trust.duration
+    factor = duration / at.trust.duration
+    assert abs(factor - 1.0) > 0.02
+    assert np.abs(pose(model, 0.4 * factor).rotations - at.rotations).max() < 1e-6
+    assert np.abs(pose(model, 0.4).rotations - at.rotations).max() > 1e-4
+    question = ClipQuestion(controls=middle(model), take=SEED)
+    frames = len(clips.synthesize_clip(model, question).clip.rotations)
+    assert clips.preview_clip(model, question).frames == frames
+    act = act_motion.act_passage(model, question)
+    assert len(act.passage) == pytest.approx(duration * passage.RATE, abs=2.0)
+
+
+DEVIATIONS = np.outer([0.0, 0.02, 0.0, 0.01], np.linspace(1.0, 0.5, 14))
 
 
 @pytest.fixture(scope="module")
