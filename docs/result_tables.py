@@ -21,6 +21,7 @@ SPEED = tuple(f"speed/{name}" for name in SPEED_FILES)
 JUDGED = (
     "performed",
     "joins",
+    "joint_angles",
     "discovered",
     "found_families",
     "found_models",
