@@ -247,7 +247,7 @@ def _rows(title: str, joins: Sequence[Join], goal: float | None) -> list[Row]:
             None,
             1.0,
         ),
-        Row(f"{title}: pelvis lowered", lowered, "cm", "mean", None, 5.0),
+        Row(f"{title}: pelvis lowered", lowered, "cm", "mean", None, 1.5),
         Row(f"{title}: flagged as hard", hard, "%", "", None, None),
     ]
 
