@@ -8,6 +8,7 @@ from pathlib import Path
 
 import clip_feet
 import crowd_bounds
+import crowd_distances
 import crowd_feet
 import crowd_models
 import crowd_poses
@@ -27,6 +28,7 @@ def rows(trained_family: Family) -> list[Row]:
         *crowd_rivals.rows(trained_family, model),
         *crowd_walk.rows(walks),
         *crowd_feet.rows(walks),
+        *crowd_distances.rows(walks),
         *clip_feet.rows(walks),
     ]
 
