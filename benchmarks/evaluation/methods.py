@@ -36,7 +36,7 @@ DEFINITIONS = {
     EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
     "captured position at the event",
     UNCORRECTED: "the same without the correction that makes predicted time functions the "
-    "identity in the mean; a negative control of the acceleration at the ends",
+    "identity in the mean",
     NO_PERFORMER: "a model of the same recipe, trained without performers",
     ASKED_OPEN: "the model trained with performers, asked with the performer left open: it "
     "then answers for a person whom it has not seen",
