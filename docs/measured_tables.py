@@ -44,6 +44,7 @@ PIXELS, FIELD = 1080, math.pi / 3.0
 LEVELS_OF = "cmu_walk"
 JUDGED_COLUMNS = ["figure", "value", "must", "wish", "remark"]
 WISHES = {
+    "target_frames": {f"{rate} frames a second": 0.1 for rate in (24, 30, 60)},
     "joins": {
         "slide of standing feet": 0.2,
         "pelvis lowered": 2.0,

@@ -22,6 +22,7 @@ JUDGED = (
     "performed",
     "joins",
     "joint_angles",
+    "target_frames",
     "discovered",
     "found_families",
     "found_models",
