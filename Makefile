@@ -62,23 +62,23 @@ $(MODEL): $(SAMPLE)/recipe.toml | $(ENV)
 	$(BIN)/posefield train $(SAMPLE)/recipe.toml --output $(MODEL)
 
 .PHONY: demo
-demo: $(MODEL) ## walks of the shipped model, and a reach sampled, trained and served: clips in build/demo
+demo: $(MODEL) ## clips of the shipped models, and a reach sampled, trained and served: in build/demo
 	$(BIN)/python clients/demo.py $(MODEL) build/demo
 	$(BIN)/posefield demo --once --output build/demo
 
-# The walk goes first, so that the page opens with it; one of the same name in build/models takes its place.
+# The shipped models go first, so that the page opens with the walk.
 SHIPPED := service/posefield/shipped
-WALK = $(if $(wildcard build/models/cmu_walk.onnx),,$(SHIPPED)/cmu_walk.onnx)
 .PHONY: run
-run: $(MODEL) $(PAGE) $(DOCS) ## serve the shipped walk and the models of build/models on port 8000
-	$(BIN)/posefield serve $(WALK) build/models
+run: $(MODEL) $(PAGE) $(DOCS) ## serve the shipped models and those of build/models on port 8000
+	$(BIN)/posefield serve $(filter-out $(patsubst build/models/%,$(SHIPPED)/%,$(wildcard build/models/*.onnx)),$(wildcard $(SHIPPED)/*.onnx)) build/models
 
-# The motion data of CMU, as `benchmarks/fetch.py cmu` leaves it; nothing of it is kept in the project.
+# Motion data of CMU and HDM05, which the recipes name; nothing of it is kept in the project.
 POSEFIELD_DATA ?= ../shared/data
+SHIPPED_FAMILIES := cmu_walk hdm05_deposit_floor hdm05_deposit_return hdm05_grab_high hdm05_grab_return \
+	hdm05_hop hdm05_kick hdm05_kick_return hdm05_sneak hdm05_squat
 .PHONY: shipped-models
-shipped-models: $(MODEL) ## train the models that ship, from the motion data in POSEFIELD_DATA
-	$(BIN)/posefield train cmu_walk --data $(POSEFIELD_DATA) --output $(SHIPPED)/cmu_walk.onnx
-	cp $(MODEL) $(SHIPPED)/reaching.onnx
+shipped-models: | $(ENV) ## train the models that ship, from the motion data in POSEFIELD_DATA
+	$(BIN)/posefield train $(SHIPPED_FAMILIES) --data $(POSEFIELD_DATA) --output $(SHIPPED)
 
 .PHONY: addon
 addon: $(ENV) ## the Blender add-on as an archive to install, in build

@@ -32,7 +32,7 @@ from posefield.inference import session
 from posefield.synthesis.synthesizer import Synthesizer
 
 ROOT = Path(__file__).parents[1]
-MODEL = ROOT / "service/posefield/shipped/reaching.onnx"
+MODEL = ROOT / "build/models/reaching.onnx"
 MANY, ROUNDS, REPEATS = 10_000, 9, 5
 FASTER, RATIO = 2.5, 2.0
 """Goals: processor time of the earlier commit over ours, and finest over coarsest."""

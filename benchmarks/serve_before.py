@@ -31,7 +31,7 @@ from posefield.synthesis import clips, crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 
 ROOT = Path(__file__).parents[1]
-MODEL = ROOT / "service/posefield/shipped/reaching.onnx"
+MODEL = ROOT / "build/models/reaching.onnx"
 QUIET, GOAL, WISH = 1_330.0, 1_650.0, 2_000.0
 """Clips as usdc a second and core: recorded on a quiet machine before, the goal and the wish."""
 BINARY = {"msgpack": "MessagePack", "arrow": "Arrow", "npz": "npz"}

@@ -1,6 +1,7 @@
-"""Draws the README's picture: poses of a clip side by side, rendered by Blender.
+"""Draws the first picture of the documentation: poses of a clip side by side, rendered by Blender.
 
-make test-system && .venv-blender/bin/python docs/draw.py CLIP.usdc PICTURE.png
+posefield clip hdm05_grab_high --fps 24 -o CLIP.usdc
+.venv-blender/bin/python docs/draw.py CLIP.usdc PICTURE.png
 
 The picture here is of `hdm05_grab_high`, reduced to 64 colours.
 """

@@ -1,7 +1,7 @@
 """Draws the guide's picture of a performance: moments of it along its path, coloured by segment.
 
-posefield perform SCRIPT.json --model GRAB.onnx --model RETURN.onnx -o MOTION.usdc
-posefield perform SCRIPT.json --model GRAB.onnx --model RETURN.onnx -o MOTION.npz
+posefield perform SCRIPT.json -o MOTION.usdc
+posefield perform SCRIPT.json -o MOTION.npz
 .venv-blender/bin/python docs/draw_performance.py MOTION.usdc MOTION.npz SCRIPT.json LARGE.png
 .venv/bin/python docs/draw_performance.py LARGE.png [LARGE.png ...] PICTURE.png
 

@@ -353,8 +353,8 @@ def test_shipped_models_are_known_by_their_names(posefield, refused, tmp_path, m
     code, out, _ = posefield("pose", "cmu_walk", "-c", "speed=1.2")
     assert code == 0 and json.loads(out)["trust"]["model"].startswith("cmu_walk@")
     assert refused(3, "inspect", "cmu_wlak") == (
-        "cmu_wlak: no such file, expected one or a shipped model: cmu_walk, reaching "
-        "(did you mean 'cmu_walk'?)"
+        "cmu_wlak: no such file, expected one or a shipped model: "
+        f"{', '.join(model_registry.with_shipped([]).models)} (did you mean 'cmu_walk'?)"
     )
 
 

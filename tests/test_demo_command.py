@@ -65,7 +65,7 @@ def test_usd_files_have_characters(made):
         stage = Usd.Stage.Open(str(path))
         counts[path.name] = sum(prim.IsA(UsdSkel.Root) for prim in stage.TraverseAll())
     assert counts.pop("crowd.usdc") >= 50
-    assert set(counts.values()) == {1}
+    assert set(counts.values()) == {1} and len(counts) == len(command_serve.SPEEDS) + 5
 
 
 @contextmanager

@@ -109,7 +109,7 @@ def test_many_examples_are_found():
 @pytest.mark.parametrize(
     "text",
     [
-        f"curl 'http://{ADDRESS}/v1/models/reaching/pose?tune=1&time=0'\n",
+        f"curl 'http://{ADDRESS}/v1/models/cmu_walk/pose?sped=1&time=0'\n",
         "posefield clip models/none.onnx -o none.usdc\n",
         "false | true\n",
     ],

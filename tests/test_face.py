@@ -22,8 +22,8 @@ SCRIPT = {
 
 
 @pytest.fixture(scope="module")
-def reaching():
-    return posefield.load("reaching")
+def reaching(model_path):
+    return posefield.load(model_path)
 
 
 @pytest.fixture(scope="module")

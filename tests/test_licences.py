@@ -139,8 +139,10 @@ def test_no_npm_package_is_copyleft():
     assert {name: said for name, said in found.items() if not free(alternatives(said))} == {}
 
 
-def test_what_is_our_own_is_under_one_licence():
-    for name in ("posefield", "posefield-client"):
+def test_our_software_is_under_one_licence():
+    for name in ("posefield-train", "posefield-client"):
         assert licences(distribution(name)) == ["Apache-2.0"]
+    # Beside the software its wheel holds models that stay under the licence of their motion.
+    assert licences(distribution("posefield")) == ["Apache-2.0 AND CC-BY-SA-3.0"]
     addon = (ROOT / "clients/blender/addon/blender_manifest.toml").read_text()
     assert 'license = ["SPDX:Apache-2.0"]' in addon

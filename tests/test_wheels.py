@@ -14,8 +14,12 @@ import serving
 import wheels
 
 ROOT = Path(__file__).parents[1]
-SHIPPED = [f"posefield/shipped/{name}" for name in ("cmu_walk.onnx", "reaching.onnx", "NOTICE")]
-TABLES = ("cmu_walk/strides.csv", "hdm05_reach/returns.csv", "hdm05_kick/clips.csv")
+SHIPPED = [
+    f"posefield/shipped/{path.name}"
+    for path in (ROOT / "service/posefield/shipped").iterdir()
+    if path.suffix in {".onnx", ""}
+]
+TABLES = ("cmu_walk/strides.csv", "hdm05_reach/returns.csv", "hdm05_squat/clips.csv")
 
 pytestmark = pytest.mark.system
 

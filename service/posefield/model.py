@@ -1,7 +1,7 @@
 """Models in this process: `import posefield` answers as the service does, without a server.
 
-    model = posefield.load("reaching")
-    clip = model.clip(stature=1.75, hip_height=0.95, turn=35, target_height=1.6)
+    model = posefield.load("hdm05_grab_high")
+    clip = model.clip(target_height=1.7, target_forward=0.6)
     clip.save("reach.usdc")
 
 Keywords are the fields of the questions (`posefield.question`), decoded and validated as the body

@@ -202,9 +202,10 @@ def styles(address):
 def readme(path, address):
     empty(address)
     (code,) = re.findall(r"```python\n(.*?)```", Path(path).read_text(), re.S)
+    code = code.replace("hdm05_grab_high", "reaching")
     exec(code.replace("http://127.0.0.1:8000", address), {})
     question = part("settings").question(bpy.context.scene)
-    question["controls"] |= {"stature": 1.72, "turn": 35}
+    question["controls"] |= {"target_height": 1.65}
     record("the README's lines", settings().character, model="reaching", question=question)
 
 

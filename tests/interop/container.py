@@ -60,7 +60,7 @@ def _described(built: Image) -> Iterator[str]:
     said = {
         "title": "posefield",
         "version": __version__,
-        "licenses": "Apache-2.0",
+        "licenses": "Apache-2.0 AND CC-BY-SA-3.0",
         "base.name": "docker.io/library/python:3.11-slim-bookworm",
         "source": image.SOURCE,
         "revision": image.REVISION,

@@ -17,7 +17,7 @@ function examples(): string {
   return blocks
     .join("\n")
     .replaceAll("http://localhost:8000", URL_OF_SERVICE)
-    .replaceAll('"reaching"', '"reach"');
+    .replaceAll('"hdm05_grab_high"', '"reach"');
 }
 
 test("the examples of the README run", () => {

@@ -1,4 +1,4 @@
-/** The state as the address bar's hash: `#reaching?stature=1.72&turn=~20&~time=0.5`.
+/** The state as the address bar's hash: `#cmu_walk?speed=1.3&turn=~20&~time=0.5`.
  *
  * Controls go by their names, with `~` before a value that was inferred; other entries begin with `~` and are written where they differ from the
  * start. Entries that cannot be read are reported, and the others are used.

@@ -7,7 +7,7 @@ import { settled } from "./look.ts";
 
 const SHOWN = {
   "page-one":
-    "/#reaching?stature=1.75&hip_height=0.9&turn=35&target_height=1.6&~playing=no&~time=1.5&~ghost=yes",
+    "/#hdm05_grab_high?target_height=1.7&target_forward=0.7&target_left=-0.1&~playing=no&~time=0.9&~ghost=yes",
   "page-levels": "/#cmu_walk?speed=1.3&turn=0&stride_length=1.4&~playing=no&~time=0.2&~view=levels",
   "page-performance": `/#cmu_walk?~playing=no&~view=performance&~script=${encodeURIComponent(
     JSON.stringify({

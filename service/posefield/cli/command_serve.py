@@ -1,7 +1,7 @@
 """The `posefield serve`, `key`, `mcp` and `demo` commands: the service, keys, agents, a first look.
 
 The files of the demo are fetched over HTTP from a service in a process of its own, so that each
-line that is printed is an address that `curl` or a browser can ask for as well.
+line that is printed is an address that `curl` can ask for as well.
 """
 
 import os
@@ -45,8 +45,8 @@ def serve(
 ) -> None:
     """Serve models over HTTP until interrupted.
 
-    Without PLACES it serves the models that ship with posefield: a walk, which the page at / shows
-    first, and a reach.
+    Without MODEL it serves the models that ship with posefield: a walk, which the page at / shows
+    first, and acts of captured people.
     """
     from posefield.http import server
     from posefield.http.api import settings
@@ -121,17 +121,31 @@ def mcp(
 SPEEDS = (0.8, 1.2, 1.6)
 """Speeds of the walks, m/s, within what the shipped walk was learnt from."""
 FORMATS = ("usdc", "glb", "bvh")
+ACTS = {"reach": "grab_high", "put_down": "deposit_floor", "kick": "kick", "squat": "squat"}
+"""Names of the files of acts, and their models."""
 FILES = {
     **{
-        f"walk_{speed}.{kind}": f"cmu_walk/clip.{kind}?speed={speed}&turn=0"
+        f"walk_{speed}.{kind}": f"models/cmu_walk/clip.{kind}?speed={speed}&turn=0"
         for speed in SPEEDS
         for kind in FORMATS
     },
-    "crowd.usdc": "cmu_walk/crowd.usdc?count=50&seconds=8",
-    "reach.usdc": "reaching/clip.usdc?target_height=1.6",
-    "reach.glb": "reaching/clip.glb?target_height=1.6",
+    "crowd.usdc": "models/cmu_walk/crowd.usdc?count=50&seconds=8",
+    **{
+        f"{act}.{kind}": f"models/hdm05_{model}/clip.{kind}"
+        for act, model in ACTS.items()
+        for kind in ("usdc", "glb")
+    },
+    "performance.usdc": "performances.usdc",
 }
-"""Questions to the service, below /v1/models, by the names of the files with their answers."""
+"""Questions to the service, below /v1, by the names of the files with their answers."""
+SCRIPT = b"""{"segments": [
+  {"kind": "walk", "model": "cmu_walk", "speed": 1.1},
+  {"kind": "act", "model": "hdm05_grab_high",
+   "targets": [{"joint": "rhand", "position": [0.3, 1.65, 4.0], "at": "event"}]},
+  {"kind": "hold", "seconds": 0.6, "joint": "rhand"},
+  {"kind": "act", "model": "hdm05_grab_return"},
+  {"kind": "walk", "model": "cmu_walk", "seconds": 4, "speed": 1.1}]}"""
+"""Body of the question for a performance: a walk, a reach for a place, and the walk on."""
 
 ANSWER_TIMEOUT, STOP_TIMEOUT = 60.0, 20.0
 """Seconds for an answer, and for the service's end."""
@@ -169,9 +183,10 @@ def demo(
 def _show(output: Path, port: int, browser: bool, once: bool) -> None:
     with _served(port) as (service, address):
         for name, question in FILES.items():
-            content = _fetch(f"{address}/v1/models/{question}")
+            script = SCRIPT if question.startswith("performances") else None
+            content = _fetch(f"{address}/v1/{question}", script)
             atomic_files.write(content, output / name)
-            typer.echo(f"  {output / name}  {len(content):,} bytes  /v1/models/{question}")
+            typer.echo(f"  {output / name}  {len(content):,} bytes  /v1/{question}")
         typer.echo(f"{len(FILES)} files in {output.resolve()}: USD, glTF and BVH open in Blender")
         if once:
             return
@@ -209,12 +224,16 @@ def _served(port: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
             service.wait(timeout=STOP_TIMEOUT)
 
 
-def _fetch(url: str) -> bytes:
-    """Return an answer's body; MotionError, with the service's words, if it refuses."""
+def _fetch(url: str, body: bytes | None) -> bytes:
+    """Return an answer's body; MotionError, with the service's words, if it refuses.
+
+    body: JSON of a POST, None for a GET.
+    """
     # A proxy of the environment cannot reach this machine's own address.
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with opener.open(url, timeout=ANSWER_TIMEOUT) as answer:
+        request = urllib.request.Request(url, body, {"Content-Type": "application/json"})
+        with opener.open(request, timeout=ANSWER_TIMEOUT) as answer:
             content: bytes = answer.read()
             return content
     except urllib.error.HTTPError as refusal:

@@ -54,10 +54,13 @@ class ModelRegistry:
 
         Raises UnknownModel, with the available identities, for any other key.
         """
+        newest = self.models.get(key)
+        if newest is not None:
+            return newest
         name = key.partition("@")[0]
         versions = self.versions(name)
         for model in versions:
-            if key in (name, model.identity):
+            if model.identity == key:
                 return model
         identities = ", ".join(model.identity for model in versions or self.models.values())
         hint = "" if versions else did_you_mean(name, self.models)

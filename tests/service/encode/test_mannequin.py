@@ -47,7 +47,7 @@ PEOPLE = {
     "person": conftest.person,
     "arms down": a_pose,
     "cmu_walk": lambda: shipped("cmu_walk"),
-    "reaching": lambda: shipped("reaching"),
+    "hdm05_grab_high": lambda: shipped("hdm05_grab_high"),
 }
 
 
