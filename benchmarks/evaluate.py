@@ -19,7 +19,7 @@ from posefield.console.progress import ProgressBar
 from posefield_train.cli import executors
 from posefield_train.evaluate import protocol as held_out
 from posefield_train.evaluate import summary
-from posefield_train.jobs import FinishedJobs, Jobs
+from posefield_train.jobs import PACKAGES, FinishedJobs, Jobs
 from posefield_train.source import data_folder, ingest, recipe
 
 KEPT = Path(__file__).parents[1] / "build/evaluation"
@@ -48,7 +48,9 @@ def main() -> None:
     options = parser.parse_args()
     file = data_folder.recipe_file(options.recipe, options.data)
     with executors.jobs(None, None) as processes:
-        figures = measure(file, options.data or file.parent, FinishedJobs(processes, KEPT))
+        # Folds of these benchmarks hold data classes of their own.
+        finished = FinishedJobs(processes, KEPT, (*PACKAGES, "evaluation"))
+        figures = measure(file, options.data or file.parent, finished)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
 

@@ -159,10 +159,15 @@ CHECKSUM_BYTES = hashlib.sha256().digest_size
 
 @dataclass(frozen=True)
 class FinishedJobs:
-    """Jobs whose results are kept. jobs: executor of those without one. folder: of the results."""
+    """Jobs whose results are kept.
+
+    jobs: executor of those without one. folder: of the results. packages: whose data classes they
+    may hold.
+    """
 
     jobs: Jobs
     folder: Path
+    packages: tuple[str, ...] = PACKAGES
 
     def run(
         self,
@@ -179,7 +184,7 @@ class FinishedJobs:
         paths = [self.folder / f"{joblib.hash((common, job))}{SUFFIX}" for job in listed]
         left = []
         for number, file in enumerate(paths):
-            finished = read_result(file)
+            finished = read_result(file, self.packages)
             if finished:
                 yield finished[0]
             else:
@@ -190,10 +195,10 @@ class FinishedJobs:
             yield result
 
 
-def read_result(file: Path) -> tuple[Any] | None:
+def read_result(file: Path, packages: tuple[str, ...]) -> tuple[Any] | None:
     """Return a kept result; None if there is none, or its checksum is wrong.
 
-    Raises FileError for a file that holds more than data.
+    packages: whose data classes it may hold. Raises FileError for a file that holds more than data.
     """
     if not file.exists():
         return None
@@ -202,7 +207,7 @@ def read_result(file: Path) -> tuple[Any] | None:
     if hashlib.sha256(content).digest() != checksum:
         return None
     try:
-        return (_DataUnpickler(io.BytesIO(content)).load(),)
+        return (_DataUnpickler(io.BytesIO(content), packages).load(),)
     except pickle.UnpicklingError as fault:
         raise FileError(file, f"{fault}, expected arrays and data classes of posefield") from None
 
@@ -210,12 +215,16 @@ def read_result(file: Path) -> tuple[Any] | None:
 class _DataUnpickler(pickle.Unpickler):
     """Reader of pickles that names no function but those by which NumPy makes arrays."""
 
+    def __init__(self, file: io.BytesIO, packages: tuple[str, ...]) -> None:
+        super().__init__(file)
+        self.packages = packages
+
     def find_class(self, module: str, name: str) -> Any:
         """Return a class or a function of NumPy; UnpicklingError for any that is not data."""
         package = module.partition(".")[0]
         if package == "numpy" and name in ARRAY_MAKERS:
             return super().find_class(module, name)
-        if package in PACKAGES:
+        if package in self.packages:
             kind = super().find_class(module, name)
             if isinstance(kind, type) and is_dataclass(kind):
                 return kind

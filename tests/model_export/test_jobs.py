@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import FileError, TrainingError
-from posefield_train.jobs import FinishedJobs, ProcessJobs
+from posefield_train.jobs import PACKAGES, FinishedJobs, ProcessJobs
 
 
 def divide(dividend, divisor):
@@ -139,3 +139,28 @@ def test_a_result_that_would_run_code_is_refused(tmp_path, nested):
     with pytest.raises(FileError, match=r"names (posix|nt)\.mkdir, expected arrays"):
         totals(HereJobs(), folder)
     assert not mark.exists()
+
+
+@dataclass(frozen=True)
+class Part:
+    """Result of a benchmark, in a data class of its own."""
+
+    values: np.ndarray
+
+
+def part(table, factor):
+    """Job of a benchmark."""
+    return Part(factor * table)
+
+
+def test_data_classes_of_the_packages_that_are_named_are_read(tmp_path):
+    def run(jobs, **packages):
+        found = FinishedJobs(jobs, tmp_path, **packages).run(part, EACH, (TABLE,))
+        return sorted(float(own.values.sum()) for own in found)
+
+    named, again = {"packages": (*PACKAGES, __name__.partition(".")[0])}, HereJobs()
+    assert run(HereJobs(), **named) == run(again, **named) == [6.0, 12.0, 18.0]
+    assert again.ran == []
+    # Negative control.
+    with pytest.raises(FileError, match="expected arrays"):
+        run(HereJobs())
