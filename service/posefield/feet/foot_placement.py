@@ -227,7 +227,9 @@ class _Placing:
         if leg.tip != leg.lower:
             lift = heel_roll.heel_turns(offset, arm, chord)
             arm = quat.rotate(lift, arm)
-            foot = lift if foot is None else quat.mul(lift, foot)
+            # A level motion has the same bytes beside a sloped one.
+            foot, sloped = lift, floors.sloped
+            foot[sloped] = quat.mul(lift[sloped], floors.tilts[sloped])
         end = -(offset + arm)
         end *= (chord / np.maximum(np.linalg.norm(end, axis=-1), 1e-9))[:, None]
         return _LimbEnd(leg, end, foot, arm)
@@ -239,7 +241,8 @@ class _Placing:
         if foot is not None:
             orientations = self.poses.orientation(limb.lower)
             local = quat.mul(quat.conj(orientations), quat.mul(foot, orientations))
-            turns.lower[:] = quat.mul(turns.lower, local)
+            changed = self.floors.sloped | (limb.tip != limb.lower)
+            turns.lower[changed] = quat.mul(turns.lower, local)[changed]
             if limb.toe is not None and limb_end.lowest_toe is not None:
                 tip = quat.mul(foot, self.poses.orientation(limb.tip))
                 toe = quat.rotate(tip, np.broadcast_to(limb.toe, limb_end.end.shape))
