@@ -13,15 +13,12 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import random_scripts
 
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.inference import session
 from posefield.motion import contact_detection
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question.json_decoding import decode_question
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.registry import model_registry
-from posefield.registry.model_registry import ModelRegistry
-from posefield.synthesis.synthesizer import Synthesizer
 
 pytestmark = pytest.mark.system
 
@@ -50,13 +47,8 @@ def segments(**walk):
 
 
 @pytest.fixture(scope="module")
-def library(real_data, models_trained):
-    """The shipped models, and those of the acts and their returns."""
-    found = dict(model_registry.load([model_registry.SHIPPED_FOLDER]).models)
-    for name in ACTS:
-        content = models_trained.captured(name, real_data)[2].content
-        found[name] = Synthesizer(name, session.open_bytes(content, name))
-    return ModelRegistry(found)
+def library():
+    return model_registry.with_shipped([])
 
 
 def perform(library, script):
