@@ -17,7 +17,7 @@ from posefield.console.options import (
     with_question_options,
 )
 from posefield.console.output import as_json, print_warnings, written_message
-from posefield.encode.formats import POSE_ENCODERS, encoder_for
+from posefield.encode.formats import POSE_ENCODERS, ClipEncoder, encoder_for
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.question.results import ClipAnswer
 from posefield.question.walk_question import WalkQuestion
@@ -58,23 +58,28 @@ def clip(
     Of a model of a robot a name such as walk.mjlab.npz writes a reference motion, in any format
     that `posefield doctor` writes.
     """
+    reference = robot_formats.of_file(output.name)
+    encoder = None if reference else encoder_for(output)
     opened = open_model(model)
-    if reference := robot_formats.of_file(output.name):
+    if reference:
         answer = clips.synthesize_clip(opened, question)
         robot = opened.session.card.robot
         content = robot_clip.file_content(robot, answer.clip, reference, output.name)
-    else:
-        answer, content = _clip_file(opened, output, question, character)
+    if encoder:
+        answer, content = _clip_file(opened, encoder, output, question, character)
     atomic_files.write(content, output)
     print_warnings(answer.trust)
     typer.echo(written_message(output, answer, json))
 
 
 def _clip_file(
-    opened: Synthesizer, output: Path, question: FileQuestion, character: CharacterOptions
+    opened: Synthesizer,
+    encoder: ClipEncoder,
+    output: Path,
+    question: FileQuestion,
+    character: CharacterOptions,
 ) -> tuple[ClipAnswer, bytes]:
     """Return a clip and its file, of the model's own or of a user's character."""
-    encoder = encoder_for(output)
     delivery = character.delivery(encoder, question, output)
     if delivery is None:
         convention = encoder.convention(question.unit, question.up, question.body)

@@ -65,7 +65,7 @@ def test_takes_vary_as_much_as_sigma_says(model):
     """The mean square over seeds is sigma's, but for the part that is not varied."""
     mean, trust = clip(model)
     squares = [apart(clip(model, take=seed, variety=1.0)[0], mean) ** 2 for seed in range(1, 41)]
-    assert 0.3 < np.sqrt(np.mean(squares)) / trust.sigma < 1.5
+    assert 0.3 < np.sqrt(np.mean(squares)) / trust.sigma < 2.5
     halved = [apart(clip(model, take=seed, variety=0.5)[0], mean) ** 2 for seed in range(1, 41)]
     assert np.sqrt(np.mean(halved) / np.mean(squares)) == pytest.approx(0.5, abs=0.05)
 
@@ -118,7 +118,7 @@ def test_targets_are_met_after_the_take(reach):
     hand = reach.session.card.skeleton.names.index("RightHand")
     goal = mean[-1, hand] + [0.02, 0.01, -0.02]
     rate = 10.0 / trust.duration
-    target = Target("RightHand", tuple(goal), trust.duration)
+    target = Target("RightHand", tuple(goal), at="end")
     free, _ = clip(reach, fps=rate, take=SEED)
     held, said = clip(reach, fps=rate, take=SEED, targets=(target,))
     assert np.linalg.norm(free[-1, hand] - goal) > 0.01
@@ -133,7 +133,7 @@ def test_a_target_within_reach_of_the_mean_is_within_reach_of_every_take(reach):
 
     def reached(offset, **asked):
         goal = tuple((hand + np.array([0.0, 0.0, offset])).tolist())
-        target = Target("RightHand", goal, trust.duration)
+        target = Target("RightHand", goal, at="end")
         return clip(reach, targets=(target,), extrapolate="ok", **asked)[1].targets[0].reached
 
     offsets = np.arange(0.0, 1.0, 0.01)
@@ -256,7 +256,7 @@ def test_detail_is_sampled_by_the_seed_of_the_take(detailed):
     assert np.array_equal(detailed_clip(detailed, detail=True)[0], one)
     taken, _ = detailed_clip(detailed, take=SEED)
     both, _ = detailed_clip(detailed, take=SEED, detail=True)
-    assert np.abs(both - taken).max() > 0.005 and np.abs((both - taken) - (one - mean)).max() > 1e-3
+    assert np.abs(both - taken).max() > 0.005 and apart(both - taken, one - mean) > 1e-3
     assert own.warnings == ()
 
 
