@@ -157,7 +157,7 @@ clean: ## remove what was built, environments too
 	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-older .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # Every family is held out take by take; finished folds are kept, so that a run that was stopped goes on.
-EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop bandai_raise_hand
+EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop hdm05_squat bandai_raise_hand
 EVALUATIONS := build/evaluation/results
 
 .PHONY: evaluate

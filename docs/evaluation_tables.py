@@ -14,6 +14,7 @@ ALL_FAMILIES = {
     "hdm05_deposit_floor": "deposit",
     "hdm05_kick": "kick",
     "hdm05_hop": "hop",
+    "hdm05_squat": "squat",
     "bandai_raise_hand": "raise hand",
     "reaching": "procedural",
 }
@@ -127,7 +128,10 @@ def exact() -> Rows:
 
 
 def _mean_and_worst(key: str, digits: int) -> Callable[[Found], str]:
-    return lambda own: f"{own[key]:.{digits}f} ({own[key + '_worst']:.{digits}f})"
+    """Return the text of a figure; empty for the hips, which no limb carries beyond its reach."""
+    return lambda own: (
+        f"{own[key]:.{digits}f} ({own[key + '_worst']:.{digits}f})" if key in own else ""
+    )
 
 
 def _plain(value: float, digits: int) -> str:
@@ -136,7 +140,7 @@ def _plain(value: float, digits: int) -> str:
 
 
 def _percent(key: str, sign: str = "") -> Callable[[Found], str]:
-    return lambda own: f"{100 * own[key]:{sign}.1f} %"
+    return lambda own: f"{100 * own[key]:{sign}.1f} %" if key in own else ""
 
 
 EXACT_ROWS: tuple[tuple[str, Callable[[Found], str], str], ...] = (
