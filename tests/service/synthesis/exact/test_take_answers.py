@@ -128,7 +128,7 @@ def test_targets_are_met_after_the_take(reach):
 
 
 def test_a_target_within_reach_of_the_mean_is_within_reach_of_every_take(reach):
-    mean, trust = clip(reach)
+    mean, _ = clip(reach)
     hand = mean[-1, reach.session.card.skeleton.names.index("RightHand")]
 
     def reached(offset, **asked):
