@@ -290,9 +290,8 @@ class ConstraintSolver:
             for index, target in enumerate(constraints.targets):
                 if target.time is not None:
                     field = f"targets/{index}/time"
-                    motion_question.check_rounded_range(
-                        field, target.time, 0.0, motion.duration, "s"
-                    )
+                    latest = motion.duration + target.slack
+                    motion_question.check_rounded_range(field, target.time, 0.0, latest, "s")
             aims = self._target_constraints(question, constraints.targets, motion)
             _check_duplicates(aims, corrector.reduced.frames - 1.0)
         except QueryError as error:

@@ -22,7 +22,7 @@ from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import motion_question
-from posefield.question.motion_question import MotionQuestion, Target
+from posefield.question.motion_question import ClipQuestion, MotionQuestion, Target
 from posefield.question.results import ConstraintResult, split_results
 from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
@@ -39,13 +39,14 @@ class JointTarget:
     """Target position of a joint.
 
     moment: rule that determines the moment. position: (3,), m. time: s, None for a moment without
-    one.
+    one. slack: by which it may lie behind the end, s, which a clip plays at its nearest frame.
     """
 
     name: str
     moment: Measure
     position: tuple[float, float, float]
     time: float | None
+    slack: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,13 @@ def from_question(
     Raises InvalidField for a control that is not measured on a motion, an unknown joint, an invalid
     position or time, and two targets for one joint at one moment.
     """
-    targets = tuple(_joint_target(card, i, target) for i, target in enumerate(question.targets))
+    slack = 0.0
+    if isinstance(question, ClipQuestion) and question.fps >= 1.0:
+        slack = 0.5 / question.fps
+    targets = tuple(
+        replace(_joint_target(card, i, target), slack=slack)
+        for i, target in enumerate(question.targets)
+    )
     _check_duplicates(question.targets, targets)
     targeted = {goal.moment for goal in targets if goal.time is None}
     has_names = question.exact not in ("auto", "none")

@@ -22,7 +22,7 @@ SCRIPT = {
         {"kind": "hold", "seconds": 1.0},
         {"kind": "walk", "model": "walk", "seconds": 2.0, "turn": 0.4},
     ],
-    "take": 4,
+    "take": 8,
     "fps": 60,
 }
 
