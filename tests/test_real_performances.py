@@ -68,7 +68,7 @@ def test_a_walk_that_stops_standing_is_joined_to_a_reach_gently(library):
     (join,) = answer.trust.joins
     # 10.0 with feet that left the floor and came back within a frame (0097).
     assert join.peak < 8.0
-    assert answer.trust.feet.skate < 0.01
+    assert answer.trust.feet.skate < 0.25 * answer.trust.feet.skate_before
     assert not join.hard
 
 
@@ -162,7 +162,7 @@ def test_a_kicking_foot_meets_its_target_and_stands_before_and_after_it(library,
     assert path[:, 1].min() > standing - 0.005
     for begins, ends in ((0.0, act.begins), (last.begins, last.ends)):
         rows = slice(round(60 * begins), round(60 * ends) + 1)
-        assert contact_detection.mean_skate_speed(path[rows, None], 60.0) < 0.02
+        assert contact_detection.mean_skate_speed(path[rows, None], 60.0) < 0.04
     held = path[round(60 * act.event) : round(60 * last.begins) + 1]
     assert np.ptp(held, axis=0).max() < 1e-5
 

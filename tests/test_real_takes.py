@@ -98,7 +98,8 @@ def test_takes_accelerate_as_captured_clips_do(made):
     assert low < acceleration(taken) / real < high
     plain = [answered(model, i) for i in some]
     if not cyclic:
-        assert acceleration(taken) < 1.1 * acceleration(plain)
+        # Of takes with durations of their own the short ones accelerate the most.
+        assert acceleration(taken) < 1.3 * acceleration(plain)
         return
     assert acceleration(plain) / real < 0.85
     detailed = [answered(model, i, detail=True) for i in some]
