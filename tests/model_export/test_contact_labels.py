@@ -100,7 +100,7 @@ def test_a_cell_that_is_no_intervals_is_refused(rail, cell):
 def newcomers():
     """Strides of a third walker, by their controls."""
     return {
-        (3.6 * speed, 1000.0 * turn): sample_walk.walk_stride(speed, turn, 0.08)
+        (3.6 * speed, 1000.0 * turn): sample_walk.walk_stride(speed, turn, 0.07)
         for speed, turn in ((0.8, -0.3), (1.1, 0.3), (1.4, 0.0))
     }
 

@@ -7,7 +7,7 @@ says at the samples.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.linalg import cho_solve, cholesky
@@ -40,7 +40,9 @@ class MarginalLikelihood:
     squares: Floats
     values: Floats
 
-    def negative(self, theta: Floats) -> tuple[float, Floats]:
+    def negative(
+        self, theta: Annotated[Floats, "parameters"]
+    ) -> tuple[float, Annotated[Floats, "parameters"]]:
         """Return minus the logarithm of the likelihood, and its slope.
 
         theta: logarithms of amplitude, length scales and noise, in the order of the kernel.
@@ -66,14 +68,17 @@ class MarginalLikelihood:
         slope = 0.5 * np.array([weighted.sum(), *lengths, noise * np.trace(inner)])
         return -likelihood, -slope
 
-    def signal(self, theta: Floats) -> SampleMatrix:
+    def signal(self, theta: Annotated[Floats, "parameters"]) -> SampleMatrix:
         """Return the covariances (n, n) without noise."""
         rates = np.exp(-2.0 * theta[1:-1])
         return np.asarray(np.exp(theta[0] - 0.5 * self.squares @ rates))
 
     def optimize(
-        self, unused: Callable[..., Any], start: Floats, bounds: Floats
-    ) -> tuple[Floats, float]:
+        self,
+        unused: Callable[..., Any],
+        start: Annotated[Floats, "parameters"],
+        bounds: Annotated[Floats, "parameters 2"],
+    ) -> tuple[Annotated[Floats, "parameters"], float]:
         """Return the best theta and its value; an optimizer of scikit-learn's regressor."""
         limits = [(float(low), float(high)) for low, high in bounds]
         best = minimize(self.negative, start, method="L-BFGS-B", jac=True, bounds=limits)

@@ -131,7 +131,7 @@ class _Grid:
         # Cells of one walk differ, so that none is counted twice.
         self._counts[cells] += np.uint8(change % 256)
 
-    def meetings(self, points: Points, first: int) -> Indices:
+    def meetings(self, points: Points, first: int) -> Annotated[Indices, "..."]:
         """Return the first steps (...) at which points (..., K) are near a character.
 
         first: step of the first point. The step after the last for points that are near none.

@@ -301,7 +301,9 @@ def _starts(spot: Annotated[Floats, "characters 2"]) -> Annotated[FloorVectors, 
     return (SPACING * rows + jitter[:, 0]) + 1j * (SPACING * columns + jitter[:, 1])
 
 
-def grid_cells(count: int) -> tuple[Indices, Indices]:
+def grid_cells(
+    count: int,
+) -> tuple[Annotated[Indices, "characters"], Annotated[Indices, "characters"]]:
     """Return the rows and columns (N,) of a grid that is numbered in growing squares."""
     number = np.arange(count)
     ring = np.sqrt(number).astype(np.int64)

@@ -265,7 +265,7 @@ def _unit(vectors: Vectors) -> Vectors:
     return units
 
 
-def rounded(numbers: Sequence[float] | Floats) -> Any:
+def rounded(numbers: Sequence[float] | Annotated[Floats, "..."]) -> Any:
     """Return numbers as cards store them."""
     # Adding zero takes the sign of a negative one away.
     return tuple(round(float(number), DECIMALS) + 0.0 for number in numbers)
