@@ -32,6 +32,7 @@ SOURCES = (
     "service/posefield/motion",
     "service/posefield/question",
     "service/posefield/rigs",
+    "service/posefield/robots",
     "service/posefield/roles",
     "tests/families",
     "tests/fixture_cache.py",
