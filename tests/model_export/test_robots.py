@@ -111,12 +111,22 @@ def test_an_order_of_joints_is_told_by_the_bodies_and_never_guessed(robot, tmp_p
     breadth = save(tmp_path, motion_of(robot), robot, "beyondmimic.npz")
     told = robot_formats.read(breadth, Conventions(robot)).evidence["joints"]
     assert told.startswith("breadth first: its bodies lie within")
+    stated = robot_formats.read(breadth, Conventions(robot, order="breadth"))
+    np.testing.assert_allclose(stated.angles, motion_of(robot).angles, atol=1e-12)
     assert "unknown" in robot_formats.read(breadth, Conventions()).evidence["joints"]
     with np.load(breadth) as fields:
         shuffled = {**fields, "joint_pos": fields["joint_pos"][:, ::-1]}
     np.savez(breadth, **shuffled)
     with pytest.raises(MotionFileError, match="in neither order"):
         robot_formats.read(breadth, Conventions(robot))
+
+
+def test_angles_in_degrees_are_read_as_such(robot, tmp_path):
+    motion = motion_of(robot)
+    degrees = replace(motion, angles=np.degrees(motion.angles))
+    path = save(tmp_path, degrees, robot, "qpos.csv")
+    read = robot_formats.read(path, Conventions(robot, rate=50.0, degrees=True))
+    np.testing.assert_allclose(read.angles, motion.angles, atol=1e-7)
 
 
 def test_quaternions_are_told_by_the_robot_that_stands_or_asked_for(robot, tmp_path):

@@ -146,7 +146,8 @@ def _convert(
 ) -> None:
     """Write the motions in another format, all or none of names that are free."""
     assert target.write is not None
-    paths = [folder / (Path(each.motion.source).stem + target.suffix) for each in diagnoses]
+    stems = [Path(diagnosis.motion.source).stem for diagnosis in diagnoses]
+    paths = [folder / (stem + target.suffix) for stem in stems]
     for path in paths:
         if path.exists() or paths.count(path) > 1:
             fault = "exists already" if path.exists() else "would be written twice"

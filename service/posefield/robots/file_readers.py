@@ -38,9 +38,7 @@ def from_tracking(file: File) -> RobotMotion:
     if file.conventions.order:
         name = "beyondmimic.npz" if file.conventions.order == "breadth" else "mjlab.npz"
     evidence = {"joints": told, "quaternions": WXYZ, "rate": rate_told}
-    return RobotMotion(
-        file.source, name, bodies[:, 0], turns, ordered, rate, evidence=evidence, bodies=bodies
-    )
+    return RobotMotion(file.source, name, bodies[:, 0], turns, ordered, rate, evidence=evidence)
 
 
 def _number(file: File, field: str) -> float | None:
@@ -49,15 +47,10 @@ def _number(file: File, field: str) -> float | None:
 
 def from_holosoma(file: File) -> RobotMotion:
     """Return the motion of MuJoCo's coordinates with names of joints and bodies."""
-    hinges, bodies = file.names("joint_names"), file.names("body_names")
+    hinges = file.names("joint_names")
     columns = file.array("joint_pos", None, 7 + len(hinges))
     rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {
-        "joints": NAMED,
-        "quaternions": WXYZ,
-        "rate": rate_told,
-    }
-    places = [place for place, name in enumerate(bodies) if name != "world"]
+    evidence = {"joints": NAMED, "quaternions": WXYZ, "rate": rate_told}
     return RobotMotion(
         file.source,
         "holosoma.npz",
@@ -67,7 +60,6 @@ def from_holosoma(file: File) -> RobotMotion:
         rate,
         hinges,
         evidence=evidence,
-        bodies=file.array("body_pos_w", len(columns), len(bodies), 3)[:, places],
     )
 
 
@@ -80,11 +72,7 @@ def from_isaaclab(file: File) -> RobotMotion:
     robot = file.conventions.robot
     base = bodies.index(robot.bodies[0]) if robot and robot.bodies[0] in bodies else 0
     rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {
-        "joints": NAMED,
-        "quaternions": WXYZ,
-        "rate": rate_told,
-    }
+    evidence = {"joints": NAMED, "quaternions": WXYZ, "rate": rate_told}
     return RobotMotion(
         file.source,
         "isaaclab.npz",
@@ -94,7 +82,6 @@ def from_isaaclab(file: File) -> RobotMotion:
         rate,
         hinges,
         evidence=evidence,
-        bodies=positions,
     )
 
 
@@ -117,11 +104,7 @@ def from_loco_joints(file: File) -> RobotMotion:
         path = path + robot.offsets[0]
     turns = np.stack([columns[name] for name in PELVIS[3:]], axis=-1)
     rate, rate_told = file.rate(None, " (LocoMuJoCo's first files have 500)")
-    evidence = {
-        "joints": NAMED,
-        "quaternions": "none: three angles",
-        "rate": rate_told,
-    }
+    evidence = {"joints": NAMED, "quaternions": "none: three angles", "rate": rate_told}
     return RobotMotion(
         file.source,
         "locomujoco.npz",
@@ -169,11 +152,7 @@ def from_gmr(file: File) -> RobotMotion:
     """Return the motion of a retargeter's pickle."""
     angles = file.array("dof_pos", None, None)
     rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {
-        "joints": UNNAMED,
-        "quaternions": XYZW,
-        "rate": rate_told,
-    }
+    evidence = {"joints": UNNAMED, "quaternions": XYZW, "rate": rate_told}
     rotations = wxyz(file.array("root_rot", len(angles), 4), "xyzw")
     path = file.array("root_pos", len(angles), 3)
     return RobotMotion(file.source, "gmr.pkl", path, rotations, angles, rate, evidence=evidence)
@@ -187,11 +166,7 @@ def from_mimickit(file: File) -> RobotMotion:
             f"found {frames.shape[1]} numbers a frame, expected 6 of the base and more"
         )
     rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {
-        "joints": UNNAMED,
-        "quaternions": "none: rotation vectors",
-        "rate": rate_told,
-    }
+    evidence = {"joints": UNNAMED, "quaternions": "none: rotation vectors", "rate": rate_told}
     return RobotMotion(
         file.source,
         "mimickit.pkl",
@@ -208,11 +183,7 @@ def from_asap(file: File) -> RobotMotion:
     """Return the motion of a pickle with the base's quaternions and joint angles."""
     angles = file.array("dof", None, None)
     rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {
-        "joints": UNNAMED,
-        "quaternions": XYZW,
-        "rate": rate_told,
-    }
+    evidence = {"joints": UNNAMED, "quaternions": XYZW, "rate": rate_told}
     path = file.array("root_trans_offset", len(angles), 3)
     rotations = wxyz(file.array("root_rot", len(angles), 4), "xyzw")
     return RobotMotion(file.source, "asap.pkl", path, rotations, angles, rate, evidence=evidence)
@@ -244,11 +215,7 @@ def from_awd(file: File) -> RobotMotion:
             )
         parts[name] = rows[:, starts[name] : starts[name] + size]
     rate, rate_told = _frame_rate(file)
-    evidence = {
-        "joints": NAMED,
-        "quaternions": XYZW,
-        "rate": rate_told,
-    }
+    evidence = {"joints": NAMED, "quaternions": XYZW, "rate": rate_told}
     return RobotMotion(
         file.source,
         "awd.json",

@@ -3,7 +3,6 @@
 Files of robots, and this package, have Z up; a robot that faces straight ahead faces +X.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -125,9 +124,3 @@ def angular_velocities(rotations: Annotated[Floats, "frames *bodies 4"], rate: f
     steps = quat.log(quat.mul(rotations[1:], quat.conj(rotations[:-1]))) * rate
     # A frame has the mean of the steps before and after it.
     return np.concatenate([steps[:1], 0.5 * (steps[1:] + steps[:-1]), steps[-1:]])
-
-
-def index_names(names: Sequence[str], order: Sequence[str]) -> list[int]:
-    """Return the index in `names` of each name of `order`."""
-    places = {name: place for place, name in enumerate(names)}
-    return [places[name] for name in order]

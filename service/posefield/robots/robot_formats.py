@@ -144,7 +144,7 @@ FORMATS = (
 """Formats in the order in which they are tried; one without fields is told by its numbers."""
 
 
-WRITTEN = {each.name: each for each in FORMATS if each.write}
+WRITTEN = {form.name: form for form in FORMATS if form.write}
 
 
 def of_file(name: str) -> RobotFormat | None:

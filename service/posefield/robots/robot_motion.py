@@ -9,7 +9,7 @@ import numpy as np
 from posefield.common.errors import MotionFileError, did_you_mean
 from posefield.common.units import Floats, RootPath
 from posefield.motion import quat
-from posefield.robots.robot import BodyPositions, BodyRotations, HingeAngles, Robot, index_names
+from posefield.robots.robot import BodyPositions, BodyRotations, HingeAngles, Robot
 
 NORM_TOLERANCE = 1e-3
 """Deviation from a unit quaternion's norm that digits cut off explain."""
@@ -23,7 +23,7 @@ class RobotMotion:
     base_rotations (F, 4); angles (F, H), rad. rate: frames a second. hinges: names of the columns
     of angles; empty if the file has none and no robot was given. loops: whether the file says that
     the motion repeats; None if it says nothing. evidence: how each convention was known, by what
-    it is of. bodies: positions (F, B, 3), m, that the file gives of bodies.
+    it is of.
     """
 
     source: str
@@ -35,7 +35,6 @@ class RobotMotion:
     hinges: tuple[str, ...] = ()
     loops: bool | None = None
     evidence: Mapping[str, str] = field(default_factory=dict)
-    bodies: BodyPositions | None = None
 
     def __len__(self) -> int:
         return len(self.angles)
@@ -100,7 +99,7 @@ class RobotMotion:
                 f"joint {name!r} {where}{hint}: found {len(self.hinges)} joints, expected its "
                 f"{len(robot.hinges)}"
             )
-        angles = self.angles[:, index_names(self.hinges, robot.hinges)]
+        angles = self.angles[:, [self.hinges.index(name) for name in robot.hinges]]
         return replace(self, angles=angles, hinges=robot.hinges)
 
     def body_poses(self, robot: Robot) -> tuple[BodyPositions, BodyRotations]:
