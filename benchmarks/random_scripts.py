@@ -32,7 +32,7 @@ does not jump: feet of slow walkers land as suddenly as those of fast ones."""
 BEFORE, AFTER = 0.1, 0.6
 """Times before and after a join that belong to it, s."""
 DEEPEST = 0.0105
-"""How far a foot may be below the floor, m: twice by 5 mm, for its sole and in its stance."""
+"""Largest depth of a foot below the floor, m: a sole may sink by 5 mm, and a stance by 5 mm."""
 
 LED = 0.3
 """Time before and after a target for which a foot is led, s."""

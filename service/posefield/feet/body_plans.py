@@ -322,7 +322,7 @@ class _Bodies:
             reach = two_bone.firm_reach(self.poses, leg)
             if leg.tip != leg.lower:
                 distance = np.linalg.norm(hip - ball + arm, axis=-1)
-                # Rounding is no need.
+                # A micrometre of slack, so that rounding lifts no heel.
                 reach = two_bone.leg_chord(self.poses, leg, distance) + 1e-6
                 lifted = quat.rotate(heel_roll.heel_turns(hip - ball, arm, reach), arm)
                 # On a slope the pelvis sinks first.

@@ -32,7 +32,7 @@ MOST_CELLS = 1 << 28
 that it is too small for keep their walks.
 """
 START = 3
-"""Steps in which no character comes to the start of another."""
+"""Steps at the beginning in which the places where others start stay free."""
 FACTORS, SIDES = (1.0, 0.85, 1.15, 0.7, 1.3, 0.55, 1.5), (0.0, 0.5, -0.5, 1.0, -1.0)
 """Changes of the speed, and of turning as shares of what is left to the limits."""
 RAMP, HOLDS = 6, (6, 16)

@@ -35,7 +35,7 @@ def nearest(places):
 def test_fifty_walkers_do_not_walk_through_each_other(own, seed):
     plan = walking_crowd.plan_random(own, 50, 20.0, RATE, seed)
     assert nearest(plan.places) > 2.0 * collision_avoidance.RADIUS
-    # They still walk: nobody stands or turns in circles.
+    # Each walker still gets on: none stands or walks in circles.
     assert np.abs(plan.places[:, -1] - plan.places[:, 0]).min() > 5.0
     # Negative control: with the walkers of another crowd, which were planned without these.
     others = walking_crowd.plan_random(own, 50, 20.0, RATE, seed + 10)
