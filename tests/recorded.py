@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from posefield.inference.onnx_runtime import Graph
-from posefield.inference.session import Session
+from posefield.inference.session import Graph, Session
 
 Feed = dict[str, Any]
 

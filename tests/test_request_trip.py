@@ -32,11 +32,11 @@ REQUESTS = {
     "performance": ("POST", "/v1/performances.usdc", b"", json.dumps(SCRIPT).encode()),
 }
 CEILINGS = {
-    "plain clip": (38, 167, 13),
-    "standing feet": (65, 408, 43),
-    "pose": (23, 62, 5),
-    "crowd": (52, 412, 45),
-    "performance": (66, 478, 57),
+    "plain clip": (30, 163, 13),
+    "standing feet": (56, 407, 43),
+    "pose": (21, 61, 5),
+    "crowd": (50, 411, 45),
+    "performance": (63, 477, 57),
 }
 """Most modules, functions and classes of each request."""
 

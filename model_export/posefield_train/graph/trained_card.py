@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from posefield.common.units import Floats, Frames
-from posefield.kriging import typical_clip
+from posefield.kriging import support
 from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
 from posefield.model_file.model_card import (
     ACCELERATION_RATE,
@@ -322,7 +322,7 @@ def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
 def typical_controls(values: Floats) -> Floats:
     """Return the controls (d,) of the medoid of captured clips with controls (N, d)."""
     points = half_ranges(values, values.min(axis=0), values.max(axis=0))
-    return values[typical_clip.medoid(points)]
+    return values[support.medoid(points)]
 
 
 def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict[str, Any]:

@@ -56,11 +56,6 @@ MICROMETRES = 6
 machines whose last digits differ agree."""
 
 
-def round_micrometres(value: float) -> float:
-    """Return a number of an answer, such as a length, m, rounded to six decimals."""
-    return round(float(value), MICROMETRES)
-
-
 # Of any number of rotations and vectors, which broadcast.
 Scalars = Annotated[Floats, "*#batch"]
 Vectors = Annotated[Floats, "*#batch 3"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Floats, Gradients, ReducedMotions, Values, Variables
-from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
+from posefield.constraints.constrained_motion import CYCLE_VARIABLES, MotionVariables
 from posefield.motion import measures
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 

@@ -15,14 +15,13 @@ import numpy as np
 
 from posefield.common.units import Booleans, Floats, Indices, Values
 from posefield.constraints import constraint, reachability
-from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.constrained_motion import ConstrainedMotion, MotionVariables
 from posefield.constraints.constraint import (
     Constraint,
     StackedGradients,
     StackedValues,
     StackedVariables,
 )
-from posefield.constraints.motion_variables import MotionVariables
 from posefield.constraints.reachability import CorrectionTask, stacked_dot, stacked_solve
 from posefield.inference import reduced_motion
 from posefield.inference.reduced_motion import ReducedTensor, ResidualCovariance

@@ -16,9 +16,8 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, PointControls, PointLabels, PointValues, Values
 from posefield.common.value_cache import ValueCache
-from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.constrained_motion import CYCLE_VARIABLES, ConstrainedMotion
 from posefield.constraints.gauss_newton import LevelCorrector
-from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import reduced_motion
 from posefield.inference.session import Session
 from posefield.kriging import kriging_model, random_field

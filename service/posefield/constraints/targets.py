@@ -12,13 +12,16 @@ import numpy as np
 from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import Floats
 from posefield.constraints import take_variation
-from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.constrained_motion import (
+    CYCLE_VARIABLES,
+    ConstrainedMotion,
+    MotionVariables,
+)
 from posefield.constraints.constraint import TravelConstraint
 from posefield.constraints.gauss_newton import MISS_TOLERANCE, LevelCorrector
-from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
 from posefield.constraints.take_variation import TakeSettings
-from posefield.model_file import answer_bounds
-from posefield.model_file.answer_bounds import AnswerBounds
+from posefield.inference import session
+from posefield.inference.session import AnswerBounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import motion_question
@@ -113,7 +116,7 @@ def from_question(
             if has_names:
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
-        goal = answer_bounds.limit_control(control, validated.controls[control.name])
+        goal = session.limit_control(control, validated.controls[control.name])
         controls.append((control.name, measure, goal))
     return ConstraintSet(tuple(controls), targets, take_variation.settings(card, question))
 

@@ -16,13 +16,13 @@ from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Booleans, Floats, Frames
 from posefield.feet import ball_path, footsteps, heel_roll, limbs, stance_rows, two_bone
-from posefield.feet.footsteps import FeetPlan, Footsteps, PlanRequest
+from posefield.feet.footsteps import FeetPlan, Floors, Footsteps, PlanRequest
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import SUNK, UNEVEN, FootRows, Interval, Runs
 from posefield.locomotion import floor_plane
 from posefield.motion import quat
 from posefield.motion.contact_detection import FootContact
-from posefield.question.floor import LEVEL_FLOOR, Floor, Floors
+from posefield.question.motion_question import LEVEL_FLOOR, Floor
 
 # Rounds in which stances are shortened whose leg does not reach.
 ROUNDS = 4

@@ -13,12 +13,11 @@ from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import UP, Floats, Frames, RootPath, Rotations
 from posefield.feet import heel_roll, limbs, stance_rows, two_bone
-from posefield.feet.footsteps import FeetPlan, evaluate_by_kind
+from posefield.feet.footsteps import FeetPlan, Floors, evaluate_by_kind
 from posefield.feet.limbs import Limb, LimbPoses, Turns
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton
-from posefield.question.floor import Floors
 
 Points = Annotated[Floats, "frames 3"]
 FootPaths = Annotated[Floats, "frames feet 3"]

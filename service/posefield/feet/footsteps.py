@@ -12,6 +12,7 @@ from typing import Annotated, TypeVar
 
 import numpy as np
 
+from posefield.common.frame_groups import FrameGroups
 from posefield.common.units import (
     UP,
     Bones,
@@ -25,10 +26,10 @@ from posefield.common.units import (
 from posefield.feet import limbs, two_bone
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle, Interval
-from posefield.motion import skeleton
+from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.hinges import Hinge
-from posefield.question.floor import LEVEL_FLOOR, Floor
+from posefield.question.motion_question import LEVEL_FLOOR, Floor
 
 # A foot that is led to two places that are farther apart does not stand on both, m.
 SAME_PLACE = 1e-3
@@ -50,6 +51,38 @@ def evaluate_by_kind(
         indices = [index for index, other in enumerate(kinds) if other == kind]
         results |= zip(indices, evaluate([values[index] for index in indices]), strict=True)
     return [results[index] for index in range(len(values))]
+
+
+@dataclass(frozen=True)
+class Floors:
+    """Floors of several motions, whose frames (N,) lie one after another."""
+
+    floors: Sequence[Floor]
+    groups: FrameGroups
+
+    @property
+    def sloped(self) -> Annotated[Booleans, "frames"]:
+        """Return whether the floor of each frame (N,) has a slope."""
+        return np.array([not floor.is_level for floor in self.floors])[self.groups.group]
+
+    @property
+    def tilts(self) -> Annotated[Floats, "frames 4"]:
+        """Return the rotation from the vertical to the floor's normal at each frame (N, 4)."""
+        return np.array([floor.tilt for floor in self.floors])[self.groups.group]
+
+    def heights(self, points: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames"]:
+        """Return the heights (N,), m, of the floors below or above points (N, 3), m."""
+        if all(floor == LEVEL_FLOOR for floor in self.floors):
+            return np.zeros(len(points))
+        groups = zip(self.floors, self.groups.split(points), strict=True)
+        return np.concatenate([floor.heights(positions) for floor, positions in groups])
+
+    def tilted(self, vectors: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames 3"]:
+        """Return vectors (N, 3) turned as the floors are tilted; level floors turn none."""
+        if all(floor.is_level for floor in self.floors):
+            return vectors
+        turned = quat.rotate(self.tilts, vectors)
+        return np.where(self.sloped[:, None], turned, vectors)
 
 
 @dataclass(frozen=True)

@@ -81,20 +81,9 @@ _BUILD = prometheus.Gauge(
 _BUILD.labels(__version__).set(1)
 
 # Cached since labels() takes a lock and builds a tuple; there are some hundred label sets.
-_latency = lru_cache(None)(_LATENCY.labels)
-_bytes = lru_cache(None)(_BYTES.labels)
-_not_modified = lru_cache(None)(_NOT_MODIFIED.labels)
-
-
-def count_request(operation: str, form: str, status: int, seconds: float, size: int) -> None:
-    """Count a request.
-
-    form: format of the response, empty without a choice. seconds: duration. size: bytes sent.
-    """
-    _latency(operation, form, status).observe(seconds)
-    _bytes(operation, form).inc(size)
-    if status == 304:
-        _not_modified(operation, form).inc()
+latency = lru_cache(None)(_LATENCY.labels)
+sent_bytes = lru_cache(None)(_BYTES.labels)
+not_modified = lru_cache(None)(_NOT_MODIFIED.labels)
 
 
 def count_inference(rows: int) -> None:

@@ -236,7 +236,10 @@ def record(request: ServiceRequest) -> None:
     """Record a request in the metrics, the log and the trace."""
     duration = time.perf_counter() - request.start
     operation = request.route.operation.id if request.route else "none"
-    metrics.count_request(operation, request.format, request.status, duration, request.size)
+    metrics.latency(operation, request.format, request.status).observe(duration)
+    metrics.sent_bytes(operation, request.format).inc(request.size)
+    if request.status == 304:
+        metrics.not_modified(operation, request.format).inc()
     if request.service.log is not None:
         request.service.log.add(_log_line(request, operation, duration))
 

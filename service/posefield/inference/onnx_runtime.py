@@ -1,19 +1,13 @@
-"""Sessions of onnxruntime, each on one thread of the CPU, and on parts of a model's graph.
+"""Sessions of onnxruntime, each on one thread of the CPU, and checks of their answers."""
 
-onnxruntime computes whatever a session holds, asked for or not, so that each set of values that
-the program asks for has a session of its own, opened at first use. The sets are those of the
-program's calls, never of a request.
-"""
-
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Protocol
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 import numpy as np
 import onnxruntime
 
 from posefield.common.errors import ModelError
 from posefield.common.units import Floats, Singles
-from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
 
 
@@ -38,51 +32,6 @@ def open_session(content: bytes, source: str) -> Any:
 def first_line(fault: Exception) -> str:
     """Return the first line of an exception's message, or its class where it has none."""
     return next(iter(str(fault).strip().splitlines()), type(fault).__name__)
-
-
-Feed = Mapping[str, Singles]
-"""Inputs of a graph by name."""
-
-
-class Graph(Protocol):
-    """A model's graph, of which any values can be asked for."""
-
-    def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
-        """Return float32 values of the graph, by name, at a level of detail.
-
-        feed: inputs; those that the values do not depend on are ignored.
-        """
-        ...
-
-
-class GraphParts:
-    """Sessions on parts of one file's graph.
-
-    Two threads that need a part at the same time each open a session; one of them is kept.
-    """
-
-    def __init__(self, content: bytes, source: str) -> None:
-        """Take a checked file; source: its name in errors."""
-        self._content, self._source = content, source
-        self._parts: dict[tuple[tuple[str, ...], int], tuple[Any, tuple[str, ...]]] = {}
-
-    def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
-        """Return values as `Graph.run` does."""
-        key = tuple(values), level
-        graph_part = self._parts.get(key)
-        if graph_part is None:
-            graph_part = self._parts[key] = self._open(*key)
-        session, names = graph_part
-        outputs: list[Any] = session.run(key[0], {n: feed[n] for n in names if n in feed})
-        return outputs
-
-    def _open(self, values: tuple[str, ...], level: int) -> tuple[Any, tuple[str, ...]]:
-        """Return an onnxruntime session and the inputs that it has."""
-        content = onnx_file.select_outputs(onnx_file.fix_level(self._content, level), *values)
-        session = open_session(content, self._source)
-        # Inputs with a default are not among the others.
-        ports = [*session.get_inputs(), *session.get_overridable_initializers()]
-        return session, tuple(port.name for port in ports)
 
 
 TRIED_CLIPS, TRIED_TIMES = 16, 5

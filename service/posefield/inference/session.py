@@ -1,23 +1,126 @@
-"""A checked model file opened in onnxruntime."""
+"""A checked model file opened in onnxruntime, whose answers are bounded outside the sampled ranges.
 
-from collections.abc import Sequence
+Trends of the model are not followed without end: a control acts as if it were at most a quarter of
+its range outside the sampled one, and a clip is at most a quarter shorter or longer than the
+captured ones. Within the sampled ranges nothing is bounded.
+
+onnxruntime computes whatever a session holds, asked for or not, so that each set of values that
+the program asks for has a session of its own, opened at first use. The sets are those of the
+program's calls, never of a request.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol, TypeVar
 
 import numpy as np
 
-from posefield.common.units import Bones, Floats, Frames, Indices, PointControls, Singles, Vector
+from posefield.common.units import (
+    Bones,
+    Booleans,
+    Floats,
+    Frames,
+    Indices,
+    PointControls,
+    Singles,
+    Vector,
+)
 from posefield.inference import onnx_runtime
-from posefield.inference.onnx_runtime import CONTACTS, LABELS, Graph, GraphParts
+from posefield.inference.onnx_runtime import CONTACTS, LABELS
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
-from posefield.model_file import checked_file
-from posefield.model_file.answer_bounds import AnswerBounds
-from posefield.model_file.model_card import ROW_VALUES, ModelCard, shape_rows
+from posefield.model_file import checked_file, onnx_file
+from posefield.model_file.model_card import ROW_VALUES, Control, ModelCard, shape_rows
+
+MARGIN = 0.25
+"""Margin of controls, as a share of the sampled range, and of durations, as a share of the captured
+ones. Measured on three families of captured motion and the procedural one: up to 0.15 of the range
+outside the samples, supported answers last 0.93 times the shortest to 1.25 times the longest
+captured clip; paths of walking crowds need controls up to 0.2 of a range outside.
+"""
+SLACK = 1e-6
+"""Share of the range that a control inside it may lie outside by rounding."""
+
+Bound = TypeVar("Bound", float, Floats)
+
+
+@dataclass(frozen=True)
+class AnswerBounds:
+    """Bounds of a model's answers.
+
+    low, high (d,): sampled range of each control. durations: shortest and longest captured clip, s.
+    """
+
+    low: Floats
+    high: Floats
+    durations: tuple[float, float]
+
+    @cached_property
+    def _inside(self) -> tuple[Floats, Floats]:
+        slack = SLACK * (self.high - self.low)
+        return self.low - slack, self.high + slack
+
+    @cached_property
+    def limits(self) -> tuple[Floats, Floats]:
+        """Smallest and largest value (d,) at which each control acts."""
+        return _with_margin(self.low, self.high)
+
+    @property
+    def duration_limits(self) -> tuple[float, float]:
+        """Smallest and largest duration, s, of an answer outside the sampled ranges.
+
+        The duration at the nearest controls inside the ranges is never outside the limits.
+        """
+        return self.durations[0] * (1.0 - MARGIN), self.durations[1] * (1.0 + MARGIN)
+
+    def is_inside(self, controls: Floats | Singles) -> bool:
+        """Return whether all controls (B, d) lie within the sampled ranges."""
+        low, high = self._inside
+        return bool(((controls >= low) & (controls <= high)).all())
+
+    def outside(self, controls: Floats | Singles) -> Booleans:
+        """Return whether a control of each row (B, d) lies outside its sampled range, (B,)."""
+        low, high = self._inside
+        return np.asarray(((controls < low) | (controls > high)).any(axis=1))
+
+    def limit(self, controls: Floats | Singles) -> Floats | Singles:
+        """Return the controls (B, d) at which the answer is computed; inside the limits the same.
+
+        Keeps the type of the numbers.
+        """
+        low, high = (limit.astype(controls.dtype) for limit in self.limits)
+        return np.asarray(np.clip(controls, low, high))
+
+    def nearest_sampled(self, controls: Floats | Singles) -> Floats:
+        """Return the nearest controls (B, d) inside the sampled ranges."""
+        return np.clip(controls.astype(np.float64), self.low, self.high)
+
+    def limit_durations(self, durations: Singles, nearest: Singles) -> Singles:
+        """Return durations (B,), s, limited to the margin about the captured ones.
+
+        nearest (B,): durations at the nearest controls inside the sampled ranges, which may lie
+        further out where a combination of controls was never captured.
+        """
+        shortest, longest = np.array(self.duration_limits, durations.dtype)
+        low, high = np.minimum(shortest, nearest), np.maximum(longest, nearest)
+        return np.clip(durations, low, high)
+
+
+def limit_control(control: Control, value: float) -> float:
+    """Return the value at which a control acts: at most the margin outside its sampled range."""
+    low, high = _with_margin(control.minimum, control.maximum)
+    return min(max(value, low), high)
+
+
+def _with_margin(low: Bound, high: Bound) -> tuple[Bound, Bound]:
+    """Return the limits that lie the margin outside sampled ranges."""
+    room = MARGIN * (high - low)
+    return low - room, high + room
+
 
 # Estimate of memory, by the shipped models: each level has up to six sessions, one for each set of
 # values that is asked for, and a session takes four to five times the file.
@@ -40,6 +143,51 @@ class PredictionState:
     duration: float
     sigma: float
     asked_sigma: float
+
+
+Feed = Mapping[str, Singles]
+"""Inputs of a graph by name."""
+
+
+class Graph(Protocol):
+    """A model's graph, of which any values can be asked for."""
+
+    def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
+        """Return float32 values of the graph, by name, at a level of detail.
+
+        feed: inputs; those that the values do not depend on are ignored.
+        """
+        ...
+
+
+class GraphParts:
+    """Sessions on parts of one file's graph.
+
+    Two threads that need a part at the same time each open a session; one of them is kept.
+    """
+
+    def __init__(self, content: bytes, source: str) -> None:
+        """Take a checked file; source: its name in errors."""
+        self._content, self._source = content, source
+        self._parts: dict[tuple[tuple[str, ...], int], tuple[Any, tuple[str, ...]]] = {}
+
+    def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
+        """Return values as `Graph.run` does."""
+        key = tuple(values), level
+        graph_part = self._parts.get(key)
+        if graph_part is None:
+            graph_part = self._parts[key] = self._open(*key)
+        session, names = graph_part
+        outputs: list[Any] = session.run(key[0], {n: feed[n] for n in names if n in feed})
+        return outputs
+
+    def _open(self, values: tuple[str, ...], level: int) -> tuple[Any, tuple[str, ...]]:
+        """Return an onnxruntime session and the inputs that it has."""
+        content = onnx_file.select_outputs(onnx_file.fix_level(self._content, level), *values)
+        session = onnx_runtime.open_session(content, self._source)
+        # Inputs with a default are not among the others.
+        ports = [*session.get_inputs(), *session.get_overridable_initializers()]
+        return session, tuple(port.name for port in ports)
 
 
 @dataclass(frozen=True)
@@ -71,7 +219,7 @@ class Session:
         coefficients, canonical frames and the travel of a cycle. times: None for values that do not
         depend on it, as "duration" and "sigma". labels (B or 1, p): weights of the names of all
         label sets; all sets are left open if None. level: level of detail. Outside the sampled
-        ranges, answers are bounded (`answer_bounds`), but sigma is that of the controls as asked.
+        ranges, answers are bounded (`AnswerBounds`), but sigma is that of the controls as asked.
         Raises ValueError for the contacts of a model without them.
         """
         if CONTACTS in values and not self.card.contacts:

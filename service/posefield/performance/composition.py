@@ -11,7 +11,7 @@ import orjson
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Frames, RootPath, Rotations, round_micrometres
+from posefield.common.units import Floats, Frames, RootPath, Rotations
 from posefield.constraints.gauss_newton import MISS_TOLERANCE
 from posefield.feet import body_plans, foot_placement
 from posefield.feet.footsteps import FeetPlan, PlanRequest
@@ -36,9 +36,9 @@ from posefield.question.performance_report import (
     ScriptWarning,
     SegmentReport,
 )
-from posefield.question.results import ConstraintResult, FeetResult
-from posefield.synthesis import event_frames, standing_feet
-from posefield.synthesis.event_frames import Playback
+from posefield.question.results import ConstraintResult, FeetResult, round_micrometres
+from posefield.synthesis import clip_draft, standing_feet
+from posefield.synthesis.clip_draft import Playback
 
 
 def plan(script: Script, frame_limit: int) -> PerformanceReport:
@@ -198,7 +198,7 @@ def plan_frames(timeline: Timeline, fps: float, limit: int) -> Playback:
     marks = [target.begin for target in timeline.targets]
     marks += [span.event for span in timeline.spans if span.event is not None]
     moments = [(mark - timeline.begin) / RATE for mark in marks]
-    played = event_frames.playback(fps, 0.0, seconds, moments)
+    played = clip_draft.playback(fps, 0.0, seconds, moments)
     if (count := len(played.times(played.duration))) > limit:
         raise InvalidField(
             "segments", f"{count} frames at {fps:g} a second, expected at most {limit}"
@@ -233,7 +233,7 @@ def _at_times(
     motion: at `RATE`, with placed feet. Times between its frames have feet placed anew.
     """
     step = round(RATE / fps)
-    if np.abs(times * RATE - step * np.arange(len(times))).max() < event_frames.ROUNDING:
+    if np.abs(times * RATE - step * np.arange(len(times))).max() < clip_draft.ROUNDING:
         rows = slice(0, step * len(times), step)
         return motion.rotations[rows], motion.roots[rows]
     predicted = timeline.performed

@@ -5,13 +5,14 @@ import re
 from typing import Annotated, Literal, cast
 
 import msgspec
+import numpy as np
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from posefield.common.bounded_types import Whole
 from posefield.common.errors import InvalidField
-from posefield.common.units import LengthUnit, UpAxis
+from posefield.common.units import UP, Floats, LengthUnit, UpAxis
+from posefield.motion import quat
 from posefield.motion.joint_roles import NamingConvention
-from posefield.question.floor import Floor, at_height
 
 BodyKind = Literal["none", "mannequin", "bones"]
 DEFAULT_BODY: BodyKind = "mannequin"
@@ -34,6 +35,51 @@ RootMode = Literal["travelling", "in_place"]
 FileRoot = Literal["travelling", "in_place", "bone"]
 """Root of a clip; "bone" is a joint of its own, on the floor above the hips."""
 FeetMode = Literal["stand", "as_predicted"]
+
+
+class Floor(Struct, frozen=True, forbid_unknown_fields=True):
+    """Plane over x and z in the frame of a clip.
+
+    height: at the origin, m. slope_x, slope_z: rise for each metre along the axes.
+    """
+
+    height: float
+    slope_x: float
+    slope_z: float
+
+    @property
+    def is_level(self) -> bool:
+        """Return whether the floor has no slope."""
+        return self.slope_x == self.slope_z == 0.0
+
+    @property
+    def slope(self) -> float:
+        """Return the rise for each metre in the steepest direction."""
+        return float(np.hypot(self.slope_x, self.slope_z))
+
+    @property
+    def tilt(self) -> Annotated[Floats, "4"]:
+        """Return the rotation by the smallest angle from the vertical to the floor's normal."""
+        normal = np.array([-self.slope_x, 1.0, -self.slope_z])
+        normal /= np.linalg.norm(normal)
+        turn = np.concatenate([[1.0 + normal @ UP], np.cross(UP, normal)])
+        rotation: Floats = turn / np.linalg.norm(turn)
+        return rotation
+
+    def heights(self, points: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:
+        """Return the heights (...), m, of the floor below or above points (..., 3), m."""
+        heights: Floats = (
+            self.height + self.slope_x * points[..., 0] + self.slope_z * points[..., 2]
+        )
+        return heights
+
+    def tilted(self, vectors: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch 3"]:
+        """Return vectors (..., 3) turned as the floor is tilted."""
+        return quat.rotate(np.broadcast_to(self.tilt, (*vectors.shape[:-1], 4)), vectors)
+
+
+LEVEL_FLOOR = Floor(0.0, 0.0, 0.0)
+"""Floor at height 0, on which motions are captured."""
 FloorValue = float | Floor
 """Floor as a height, m, or as a plane."""
 Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
@@ -224,7 +270,7 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     @property
     def ground(self) -> Floor:
         """Return the floor as a plane."""
-        return self.floor if isinstance(self.floor, Floor) else at_height(self.floor)
+        return self.floor if isinstance(self.floor, Floor) else Floor(self.floor, 0.0, 0.0)
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):

@@ -9,11 +9,10 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from posefield.common.units import Booleans, Floats, Singles
+from posefield.common.units import MICROMETRES, Booleans, Floats, Singles
 from posefield.model_file.model_card import Control
 from posefield.motion.clip import Clip
-from posefield.question.floor import Floor
-from posefield.question.motion_question import LabelValue
+from posefield.question.motion_question import Floor, LabelValue
 
 Number = TypeVar("Number", bound=np.floating[Any])
 
@@ -32,6 +31,11 @@ it lie answers of that family and of a deposit on the floor for an unnamed perfo
 def band(sigma: float) -> Band:
     """Return the band of sigma, m."""
     return next((name for name, largest in BANDS if sigma <= largest), "guess")
+
+
+def round_micrometres(value: float) -> float:
+    """Return a number of an answer, such as a length, m, rounded to six decimals."""
+    return round(float(value), MICROMETRES)
 
 
 @dataclass(frozen=True)

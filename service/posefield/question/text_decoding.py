@@ -25,9 +25,9 @@ from typing import (
 from msgspec import NODEFAULT, Meta, Struct, structs
 
 from posefield.common.errors import FormError, did_you_mean
-from posefield.question.floor import Floor
 from posefield.question.motion_question import (
     ExactControls,
+    Floor,
     FloorValue,
     LabelValue,
     Moment,

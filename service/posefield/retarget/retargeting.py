@@ -7,12 +7,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Booleans, Floats, Frames, RootPath, Vector, round_micrometres
+from posefield.common.units import UP, Booleans, Floats, Frames, RootPath, Vector
 from posefield.feet.two_bone import shortest_turn
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
-from posefield.question.results import StanceResult
+from posefield.question.results import StanceResult, round_micrometres
 from posefield.retarget import copied_pose, planted_legs, role_map
 from posefield.retarget.copied_pose import FLOOR, Soles
 from posefield.retarget.planted_legs import SourceFeet

@@ -1,23 +1,46 @@
-"""Drafts of clips: what is known of each before and during its synthesis, and its validation."""
+"""Drafts of clips: their validation, the times of their frames, and the trust of these.
 
+Frames are played at a constant rate. A moment of an event or a target between two of them would be
+seen in neither, so the motion is played up to half a frame earlier or later there, and eases from
+one such moment to the next: at each, and at its ends, it has its own speed.
+"""
+
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
+from msgspec import structs
 
 from posefield.common.errors import InvalidField, QueryError
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Frames
 from posefield.constraints.constrained_motion import ConstrainedMotion
-from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
+from posefield.constraints.gauss_newton import MISS_TOLERANCE
+from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTarget
 from posefield.feet.stance_rows import Cycle
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
+from posefield.motion import skeleton
+from posefield.motion.quat import smoothstep
 from posefield.motion.skeleton import Skeleton
 from posefield.question import motion_question
-from posefield.question.floor import LEVEL_FLOOR, Floor
-from posefield.question.motion_question import ClipQuestion, check_number, check_range
-from posefield.question.results import PoseAnswer
-from posefield.synthesis import event_frames
+from posefield.question.motion_question import (
+    LEVEL_FLOOR,
+    ClipQuestion,
+    Floor,
+    check_number,
+    check_range,
+)
+from posefield.question.results import (
+    ConstraintResult,
+    FeetResult,
+    PoseAnswer,
+    Trust,
+    round_micrometres,
+    split_results,
+)
+from posefield.synthesis import synthesizer
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
@@ -65,17 +88,18 @@ class ClipDraft:
 
         Raises InvalidField and OutsideSamples as `clips.synthesize_clip` does.
         """
-        question = self.question
+        question, card = self.question, model.session.card
         self.rate = check_number("fps", question.fps)
         check_range("fps", self.rate, *FPS_RANGE, "frames a second")
         self.validated = model.question(question)
-        if question.loop and not model.session.card.cyclic:
+        if question.loop and not card.cyclic:
             raise InvalidField(
                 "loop", "true, expected false: this model's last pose does not lead into its first"
             )
-        self.skeleton = model.skeleton(question.names)
+        own_names = question.names == "own"
+        self.skeleton = card.skeleton if own_names else model.skeleton(question.names)
         self.constraints = model.constraints(self.validated, question)
-        self.stands = wants_standing_feet(model.session.card, question)
+        self.stands = wants_standing_feet(card, question)
 
     def set_times(self, model: Synthesizer, duration: float) -> None:
         """Set the times of the frames of a clip that lasts `duration` seconds.
@@ -91,10 +115,10 @@ class ClipDraft:
             self.times, frames = np.arange(steps) * duration / steps, steps + 1
             inner = [time for time in moments if 0 < round(time * steps / duration) < steps]
             if inner:
-                played = event_frames.playback(steps / duration, 0.0, duration, inner)
+                played = playback(steps / duration, 0.0, duration, inner)
                 self.times = played.times(float(self.times[-1]))
         else:
-            played = event_frames.playback(rate, self._start(duration), duration, moments)
+            played = playback(rate, self._start(duration), duration, moments)
             if moments:
                 self.duration = played.duration
             # Clients read the duration of the motion from poses, as it is played from clips, and
@@ -189,7 +213,7 @@ def wants_standing_feet(card: ModelCard, question: ClipQuestion) -> bool:
         stands = bool(travels and card.feet and card.contacts)
     else:
         stands = question.feet == "stand"
-    if question.ground != LEVEL_FLOOR:
+    if question.floor != 0.0 and question.ground != LEVEL_FLOOR:
         _check_floor(question, stands)
     return stands
 
@@ -220,3 +244,130 @@ def _check_floor(question: ClipQuestion, stands: bool) -> None:
             "floor",
             f"with a slope and {name}, expected a level floor: what climbs ends at another height",
         )
+
+
+# Tolerance for the rounding of products of times and rates, in frames.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Playback:
+    """Times of a motion over the times at which it is played.
+
+    rate: frames a second. start: time of a frame, s. knots: of moments on frames and of the ends
+    (K,), in frames from the start. shifts: by which these are later in the motion (K,), s.
+    """
+
+    rate: float
+    start: float
+    knots: Annotated[Floats, "knots"]
+    shifts: Annotated[Floats, "knots"]
+
+    @property
+    def duration(self) -> float:
+        """Time at which the end of the motion is played, s."""
+        return self.start + float(self.knots[-1]) / self.rate
+
+    def times(self, last: float) -> Frames:
+        """Return the times (F,) in the motion, s, of the frames from the start until `last`, s."""
+        frames = np.arange(math.floor((last - self.start) * self.rate + ROUNDING) + 1)
+        after = np.clip(np.searchsorted(self.knots, frames), 1, len(self.knots) - 1)
+        length = self.knots[after] - self.knots[after - 1]
+        share = smoothstep(np.clip((frames - self.knots[after - 1]) / length, 0.0, 1.0))
+        before, step = self.shifts[after - 1], self.shifts[after] - self.shifts[after - 1]
+        # At a knot the sum with its share of one would round.
+        shifts = np.where(frames == self.knots[after], self.shifts[after], before + share * step)
+        return np.asarray(self.start + frames / self.rate + shifts)
+
+    def stretch(self, times: Frames) -> float:
+        """Return the largest distance of times (F,) of frames from when they are played, s."""
+        frames = np.arange(len(times)) / self.rate
+        return round_micrometres(np.abs(self.start + frames - times).max())
+
+
+def playback(rate: float, start: float, duration: float, moments: Sequence[float]) -> Playback:
+    """Return the playback of a motion with a frame at `start`, s, in which moments have frames.
+
+    rate: frames a second. duration: of the motion, s. moments: s; of two with the same nearest
+    frame the first has it, and one whose nearest frame is before the motion has none.
+    """
+    begin, end = -start * rate, (duration - start) * rate
+    shifts = {}
+    for moment in reversed(moments):
+        frame = round((moment - start) * rate)
+        if frame >= begin - ROUNDING:
+            shifts[float(frame)] = moment - start - frame / rate
+    if not any(abs(knot - begin) < ROUNDING for knot in shifts):
+        shifts[begin] = 0.0
+    # The end plays at its own time, unless it is a moment or one before it has the last frame.
+    if len(shifts) == 1 or (duration not in moments and max(shifts) < end - ROUNDING):
+        shifts[end] = 0.0
+    knots, sizes = zip(*sorted(shifts.items()), strict=True)
+    return Playback(rate, start, np.array(knots), np.array(sizes))
+
+
+def of_frames(model: Synthesizer, draft: ClipDraft) -> Trust:
+    """Return the trust of a draft's answer, whose root still travels, as its frames show it."""
+    trust = draft.answer.trust
+    if draft.target_times:
+        trust = _with_targets(model, draft, trust)
+    shifts = draft.shifts
+    if draft.question.loop:
+        # It is played in whole steps; the duration of its trust is the motion's.
+        stretch = max(np.abs(shifts).max(), abs(len(shifts) / draft.rate - trust.duration))
+        return structs.replace(trust, stretch=round_micrometres(stretch) or None)
+    stretch = round_micrometres(np.abs(shifts).max())
+    if not stretch and abs(draft.duration - trust.duration) * draft.rate < ROUNDING:
+        return trust
+    feet = trust.feet and _at_frames(draft, trust.feet)
+    return structs.replace(trust, duration=draft.duration, stretch=stretch or None, feet=feet)
+
+
+def _at_frames(draft: ClipDraft, feet: FeetResult) -> FeetResult:
+    """Return feet with the times of their stances in the clip instead of in the motion."""
+
+    def played(time: float) -> float:
+        return round_micrometres(time + np.interp(time, draft.times, draft.shifts))
+
+    stances = tuple(
+        replace(stance, begin=played(stance.begin), end=played(stance.end))
+        for stance in feet.stances
+    )
+    return structs.replace(feet, stances=stances)
+
+
+def _with_targets(model: Synthesizer, draft: ClipDraft, trust: Trust) -> Trust:
+    """Return the trust with the misses of targets in the frames nearest to their moments.
+
+    A target at a moment without a frame, before or after those of the clip, has its miss in the
+    motion.
+    """
+    answer, targets = draft.answer, draft.constraints.targets if draft.constraints else ()
+    controls, solved = split_results(trust.targets, len(targets))
+    gaps = np.abs(np.subtract.outer(draft.target_times, draft.times))
+    frames = gaps.argmin(axis=1)
+    positions = skeleton.positions(
+        model.session.card.skeleton.parents,
+        answer.rotations[frames],
+        skeleton.translations(answer.bone_offsets, answer.root_position[frames]),
+    )
+    shown = tuple(
+        result if gap * draft.rate > 0.5 + ROUNDING else _result(target, result, pose)
+        for target, result, gap, pose in zip(
+            targets, solved, gaps.min(axis=1), positions, strict=True
+        )
+    )
+    misses = synthesizer.miss_warnings(solved)
+    warnings = [sentence for sentence in trust.warnings if sentence not in misses]
+    if draft.question.extrapolate != "ok":
+        warnings += synthesizer.miss_warnings(shown)
+    return structs.replace(trust, targets=(*controls, *shown), warnings=tuple(warnings))
+
+
+def _result(
+    target: JointTarget, solved: ConstraintResult, pose: Annotated[Floats, "joints 3"]
+) -> ConstraintResult:
+    """Return the result of a target in a frame with joints at positions (J, 3), m."""
+    away = pose[list(target.moment.joints)].mean(axis=0) - target.position
+    miss = float(np.linalg.norm(away))
+    return replace(solved, miss=miss, reached=miss <= MISS_TOLERANCE)

@@ -22,7 +22,7 @@ from posefield.motion.clip import assemble
 from posefield.motion.curves import CurveValues
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
-from posefield.synthesis import clip_draft, frame_trust, poses, standing_feet
+from posefield.synthesis import clip_draft, poses, standing_feet
 from posefield.synthesis.clip_draft import ClipDraft
 from posefield.synthesis.poses import MAX_POSES, OutputRow
 from posefield.synthesis.synthesizer import Synthesizer, check_targets
@@ -35,7 +35,7 @@ def synthesize_clip(
 ) -> ClipAnswer:
     """Return the clip of a question; frame i is the pose at start + i / fps.
 
-    Targets, events and ends have frames, at most half a step beside (`event_frames`). The N steps
+    Targets, events and ends have frames, at most half a step beside (`clip_draft`). The N steps
     of a loop share the duration evenly, but are played at fps. Raises as `poses.synthesize_poses`
     does, and InvalidField for a loop of a model that is not cyclic, for joint names without roles
     and for more frames than the limit.
@@ -176,7 +176,7 @@ def _set_strides(model: Synthesizer, draft: ClipDraft, duration: float) -> None:
 
 def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer:
     question, answer = draft.question, draft.answer
-    trust = frame_trust.of_frames(model, draft)
+    trust = clip_draft.of_frames(model, draft)
     if draft.strides is not None:
         in_place = question.root == "in_place" and model.session.card.root == "travelling"
         if in_place:

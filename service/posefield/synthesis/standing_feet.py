@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from msgspec import structs
 
-from posefield.common.units import UP, Floats, round_micrometres
+from posefield.common.units import UP, Floats
 from posefield.constraints.targets import ConstraintSet
 from posefield.feet import body_plans, foot_placement, footsteps, limbs
 from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest
@@ -19,8 +19,8 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion import contact_detection, measures
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.measures import MeasuredMotion
-from posefield.question.floor import LEVEL_FLOOR, Floor
-from posefield.question.results import FeetResult, StanceResult
+from posefield.question.motion_question import LEVEL_FLOOR, Floor
+from posefield.question.results import FeetResult, StanceResult, round_micrometres
 from posefield.synthesis.clip_draft import ClipDraft
 from posefield.synthesis.synthesizer import Synthesizer
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import Booleans, Floats, Indices, Singles
+from posefield.inference import session
 from posefield.inference.level_selection import MAX_COORDINATE, LevelCriteria
 from posefield.kriging import random_field
 from posefield.kriging.support import Support
-from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import PERFORMER, Control, ModelCard
 from posefield.motion.clip import Placement
 from posefield.question.motion_question import MAX_TAKE, ExtrapolationPolicy, LabelValue, RootMode
@@ -239,7 +239,7 @@ def _range_warning(question: CrowdQuestion, control: Control, values: Floats) ->
 def _limited_part(control: Control, values: Floats) -> str:
     """Return the part of a warning that tells at which value the farthest values act."""
     extremes = float(values.min()), float(values.max())
-    acting = [answer_bounds.limit_control(control, value) for value in extremes]
+    acting = [session.limit_control(control, value) for value in extremes]
     limited = [
         f"{acting_value:.4g}"
         for acting_value, value in zip(acting, extremes, strict=True)

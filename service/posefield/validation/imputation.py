@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Booleans, Floats
-from posefield.kriging import kriging_model, typical_clip
-from posefield.kriging.typical_clip import NEAR, Neighbourhood
-from posefield.model_file import answer_bounds
+from posefield.inference import session
+from posefield.kriging import kriging_model, support
+from posefield.kriging.support import NEAR, Neighbourhood
 from posefield.model_file.model_card import Control, ModelCard
 
 OTHER_LABEL = 4.0
@@ -86,7 +86,7 @@ class ControlImputer:
         weights of names, whose own clips come first; all zero in label sets that are left open.
         """
         open_ = self._open(controls)
-        row = typical_clip.typical_row(self._scaled[:, open_], self._costs(controls, labels))
+        row = support.typical_row(self._scaled[:, open_], self._costs(controls, labels))
         return self._complete(controls, self._examples[row])
 
     def near_measures(
@@ -100,7 +100,7 @@ class ControlImputer:
         deviation[deviation == 0.0] = 1.0
         away = (measures - targets) / (NEAR * deviation)
         costs = self._costs(controls, labels) + np.sum(np.square(away), axis=1)
-        row = typical_clip.typical_row(self._scaled[:, open_], costs)
+        row = support.typical_row(self._scaled[:, open_], costs)
         near = np.sum(np.square(self._scaled - self._scaled[row])[:, open_], axis=1) / REACH**2
         samples = np.hstack([self._examples, self._labels, measures])
         values = {i: controls[c.name] for i, c in enumerate(self._controls) if c.name in controls}
@@ -118,7 +118,7 @@ class ControlImputer:
             values | label_values,
             open_,
             (self._low[open_], self._high[open_]),
-            typical_clip.neighbourhood(self._scaled[:, open_]),
+            support.neighbourhood(self._scaled[:, open_]),
         )
 
     def _open(self, controls: Mapping[str, float]) -> Booleans:
@@ -132,7 +132,7 @@ class ControlImputer:
         indices = [i for i, control in enumerate(self._controls) if control.name in controls]
         acting = np.array(
             [
-                answer_bounds.limit_control(self._controls[i], controls[self._controls[i].name])
+                session.limit_control(self._controls[i], controls[self._controls[i].name])
                 for i in indices
             ]
         )

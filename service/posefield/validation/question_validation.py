@@ -12,8 +12,8 @@ import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples, did_you_mean, similar_name
 from posefield.common.units import Floats
+from posefield.inference import session
 from posefield.kriging import support
-from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
 from posefield.question import motion_question
 from posefield.question.motion_question import (
@@ -313,7 +313,7 @@ def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tup
     """
     deviations = []
     for control, value in zip(controls, point, strict=True):
-        acting = answer_bounds.limit_control(control, value)
+        acting = session.limit_control(control, value)
         if abs(acting - value) > DEVIATION_SHARE * (control.maximum - control.minimum):
             deviations.append(deviation(control, value, acting))
     return tuple(deviations)

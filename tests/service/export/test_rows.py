@@ -29,8 +29,7 @@ from posefield.batch.rows import RowFault, generated_name, points, repeated_name
 from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question import json_decoding, text_decoding
-from posefield.question.floor import Floor
-from posefield.question.motion_question import ClipQuestion, NamedClipQuestion, Target
+from posefield.question.motion_question import ClipQuestion, Floor, NamedClipQuestion, Target
 from posefield.registry import model_registry
 from posefield.synthesis import clips
 

@@ -11,7 +11,7 @@ from posefield.feet.footsteps import Led
 from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
-from posefield.question.floor import Floor, at_height
+from posefield.question.motion_question import Floor
 
 RATE, FRAMES = 60.0, 90
 # A trunk with four legs: hip, knee, ankle of each; a head keeps the trunk from being a leg.
@@ -109,7 +109,7 @@ def test_a_character_that_floats_is_moved_to_the_floor(floats):
     assert np.abs(heights - known[0].height).max() <= stance_rows.UNEVEN + 1e-9
 
 
-FLOORS = [at_height(0.5), at_height(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]
+FLOORS = [Floor(0.5, 0.0, 0.0), Floor(-0.5, 0.0, 0.0), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]
 
 
 @pytest.mark.parametrize("floor", FLOORS)
@@ -162,11 +162,11 @@ def test_feet_are_tilted_as_the_floor_is():
 def test_a_floor_out_of_reach_of_a_fixed_body_is_told():
     motion = sliding()
     known, likely = [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
-    plan = plan_feet(body(held={0}), motion, known, likely, floor=at_height(-0.3))
+    plan = plan_feet(body(held={0}), motion, known, likely, floor=Floor(-0.3, 0.0, 0.0))
     assert not plan.lowered.any() and plan.unreached == (0, 1, 2, 3)
     assert plan_feet(body(held={0}), motion, known, likely).unreached == ()
     free = replace(body(held={0}), raised=True)
-    risen = plan_feet(free, motion, known, likely, floor=at_height(-0.3))
+    risen = plan_feet(free, motion, known, likely, floor=Floor(-0.3, 0.0, 0.0))
     assert risen.lowered == pytest.approx(0.3) and risen.unreached == ()
 
 

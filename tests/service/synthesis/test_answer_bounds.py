@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from posefield.inference import session
-from posefield.model_file import answer_bounds
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
@@ -50,7 +49,7 @@ def swept(model, performer):
 
 def test_durations_stay_in_their_margin_and_measured_controls_are_monotone_and_not_passed(model):
     low, high = model.session.card.durations
-    margin = answer_bounds.MARGIN
+    margin = session.MARGIN
     for performer in (None, *model.session.card.performers):
         for control, values, answers in swept(model, performer):
             for value, answer in zip(values, answers, strict=True):
@@ -92,7 +91,7 @@ def test_a_control_that_is_not_measured_acts_as_at_the_limit(labelled_path):
     model = Synthesizer("labelled", session.load(labelled_path))
     turn = model.session.card.control("turn")
     typical = {c.name: c.default for c in model.session.card.controls}
-    limit = answer_bounds.limit_control(turn, 1e9)
+    limit = session.limit_control(turn, 1e9)
     far, end = ({**typical, "turn": value} for value in (at(turn, 7.0), limit))
     one, other = (clips.synthesize_clip(model, ClipQuestion(controls=c)) for c in (far, end))
     assert one.clip.rotations.tobytes() == other.clip.rotations.tobytes()
@@ -147,7 +146,7 @@ def test_weights_are_those_of_the_answer_and_shares_positive(model):
             assert min(shares) >= 0.0 and found.others_share >= 0.0
             assert sum(shares) + found.others_share == pytest.approx(1.0, abs=1e-12)
             assert all(clip.share == 0.0 for clip in found.nearest if clip.weight <= 0.0)
-    limits = {c.name: answer_bounds.limit_control(c, at(c, 4.0)) for c in card.controls}
+    limits = {c.name: session.limit_control(c, at(c, 4.0)) for c in card.controls}
     one, other = (
         explain_result(model, WhyQuestion(controls=c, nearest=10_000)) for c in (asked, limits)
     )

@@ -11,8 +11,7 @@ from model_files import written
 
 from posefield.common.errors import QueryError
 from posefield.inference import session
-from posefield.question.floor import Floor
-from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
+from posefield.question.motion_question import ClipQuestion, Floor, PoseQuestion, Target
 from posefield.registry import model_registry
 from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.synthesizer import Synthesizer

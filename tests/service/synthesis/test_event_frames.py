@@ -12,7 +12,7 @@ from posefield.inference import session
 from posefield.model_file.model_card import Event
 from posefield.motion import skeleton as forward
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
-from posefield.synthesis import clips, event_frames, poses
+from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
 EXACT = 2e-5
@@ -25,7 +25,7 @@ SECONDS = st.floats(0.05, 4.0)
 )
 def test_frames_lie_on_moments_and_move_by_half_a_step_at_most(rate, duration, begin, shares):
     start, moments = begin * duration, [share * duration for share in shares]
-    played = event_frames.playback(rate, start, duration, moments)
+    played = clip_draft.playback(rate, start, duration, moments)
     times = played.times(played.duration)
     even = start + np.arange(len(times)) / rate
     assert np.abs(times - even).max() <= 0.5 / rate + 1e-9
@@ -35,7 +35,7 @@ def test_frames_lie_on_moments_and_move_by_half_a_step_at_most(rate, duration, b
         if frame >= 0 and frame not in [round((m - start) * rate) for m in moments[:index]]:
             assert times[frame] == pytest.approx(moment, abs=1e-12)
     # Negative control: without moments, frames are at equal times.
-    plain = event_frames.playback(rate, start, duration, [])
+    plain = clip_draft.playback(rate, start, duration, [])
     assert plain.duration == pytest.approx(duration)
     assert plain.stretch(plain.times(duration)) == 0.0
 

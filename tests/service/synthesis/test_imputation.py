@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from posefield.inference import session
-from posefield.kriging import typical_clip
+from posefield.kriging import support
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
@@ -56,7 +56,7 @@ def test_open_controls_are_those_of_one_captured_clip_near_the_given_ones(card):
         rest = tuple(value for name, value in found.items() if name != "turn")
         away = abs(captured[rest] - turn)
         nearest = min(abs(point[2] - turn) for point in card.examples)
-        assert away <= nearest + typical_clip.NEAR * (own.maximum - own.minimum)
+        assert away <= nearest + support.NEAR * (own.maximum - own.minimum)
 
 
 def test_a_choice_never_lies_between_two_clusters(card):
@@ -126,22 +126,22 @@ def clusters(rng):
 def test_the_medoid_has_the_least_sum_of_distances(rng):
     places = rng.normal(size=(30, 3))
     totals = [sum(np.linalg.norm(own - other) for other in places) for own in places]
-    assert typical_clip.medoid(places) == int(np.argmin(totals))
+    assert support.medoid(places) == int(np.argmin(totals))
     # Negative control: the clip nearest to the mean is another one of a skewed family.
     skewed = np.exp(3.0 * places)
     nearest = int(np.argmin(np.linalg.norm(skewed - skewed.mean(axis=0), axis=1)))
-    assert typical_clip.medoid(skewed) != nearest
+    assert support.medoid(skewed) != nearest
 
 
 def test_a_neighbourhood_holds_the_clips_and_not_the_gap(clusters):
-    around = typical_clip.neighbourhood(clusters)
+    around = support.neighbourhood(clusters)
     assert all(around.contains(own) for own in clusters)
     middle = 0.5 * (clusters[0] + clusters[50])
     assert not around.contains(middle)
 
 
 def test_a_point_in_the_gap_is_pulled_in_to_its_own_cluster(clusters):
-    around = typical_clip.neighbourhood(clusters)
+    around = support.neighbourhood(clusters)
     start, end = clusters[0], 0.6 * clusters[50]
     found = around.pull_in(start, end)
     assert around.contains(found) and not around.contains(found + 1e-3 * (end - start))

@@ -12,8 +12,7 @@ from posefield.feet import stance_rows
 from posefield.inference import session
 from posefield.motion.measures import Measure
 from posefield.question import json_decoding, text_decoding
-from posefield.question.floor import Floor, at_height
-from posefield.question.motion_question import ClipQuestion, Target
+from posefield.question.motion_question import ClipQuestion, Floor, Target
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -198,7 +197,7 @@ def test_feet_stand_on_a_slope(walker, floor):
 
 
 def test_a_floor_at_height_0_is_none(walker):
-    usual, told = made(walker), made(walker, floor=at_height(0.0))
+    usual, told = made(walker), made(walker, floor=Floor(0.0, 0.0, 0.0))
     assert usual.clip.rotations.tobytes() == told.clip.rotations.tobytes()
     assert usual.trust == told.trust and "floor" not in usual.trust.facts()["feet"]
     assert made(walker, floor=0.0, feet="as_predicted").trust.feet is None
@@ -226,7 +225,7 @@ def test_models_without_standing_feet_refuse_a_floor(walker):
     plain = Synthesizer("plain", replace(walker.session, card=card))
     with pytest.raises(InvalidField, match="unless feet=stand is asked for"):
         made(plain, floor=0.2)
-    assert made(plain, floor=0.2, feet="stand").trust.feet.floor == at_height(0.2)
+    assert made(plain, floor=0.2, feet="stand").trust.feet.floor == Floor(0.2, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
