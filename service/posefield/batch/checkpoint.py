@@ -184,7 +184,7 @@ def _finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, A
     if clips:
         lines = (line for _, entries in _parts(target, chunks) for line in entries.splitlines())
         about = layouts.find_layout(job.layout).complete(work, map(orjson.loads, lines))
-        files += [put_file(target, path, (content,)) for path, content in about]
+        files += [put_file(target, path, (content,)) for path, content in (*about, *work.about)]
     facts = {
         "job": job.digest,
         **job.facts(),

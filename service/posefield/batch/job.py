@@ -76,7 +76,8 @@ class WorkerInput:
 
     model: content of the model file, read once; the job has its checksum. target: folder or URL.
     skip: leave invalid rows out instead of ending the export. character: that moves instead of the
-    model's own; the job has its digest.
+    model's own; the job has its digest. about: path and content of further files about the whole
+    export, which follow from the job.
     """
 
     job: ExportJob
@@ -84,6 +85,7 @@ class WorkerInput:
     target: str
     skip: bool = False
     character: "UserCharacter | None" = field(default=None, compare=False, repr=False)
+    about: tuple[tuple[str, bytes], ...] = field(default=(), compare=False, repr=False)
 
 
 @lru_cache(maxsize=1)

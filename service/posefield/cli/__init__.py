@@ -16,6 +16,7 @@ import typer
 
 from posefield import __version__
 from posefield.cli import (
+    command_bake,
     command_clip,
     command_export,
     command_models,
@@ -173,6 +174,11 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
             "export walk.onnx --grid speed=0.8:1.6:9 --format glb -o sweep",
             "export walk.onnx --sample 10000 --layout tar -o s3://bucket/walks",
         ],
+    ),
+    "bake": (
+        command_bake.bake,
+        ASK,
+        ["bake walk.onnx --grid speed=0.6:1.8:5 --grid turn=-20:20:5 -o walk_space"],
     ),
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
     "mcp": (command_serve.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),

@@ -152,13 +152,14 @@ def export(
     # Workers of a cluster have other working folders.
     local = execution.scheduler and not target.URL.match(output)
     location = str(Path(output).absolute()) if local else output
-    with _runner(execution) as runner, ExportMonitor() as monitor:
+    with open_runner(execution) as runner, ExportMonitor() as monitor:
         work = WorkerInput(job, content, location, execution.skip_errors, character)
         outcome = run.run(work, source, monitor, runner, shard, execution.verify)
-    _finish(output, outcome, monitor, execution.verify, json)
+    finish(output, outcome, monitor, execution.verify, json)
 
 
-def _runner(execution: RunArguments) -> AbstractContextManager[Runner]:
+def open_runner(execution: RunArguments) -> AbstractContextManager[Runner]:
+    """Return the processes of an export; InvalidField for numbers that do not fit."""
     workers, scheduler = execution.workers, execution.scheduler
     if workers is not None and scheduler is not None:
         raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
@@ -246,7 +247,7 @@ class ExportMonitor:
         self.signal = number
 
 
-def _finish(
+def finish(
     location: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool, json: bool
 ) -> None:
     """Print the outcome; exit with the code that shells expect after a signal."""
