@@ -29,7 +29,7 @@ install: $(ENV) ## install into .venv what the lock file names
 
 # Node comes with the environment; packages are those of the lock file.
 NODE := clients/node_modules/.installed
-$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json | $(ENV)
+$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json clients/runtime/package.json | $(ENV)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --prefix clients --silent --no-audit --no-fund
 	@touch $@
 

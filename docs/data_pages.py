@@ -17,6 +17,7 @@ SCHEMA = ROOT / "model_export/posefield_train/recipes/recipe.schema.json"
 CLIENTS = {
     "python": ("Python client", "## How it is made"),
     "typescript": ("TypeScript client", "## Development"),
+    "runtime": ("A model in your program", "## Development"),
 }
 """Title of each client's page, and the heading of its README that is for its developers."""
 METHODS = ("get", "post")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import code_pages
 import data_pages
+import runtime_parts
 from page_parts import code, table
 
 DOCS = Path(__file__).parent
@@ -18,6 +19,8 @@ OVERVIEW = "architecture/00-overview.md"
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 PAGES: dict[str, Callable[[], str]] = {
     OVERVIEW: lambda: overview(),
+    "../clients/runtime/src/constants.ts": runtime_parts.constants,
+    "guide/run-time.md": lambda: data_pages.client("runtime"),
     "operate/settings.md": code_pages.settings,
     "reference/cli.md": code_pages.commands,
     "reference/problems.md": code_pages.problems,

@@ -7,7 +7,9 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 # Their examples are those of the clients' READMEs, which tests/clients runs.
-CLIENT_PAGES = {DOCS / "reference/python.md", DOCS / "reference/typescript.md"}
+CLIENT_PAGES = {
+    DOCS / name for name in ("reference/python.md", "reference/typescript.md", "guide/run-time.md")
+}
 FENCE = re.compile(r"^( *)```(\w+)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 
 

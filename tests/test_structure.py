@@ -29,7 +29,7 @@ VAGUE = set(
 )
 MOST_VAGUE = 0.004
 """Share of the bindings of what ships whose names say nothing of the thing."""
-GENERATED = {"generated.py", "client.py", "schema.ts"}
+GENERATED = {"generated.py", "client.py", "schema.ts", "constants.ts"}
 MOST_TESTS = 0.755
 """Lines of Python under tests for each line that ships."""
 

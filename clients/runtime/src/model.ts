@@ -1,0 +1,201 @@
+/** A model file that is computed here: poses, clips and walkers. */
+
+import type { ModelCard } from "./card.ts";
+import { readCard } from "./card.ts";
+import { DURATION_FACTOR } from "./constants.ts";
+import { InvalidField, ModelError, OutsideSamples } from "./errors.ts";
+import { type Onnxruntime, type Point, Session } from "./session.ts";
+
+/** Values of all controls, such as `model.defaults` with some changed. */
+export type Controls = Readonly<Record<string, number>>;
+
+export interface Options {
+  /** Name of the performer; an unseen one by default. */
+  readonly performer?: string;
+  /** Name, or weights of names, by label set; sets that are not given are left open. */
+  readonly labels?: Readonly<Record<string, string | Readonly<Record<string, number>>>>;
+  /** Level of detail; 0 is the finest. */
+  readonly level?: number;
+}
+
+export interface LoadOptions {
+  /** A build of onnxruntime-web; by default that for WebAssembly. */
+  readonly ort?: Onnxruntime;
+  /** Execution providers of onnxruntime, such as "webgpu", in order; by default "wasm". */
+  readonly providers?: readonly string[];
+}
+
+/** Poses of one performer: metres, seconds; quaternions w x y z, local to the parent. */
+export interface Poses {
+  readonly names: readonly string[];
+  readonly parents: readonly number[];
+  readonly times: readonly number[];
+  /** Of each pose and joint. */
+  readonly rotations: Float32Array;
+  readonly rootPosition: Float32Array;
+  readonly boneOffsets: Float32Array;
+  /** Of each pose and curve; empty without curves. */
+  readonly curves: Float32Array;
+  /** Of the whole motion, s. */
+  readonly duration: number;
+  /** Expected error at the controls, m. */
+  readonly sigma: number;
+}
+
+const POSE_OUTPUTS = ["rotations", "root_position", "bone_offsets", "duration", "sigma"] as const;
+const MOST_POSES = 10_000;
+const WEIGHT_ROUNDING = 1e-6;
+/** Share by which a duration from another machine may differ. */
+const TIME_SLACK = 1e-5;
+
+/** The model of a file at a URL, or of its bytes. */
+export async function load(
+  source: string | URL | Uint8Array,
+  options: LoadOptions = {},
+): Promise<Model> {
+  const content = source instanceof Uint8Array ? source : await download(source);
+  const ort: Onnxruntime = options.ort ?? (await import("onnxruntime-web/wasm"));
+  // A pose takes less time than a message to another thread.
+  ort.env.wasm.numThreads = 1;
+  return new Model(new Session(content, readCard(content), ort, options.providers ?? ["wasm"]));
+}
+
+async function download(url: string | URL): Promise<Uint8Array> {
+  const answer = await fetch(url);
+  if (!answer.ok) throw new ModelError(`${url}: status ${answer.status}, expected a model file`);
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
+export class Model {
+  readonly session: Session;
+
+  constructor(session: Session) {
+    this.session = session;
+  }
+
+  get card(): ModelCard {
+    return this.session.card;
+  }
+
+  /** Controls of the captured clip in the middle. */
+  get defaults(): Record<string, number> {
+    return Object.fromEntries(this.card.controls.map((control) => [control.name, control.default]));
+  }
+
+  /** Poses at a time or at several, s from the start of the clip. */
+  async pose(
+    controls: Controls,
+    time: number | readonly number[],
+    options: Options = {},
+  ): Promise<Poses> {
+    const point = this.point(controls, options);
+    const times = typeof time === "number" ? [time] : time;
+    if (times.length < 1 || times.length > MOST_POSES)
+      throw new InvalidField("times", `${times.length} times, expected 1 to ${MOST_POSES}`);
+    for (const [index, value] of times.entries()) finite(`times/${index}`, value);
+    const { skeleton, curves } = this.card;
+    const names = curves.length ? ([...POSE_OUTPUTS, "curves"] as const) : POSE_OUTPUTS;
+    const longest = this.durations[1];
+    // Times beyond the longest clip overflow single precision; they are refused below.
+    const within = times.map((value) => Math.min(Math.max(value, 0), longest));
+    const outputs: Partial<Record<"curves", Float32Array>> &
+      Record<(typeof POSE_OUTPUTS)[number], Float32Array> = await this.session.run(
+      point,
+      within,
+      ...names,
+    );
+    const duration = this.checkDuration(outputs.duration[0]!);
+    for (const [index, value] of times.entries())
+      range(`times/${index}`, value, 0, duration * (1 + TIME_SLACK), "s");
+    return {
+      names: skeleton.names,
+      parents: skeleton.parents,
+      times,
+      rotations: outputs.rotations,
+      rootPosition: outputs.root_position,
+      boneOffsets: outputs.bone_offsets,
+      curves: outputs.curves ?? new Float32Array(),
+      duration,
+      sigma: outputs.sigma[0]!,
+    };
+  }
+
+  /** Shortest and longest plausible duration, s. */
+  get durations(): readonly [number, number] {
+    const [low, high] = this.card.durations;
+    return [low / DURATION_FACTOR, high * DURATION_FACTOR];
+  }
+
+  /** The duration; OutsideSamples if no captured clip is near it. */
+  checkDuration(duration: number): number {
+    const [low, high] = this.durations;
+    if (duration >= low && duration <= high) return duration;
+    throw new OutsideSamples(`the clip would last ${duration} s, expected ${low} to ${high} s`);
+  }
+
+  /** The inputs of the graph for a question; InvalidField for one that cannot be answered. */
+  point(controls: Controls, options: Options = {}): Point {
+    const { card } = this;
+    const known = card.controls.map(({ name }) => name);
+    const unknown = Object.keys(controls).find((name) => !known.includes(name));
+    if (unknown !== undefined)
+      throw new InvalidField(`controls/${unknown}`, `unknown, expected ${known.join(", ")}`);
+    const row = card.controls.map(({ name, minimum, maximum, unit }) => {
+      const room = 100 * (maximum - minimum);
+      return range(`controls/${name}`, controls[name], minimum - room, maximum + room, unit);
+    });
+    const level = options.level ?? 0;
+    if (!Number.isInteger(level) || level < 0 || level >= card.levels.length)
+      throw new InvalidField("level", `${level}, expected 0 to ${card.levels.length - 1}`);
+    return { controls: [row], labels: labelWeights(card, options), level };
+  }
+}
+
+/** A finite number; InvalidField for any other value. */
+export function finite(field: string, value: unknown): number {
+  if (typeof value === "number" && Number.isFinite(value)) return value;
+  throw new InvalidField(field, `${value}, expected a finite number`);
+}
+
+/** A number within limits; InvalidField for any other value. */
+export function range(
+  field: string,
+  value: unknown,
+  low: number,
+  high: number,
+  unit: string,
+): number {
+  const number = finite(field, value);
+  if (number >= low && number <= high) return number;
+  throw new InvalidField(field, `${number} ${unit}, expected ${low} to ${high} ${unit}`);
+}
+
+/** Weights of the names of all label sets; those of a set that is left open are zero. */
+function labelWeights({ labels }: ModelCard, { performer, labels: sets = {} }: Options): number[] {
+  if (performer !== undefined && sets["performer"] !== undefined)
+    throw new InvalidField("performer", `${performer} and labels/performer, expected one`);
+  const values = performer === undefined ? sets : { ...sets, performer };
+  const known = labels.map(({ name }) => name);
+  for (const name of Object.keys(values))
+    if (!known.includes(name))
+      throw new InvalidField(`labels/${name}`, `unknown, expected ${known.join(", ") || "none"}`);
+  return labels.flatMap(({ name, names }) => setWeights(`labels/${name}`, names, values[name]));
+}
+
+function setWeights(
+  field: string,
+  names: readonly string[],
+  value: string | Readonly<Record<string, number>> | undefined,
+): number[] {
+  if (value === undefined) return names.map(() => 0);
+  const weights = typeof value === "string" ? { [value]: 1 } : value;
+  for (const [name, weight] of Object.entries(weights)) {
+    if (!names.includes(name))
+      throw new InvalidField(field, `${name}, expected one of ${names.join(", ")}`);
+    range(`${field}/${name}`, weight, 0, 1 + WEIGHT_ROUNDING, "");
+  }
+  const total = Object.values(weights).reduce((sum, weight) => sum + weight, 0);
+  if (total <= 0 || total > 1 + WEIGHT_ROUNDING)
+    throw new InvalidField(field, `weights with a sum of ${total}, expected above 0, at most 1`);
+  return names.map((name) => weights[name] ?? 0);
+}

@@ -1,0 +1,140 @@
+/** Runs of parts of a model's graph in onnxruntime, bounded outside the sampled ranges. */
+
+import type { InferenceSession, Tensor, TensorConstructor } from "onnxruntime-web";
+import type { ModelCard } from "./card.ts";
+import { BOUND_MARGIN, BOUND_SLACK } from "./constants.ts";
+import { ModelError } from "./errors.ts";
+import { selectOutputs } from "./onnx-file.ts";
+
+/** Part of onnxruntime-web that is used, so that each of its builds will do. */
+export interface Onnxruntime {
+  readonly InferenceSession: {
+    create(
+      content: Uint8Array,
+      options?: InferenceSession.SessionOptions,
+    ): Promise<InferenceSession>;
+  };
+  readonly Tensor: TensorConstructor;
+  readonly env: { readonly wasm: { numThreads?: number; proxy?: boolean } };
+}
+
+export interface Point {
+  /** Controls in the order of the card, one row for each point. */
+  readonly controls: readonly (readonly number[])[];
+  /** Weights of the names of all label sets, shared by all points. */
+  readonly labels: readonly number[];
+  readonly level: number;
+}
+
+export class Session {
+  readonly card: ModelCard;
+  readonly #content: Uint8Array;
+  readonly #ort: Onnxruntime;
+  readonly #providers: readonly string[];
+  readonly #parts = new Map<string, Promise<InferenceSession>>();
+
+  constructor(
+    content: Uint8Array,
+    card: ModelCard,
+    ort: Onnxruntime,
+    providers: readonly string[],
+  ) {
+    this.#content = content;
+    this.card = card;
+    this.#ort = ort;
+    this.#providers = providers;
+  }
+
+  /**
+   * Outputs of the graph by name, for points (B) and times (B × S), s.
+   *
+   * Outside the sampled ranges controls and durations are bounded as in the service; sigma is that
+   * of the controls as asked.
+   */
+  async run<Name extends string>(
+    point: Point,
+    times: Float32Array | readonly number[],
+    ...values: readonly Name[]
+  ): Promise<Record<Name, Float32Array>> {
+    const outside = point.controls.map((row) => this.#isOutside(row));
+    if (!outside.includes(true)) return this.#run(point, times, values);
+    const limited = { ...point, controls: point.controls.map((row) => this.#clip(row, true)) };
+    const nearest = { ...point, controls: point.controls.map((row) => this.#clip(row, false)) };
+    const { duration: raw } = await this.#run(limited, [], ["duration"]);
+    const { duration: inside } = await this.#run(nearest, [], ["duration"]);
+    const [shortest, longest] = this.card.durations;
+    const low = shortest * (1 - BOUND_MARGIN);
+    const high = longest * (1 + BOUND_MARGIN);
+    const bounded = raw.map((seconds, row) =>
+      outside[row]
+        ? Math.min(Math.max(seconds, Math.min(low, inside[row]!)), Math.max(high, inside[row]!))
+        : seconds,
+    );
+    const steps = times.length / point.controls.length;
+    // The graph places a time by the duration that it computes itself.
+    const stretched = Array.from(times, (time, index) => {
+      const row = Math.floor(index / steps);
+      return (time * raw[row]!) / bounded[row]!;
+    });
+    const outputs = await this.#run(limited, stretched, values);
+    const known: Partial<Record<string, Float32Array>> = outputs;
+    if (known["duration"]) known["duration"] = bounded;
+    if (known["sigma"]) known["sigma"] = (await this.#run(point, [], ["sigma"])).sigma;
+    return outputs;
+  }
+
+  #isOutside(row: readonly number[]): boolean {
+    return this.card.controls.some(({ minimum, maximum }, index) => {
+      const slack = BOUND_SLACK * (maximum - minimum);
+      return row[index]! < minimum - slack || row[index]! > maximum + slack;
+    });
+  }
+
+  #clip(row: readonly number[], margin: boolean): number[] {
+    return this.card.controls.map(({ minimum, maximum }, index) => {
+      const room = margin ? BOUND_MARGIN * (maximum - minimum) : 0;
+      return Math.min(Math.max(row[index]!, minimum - room), maximum + room);
+    });
+  }
+
+  async #run<Name extends string>(
+    { controls, labels, level }: Point,
+    times: Float32Array | readonly number[],
+    values: readonly Name[],
+  ): Promise<Record<Name, Float32Array>> {
+    const session = await this.#part(values, level);
+    const rows = controls.length;
+    const feeds: Record<string, Tensor> = {
+      controls: this.#tensor(controls.flat(), [rows, this.card.controls.length]),
+    };
+    if (times.length) feeds["time"] = this.#tensor(times, [rows, times.length / rows]);
+    if (labels.length) feeds["labels"] = this.#tensor(labels, [1, labels.length]);
+    const inputs = Object.entries(feeds).filter(([name]) => session.inputNames.includes(name));
+    const outputs = await session.run(Object.fromEntries(inputs));
+    const arrays = values.map((name) => [name, outputs[name]!.data]);
+    return Object.fromEntries(arrays) as Record<Name, Float32Array>;
+  }
+
+  #tensor(numbers: Float32Array | readonly number[], dims: readonly number[]): Tensor {
+    return new this.#ort.Tensor("float32", Float32Array.from(numbers), dims);
+  }
+
+  #part(values: readonly string[], level: number): Promise<InferenceSession> {
+    const key = `${level} ${values.join(" ")}`;
+    const opened = this.#parts.get(key) ?? this.#open(values, level);
+    this.#parts.set(key, opened);
+    return opened;
+  }
+
+  async #open(values: readonly string[], level: number): Promise<InferenceSession> {
+    const content = selectOutputs(this.#content, values, level);
+    try {
+      return await this.#ort.InferenceSession.create(content, {
+        executionProviders: this.#providers,
+        logSeverityLevel: 3,
+      });
+    } catch (fault) {
+      throw new ModelError(`onnxruntime cannot open ${values.join(", ")}`, { cause: fault });
+    }
+  }
+}

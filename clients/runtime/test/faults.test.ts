@@ -1,0 +1,42 @@
+/** Questions and files that are refused, and by which error. */
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { test } from "node:test";
+
+import { InvalidField, load, ModelError, OutsideSamples } from "../src/index.ts";
+
+const SHIPPED = new URL("../../../service/posefield/shipped/", import.meta.url);
+const content = readFileSync(new URL("cmu_walk.onnx", SHIPPED));
+const model = await load(content);
+
+function names(field: string) {
+  return (fault: unknown) => fault instanceof InvalidField && fault.field === field;
+}
+
+test("a question is refused by the field that is wrong", async () => {
+  const { defaults } = model;
+  await assert.rejects(model.pose({ ...defaults, pace: 1 }, 0), names("controls/pace"));
+  await assert.rejects(model.pose({ speed: 1 }, 0), names("controls/turn"));
+  await assert.rejects(model.pose({ ...defaults, speed: Number.NaN }, 0), names("controls/speed"));
+  await assert.rejects(model.pose({ ...defaults, speed: 1e9 }, 0), names("controls/speed"));
+  await assert.rejects(model.pose(defaults, 99), names("times/0"));
+  await assert.rejects(model.pose(defaults, []), names("times"));
+  await assert.rejects(model.pose(defaults, 0, { level: 9 }), names("level"));
+  await assert.rejects(model.pose(defaults, 0, { performer: "nobody" }), names("labels/performer"));
+  await assert.rejects(
+    model.pose(defaults, 0, { labels: { performer: { cmu_02: 2 } } }),
+    names("labels/performer/cmu_02"),
+  );
+});
+
+test("a file that is no model is refused", async () => {
+  await assert.rejects(load(new TextEncoder().encode("no model")), ModelError);
+  await assert.rejects(load(content.subarray(0, 5000)), ModelError);
+  await assert.rejects(load(new Uint8Array()), ModelError);
+});
+
+test("a duration that no captured clip is near is outside the samples", () => {
+  assert.throws(() => model.checkDuration(99), OutsideSamples);
+  assert.equal(model.checkDuration(1), 1);
+});
