@@ -24,6 +24,8 @@ from posefield.question.walk_question import WalkQuestion
 from posefield.robots import robot_clip, robot_formats
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.tracks import track_files
+from posefield.tracks.track_files import HeadingUnit, TrackReading
 
 
 @with_question_options(PoseQuestion, default_values={"times": [0.0]})
@@ -115,18 +117,43 @@ def crowd(
             metavar="FILE",
         ),
     ] = None,
+    trajectories: Annotated[
+        Path | None,
+        typer.Option(
+            help="instead of random paths: places over time, which people follow for as long as "
+            "they last: SUMO FCD (.xml), JuPedSim (.sqlite, .txt) or a table (.csv) of "
+            "time,id,x,y or time,id,x,y,heading, in seconds and metres, x east and y north",
+            metavar="FILE",
+        ),
+    ] = None,
+    heading_unit: Annotated[
+        HeadingUnit | None,
+        typer.Option(help="unit of the headings of a table, from east against the clock"),
+    ] = None,
+    y_down: Annotated[bool, typer.Option(help="y of a table points down, as in images")] = False,
+    skip_bad: Annotated[
+        bool, typer.Option(help="leave out, and name, people whose trajectory is unusable")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Write a walking crowd to a file.
 
-    Each character walks on its own path at its own varying speed.
+    Each character walks on its own path at its own varying speed, or follows a trajectory.
     """
     from posefield.cli import crowd_files
     from posefield.locomotion import walking_crowd
 
-    if paths and count is not None:
+    given_paths = paths or trajectories
+    if given_paths and count is not None:
         raise InvalidField("count", f"{count}, expected none: every path has one character")
+    tracks = None
+    if trajectories:
+        if paths:
+            raise InvalidField("paths", "given with trajectories, expected one of both")
+        reading = TrackReading(heading_unit, y_down)
+        tracks = track_files.read_tracks(trajectories, reading, skip_bad)
+        count = len(tracks.tracks)
     question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
     order = walking_crowd.from_question(question, crowd_files.routes(paths) if paths else ())
-    facts = crowd_files.write_crowd(open_model(model), order, question, output)
+    facts = crowd_files.write_crowd(open_model(model), order, question, output, tracks)
     typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

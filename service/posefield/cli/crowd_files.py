@@ -23,14 +23,22 @@ from posefield.question.motion_question import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.tracks import track_crowd
+from posefield.tracks.track import TrackSet
 
 EXTENSIONS = (*crowd_size.FILES, "npz")
 
 
 def write_crowd(
-    model: Synthesizer, order: CrowdOrder, question: WalkQuestion, output: Path
+    model: Synthesizer,
+    order: CrowdOrder,
+    question: WalkQuestion,
+    output: Path,
+    tracks: TrackSet | None = None,
 ) -> dict[str, Any]:
     """Write a crowd to a file, and return its report as plain values.
+
+    tracks: that its people follow; None for random paths or the routes of the order.
 
     Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
     written.
@@ -43,7 +51,10 @@ def write_crowd(
             "body", f"{question.body!r}, expected none given: npz files carry no body"
         )
     opened = gait.fit_gait(model.session)
-    crowd = walking_feet.build_crowd(model, opened, order)
+    if tracks is None:
+        crowd = walking_feet.build_crowd(model, opened, order)
+    else:
+        crowd = track_crowd.build_crowd(model, opened, order, tracks.tracks)
     feet = _FootSkateMeter(opened, order.fps)
     watched = _with_progress(crowd, order.motions or len(crowd.motion), feet)
     if ending == "npz":
@@ -60,12 +71,22 @@ def write_crowd(
         "seed": order.seed,
         "level_shares": crowd.facts["level_shares"],
         "outside_share": crowd.facts["outside_share"],
-        "feet_stand": crowd.facts["feet_stand"],
+        "feet_stand": crowd.facts.get("feet_stand"),
         "take": crowd.facts.get("take", {}),
         "overlaps": crowd.facts.get("overlaps", {}),
         "warnings": crowd.facts.get("warnings", []),
+        **_track_facts(crowd, tracks),
         **feet.facts(),
     }
+
+
+def _track_facts(crowd: CrowdClip, tracks: TrackSet | None) -> dict[str, Any]:
+    """Return the facts of people on tracks, with those who were left out."""
+    if tracks is None:
+        return {}
+    names = ("people", "begin", "scales", "path_error_cm")
+    skipped = {**tracks.skipped, **crowd.facts["skipped"]}
+    return {name: crowd.facts[name] for name in names} | {"skipped": skipped}
 
 
 def routes(path: Path) -> Sequence[Route]:
@@ -166,6 +187,15 @@ def report_text(facts: dict[str, Any]) -> str:
             f"{100 * facts['outside_share']:.1f} % of the poses have some control outside what was "
             "sampled"
         )
+    if "path_error_cm" in facts:
+        errors = facts["path_error_cm"]
+        lines.append(
+            f"smoothed paths are {errors['mean']:.1f} cm away from their tracks in the mean and "
+            f"{errors['worst']:.1f} cm at most"
+        )
+    lines += [
+        f"person {person!r} left out: {why}" for person, why in facts.get("skipped", {}).items()
+    ]
     return "\n".join([*lines, *facts["warnings"]])
 
 

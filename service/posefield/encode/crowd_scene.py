@@ -203,6 +203,7 @@ def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
                     prim, "skel:animationSource", MOTIONS.AppendChild(motion_name(motion))
                 )
             set_transforms(prims, crowd.placement.select(indices))
+            set_visibility(layer, prims, crowd, indices)
 
 
 def character_blocks(crowd: CrowdClip) -> Iterator[Indices]:
@@ -221,6 +222,20 @@ def set_transforms(prims: Sequence[Any], placement: Placement) -> None:
     for prim, matrix in zip(prims, _matrices(placement), strict=True):
         layers.varying_attribute(prim, "xformOp:transform", ValueTypes.Matrix4d, matrix)
         layers.uniform_attribute(prim, "xformOpOrder", ValueTypes.TokenArray, order)
+
+
+def set_visibility(layer: Any, prims: Sequence[Any], crowd: CrowdClip, indices: Indices) -> None:
+    """Hide characters in the frames in which they are not there."""
+    if crowd.presence is None:
+        return
+    for prim, (begin, end) in zip(prims, crowd.presence[indices].tolist(), strict=True):
+        shown = {0: begin == 0, begin: True}
+        if end < crowd.frames:
+            shown[end] = False
+        layers.varying_attribute(prim, "visibility", ValueTypes.Token, "inherited")
+        for frame, visible in shown.items():
+            path = prim.path.AppendProperty("visibility")
+            layer.SetTimeSample(path, frame, "inherited" if visible else "invisible")
 
 
 def _matrices(placement: Placement) -> Any:
@@ -335,6 +350,7 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
                 character_prims.add_blend_shapes(prim, rig, crowd.curves)
                 character_prims.set_values(prim, values)
             set_transforms(prims, crowd.placement.select(indices))
+            set_visibility(layer, prims, crowd, indices)
 
 
 def _copy_motion(

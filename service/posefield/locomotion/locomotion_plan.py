@@ -20,6 +20,7 @@ from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait, WalkerLabels
 from posefield.locomotion.paths import POINT_SPACING, Paths
+from posefield.locomotion.stepping import Stepping
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.motion import quat
 
@@ -32,7 +33,7 @@ class LocomotionPlan:
 
     controls: (N, F, d). who: (N,), index into `labels`. phases: (N, F), of the cycle, in [0, 1).
     places: (N, F) and headings: (N, F), rad, of the frames that travel with the characters. rate:
-    frames a second.
+    frames a second. stepping: steps and standing; None for walkers that only walk ahead.
     """
 
     controls: Annotated[Floats, "characters frames controls"]
@@ -42,6 +43,7 @@ class LocomotionPlan:
     headings: CharacterFrames
     rate: float
     labels: WalkerLabels
+    stepping: Stepping | None = None
 
     @property
     def roots(self) -> Annotated[Floats, "characters frames 3"]:
@@ -131,6 +133,8 @@ def place_poses(
     poses: K poses in frames that travel with the characters.
     """
     headings = plan.headings[pair]
+    if plan.stepping is not None:
+        poses = plan.stepping.apply(pair, plan.who[pair[0]], poses)
     roots = plan.places[pair] + poses.places * floor_plane.unit_vectors(headings)
     rotations = floor_plane.turn_roots(poses.rotations, headings)
     return RelativePoses(rotations, poses.heights, roots, poses.curves)

@@ -186,7 +186,8 @@ class CrowdClip:
     frames: of each motion. rate: frames a second. motion (N,): index of the motion that each
     character plays. batches: the motions in order, several at a time, computed lazily to bound
     memory; they can be iterated once. facts: provenance as plain values. curves: names of the
-    motions' curves; empty where they have none.
+    motions' curves; empty where they have none. presence: the first frame in which each character
+    is there, and the one after the last (N, 2); None where all are there all the time.
     """
 
     skeleton: Skeleton
@@ -197,6 +198,7 @@ class CrowdClip:
     batches: Iterable[Motions]
     facts: Mapping[str, Any]
     curves: tuple[str, ...] = ()
+    presence: Annotated[Indices, "characters 2"] | None = None
 
     @property
     def shared(self) -> bool:

@@ -213,7 +213,7 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     """
     takes = of_order(model.session.card, order)
     standing = wants_standing_feet(gait.session.card, order)
-    make = _motion_maker(model, takes, standing)
+    make = motion_maker(model, takes, standing)
     crowd = walking_crowd.build_crowd(model, gait, order, make)
     facts: dict[str, Any] = {"feet_stand": standing}
     if takes is not None:
@@ -227,7 +227,8 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     return replace(crowd, facts={**crowd.facts, **facts})
 
 
-def _motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool) -> MotionMaker:
+def motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool) -> MotionMaker:
+    """Return what makes motions of takes, or of the prediction, with standing feet or without."""
     make = standing_motions if standing else walking_crowd.motions
     if takes is None:
         return make
@@ -356,7 +357,11 @@ def contact_probabilities(
         probabilities[rows] = _blended_contacts(
             session, plan, (walkers[character], frame), schedule.rows(rows)
         )
-    return probabilities.reshape(*shape, -1)
+    probabilities = probabilities.reshape(*shape, -1)
+    if plan.stepping is not None:
+        firm = plan.stepping.firm[walkers][..., None]
+        probabilities += firm * (1.0 - probabilities)
+    return probabilities
 
 
 def _blended_contacts(

@@ -1,0 +1,134 @@
+"""Steps that no capture shows: in place, round corners, sideways, backwards, and standing.
+
+A model's stride travels forward at its captured speeds and rates of turning. What a person does
+beyond that, such as a turn on the spot, is done in steps: the phase of the cycle advances with the
+turn and with the way to the side as with the distance, the legs turn about the vertical so that
+each foot keeps its heading while it stands, and the planner of feet sets the feet under the body.
+Between steps the pose is blended into a standing one.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.units import UP, CharacterFrames, Floats, Frames, Indices
+from posefield.locomotion.floor_plane import FloorVectors
+from posefield.locomotion.stride import RelativePoses
+from posefield.motion import quat, skeleton
+
+TURN_OF_CYCLE = 2.0
+"""Turn on the spot of one cycle, two steps, rad."""
+SIDE_OF_CYCLE = 0.4
+"""Way to the side of one cycle, m: feet do not cross."""
+MOST_CADENCE = 1.3
+"""Most cycles a second of steps that are not forward."""
+POWER = 3.0
+"""Exponent of the sum of the cadences of the way forward, to the side, and of the turn."""
+SWING = 0.36
+"""Share of the cycle in which a foot swings and takes a new heading."""
+
+
+@dataclass(frozen=True)
+class StandingPoses:
+    """Standing poses of C combinations of labels, in the frames that travel.
+
+    rotations: (C, J, 4). heights: of the roots (C,), m. points: of the roots over the floor (C,).
+    hips: upper joint of each leg. passings: phase at which each foot swings past the other (C, 2).
+    supports: phases of double support (C, 2).
+    """
+
+    rotations: Annotated[Floats, "combinations joints 4"]
+    heights: Annotated[Floats, "combinations"]
+    points: Annotated[FloorVectors, "combinations"]
+    hips: tuple[int, ...]
+    passings: Annotated[Floats, "combinations 2"]
+    supports: Annotated[Floats, "combinations 2"]
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """Steps and standing of N characters in F frames.
+
+    shares: of the standing pose (N, F). firm: share (N, F) to which both feet stand. turns: of each
+    leg about the vertical (N, F, 2), rad.
+    """
+
+    poses: StandingPoses
+    parents: tuple[int, ...]
+    shares: CharacterFrames
+    firm: CharacterFrames
+    turns: Annotated[Floats, "characters frames 2"]
+
+    def apply(
+        self,
+        pair: tuple[Annotated[Indices, "poses"], Annotated[Indices, "poses"]],
+        combinations: Annotated[Indices, "poses"],
+        walked: RelativePoses,
+    ) -> RelativePoses:
+        """Return walked poses (K) of pairs of a character and a frame with steps and standing.
+
+        combinations: of labels of each pose (K,).
+        """
+        share, poses = self.shares[pair], self.poses
+        rotations = quat.nlerp(walked.rotations, poses.rotations[combinations], share)
+        heights = walked.heights + share * (poses.heights[combinations] - walked.heights)
+        points = walked.places + share * (poses.points[combinations] - walked.points)
+        turn_legs(self.parents, rotations, poses.hips, self.turns[pair])
+        return RelativePoses(rotations, heights, points, walked.curves)
+
+
+def turn_legs(
+    parents: tuple[int, ...],
+    rotations: Annotated[Floats, "poses joints 4"],
+    hips: tuple[int, ...],
+    turns: Annotated[Floats, "poses legs"],
+) -> None:
+    """Turn the legs of poses (K, J, 4) about the vertical through their hips (K, 2), rad."""
+    for hip, turn in zip(hips, turns.T, strict=True):
+        above = rotations[:, 0]
+        for joint in skeleton.joint_chain(parents, hip)[1:-1]:
+            above = quat.mul(above, rotations[:, joint])
+        turned = quat.mul(quat.from_axis_angle(UP, turn), quat.mul(above, rotations[:, hip]))
+        rotations[:, hip] = quat.mul(quat.conj(above), turned)
+
+
+def cadences(
+    forward: Annotated[Floats, "*frames"],
+    side: Annotated[Floats, "*frames"],
+    turning: Annotated[Floats, "*frames"],
+    strides: tuple[Annotated[Floats, "*frames"], Annotated[Floats, "*frames"]],
+    slowest: float,
+) -> Annotated[Floats, "*frames"]:
+    """Return the cycles a second (F,) at velocities forward and to the side (F,), m/s.
+
+    turning: beyond that of the model (F,), rad/s. strides: their lengths (F,), m, and durations
+    (F,), s, at these speeds. slowest: of the model's speeds, m/s; below it strides get shorter and
+    slower alike.
+    """
+    speed = np.abs(forward)
+    walked = np.where(speed >= slowest, speed / strides[0], np.sqrt(speed / slowest) / strides[1])
+    other = np.hypot(side / SIDE_OF_CYCLE, turning / TURN_OF_CYCLE)
+    stepped = MOST_CADENCE * np.tanh(other / MOST_CADENCE)
+    return np.asarray((walked**POWER + stepped**POWER) ** (1.0 / POWER))
+
+
+def leg_turns(
+    phases: Frames, beyond: Frames, passings: Annotated[Floats, "2"]
+) -> Annotated[Floats, "frames 2"]:
+    """Return the turns of both legs (F, 2), rad, with which feet keep their headings in stances.
+
+    phases: of the cycle (F,), without wrapping. beyond: turns of the body beyond those of the model
+    (F,), rad. passings: phase at which each foot swings past the other one. A foot has the heading
+    of the body in the middle of its stance, and takes the next one while it swings.
+    """
+    turns = np.empty((len(phases), 2))
+    # Phases may rest, where the turn does, too.
+    rising = phases + 1e-9 * np.arange(len(phases))
+    for foot, passing in enumerate(passings.tolist()):
+        cycles = phases - passing
+        swing = np.round(cycles)
+        before, after = (np.interp(passing + swing + half, rising, beyond) for half in (-0.5, 0.5))
+        share = quat.smoothstep(np.clip((cycles - swing) / SWING + 0.5, 0.0, 1.0))
+        turns[:, foot] = before + share * (after - before) - beyond
+    return turns

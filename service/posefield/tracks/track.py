@@ -1,0 +1,215 @@
+"""Tracks of pedestrians over the floor, and what makes one unusable.
+
+Files have x east and y north, m, in a right-handed frame with z up. This project has Y up, so a
+point (x, y) is X = x, Z = -y, and an angle that counts from east against the clock is a heading of
+a quarter turn more. `floor_points` and `floor_headings` are the only places where this is known.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.errors import FileError, InvalidField
+from posefield.common.units import Floats, Indices
+from posefield.inference.level_selection import MAX_COORDINATE
+from posefield.locomotion.floor_plane import FloorVectors
+
+MAX_PEOPLE = 100_000
+"""Most people of one file."""
+FASTEST = 12.0
+"""Speed beyond which nobody runs, m/s: what is faster is a jump, if it is longer than `JUMP`, m."""
+JUMP = 0.5
+MAX_SECONDS = 1e9
+"""Largest time stamp, s: a float64 still has 1e-7 s there."""
+MAX_ANGLE = {"radians": 2.0 * np.pi + 0.01, "degrees": 360.0}
+"""Largest heading of each unit, in that unit."""
+MIRRORED, FOLLOWED, MOVING = 0.9, 0.5, 0.5
+"""Agreement of headings with the mirrored direction of travel from which on, and that with the
+direction itself up to which, y points down; speed from which on directions count, m/s."""
+
+
+def floor_points(
+    x: Annotated[Floats, "rows"], y: Annotated[Floats, "rows"]
+) -> Annotated[FloorVectors, "rows"]:
+    """Return floor points (R,) of coordinates east and north (R,), m."""
+    return -y + 1j * x
+
+
+def floor_headings(angles: Annotated[Floats, "rows"]) -> Annotated[Floats, "rows"]:
+    """Return headings (R,), rad, of angles from east against the clock (R,), rad."""
+    return angles + 0.5 * np.pi
+
+
+@dataclass(frozen=True)
+class Track:
+    """Track of one person.
+
+    person: id in the file. times: (S,), s, ascending, as in the file. points: (S,), over the floor,
+    m. headings: (S,), rad; None where the file has none. lines: (S,), in the file, from 1, or rows
+    of a table; empty for arrays.
+    """
+
+    person: str
+    times: Annotated[Floats, "samples"]
+    points: Annotated[FloorVectors, "samples"]
+    headings: Annotated[Floats, "samples"] | None = None
+    lines: Annotated[Indices, "rows"] | Sequence[int] = ()
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.times)
+
+    @property
+    def speeds(self) -> Annotated[Floats, "steps"]:
+        """Speed (S - 1,) between samples, m/s."""
+        return np.abs(np.diff(self.points)) / np.diff(self.times)
+
+
+@dataclass(frozen=True)
+class TrackSet:
+    """Tracks of a file. skipped: reason by id of the people who were left out."""
+
+    tracks: tuple[Track, ...]
+    skipped: dict[str, str]
+
+
+@dataclass(frozen=True)
+class TrackRows:
+    """Block of R rows of a file, in its order.
+
+    people: ids (R,). times: (R,), s. points: (R,), m. headings: (R,), rad; None without them.
+    lines: (R,), of the file, from 1.
+    """
+
+    people: Sequence[str]
+    times: Annotated[Floats, "rows"]
+    points: Annotated[FloorVectors, "rows"]
+    headings: Annotated[Floats, "rows"] | None
+    lines: Annotated[Indices, "rows"]
+
+
+def of_arrays(
+    person: str,
+    times: Annotated[Floats, "samples"],
+    points: Annotated[Floats, "samples 2"],
+    headings: Annotated[Floats, "samples"] | None = None,
+) -> Track:
+    """Return the track of points east and north (S, 2), m, and angles from east (S,), rad.
+
+    Raises InvalidField, which names the sample, for a track that cannot be walked.
+    """
+    turned = None if headings is None else floor_headings(headings)
+    track = Track(person, times, floor_points(*points.T), turned)
+    problem = find_problem(track)
+    if problem is not None:
+        raise InvalidField(f"tracks/{person}/{problem[0]}", problem[1])
+    return track
+
+
+def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> TrackSet:
+    """Return the tracks of the rows of a file, in the order in which people appear.
+
+    skip_bad: whether people with unusable tracks are left out, and told. Raises FileError, with the
+    line, for the first unusable track otherwise, and for too many people or none.
+    """
+    rows: dict[str, list[tuple[TrackRows, Indices]]] = {}
+    for block in blocks:
+        people, whose = np.unique(np.asarray(block.people), return_inverse=True)
+        order = np.argsort(whose, kind="stable")
+        stops = np.searchsorted(whose[order], np.arange(len(people)), "right")
+        firsts = np.array([indices[0] for indices in np.split(order, stops[:-1])])
+        groups = np.split(order, stops[:-1])
+        for index in np.argsort(firsts, kind="stable").tolist():
+            rows.setdefault(str(people[index]), []).append((block, groups[index]))
+        if len(rows) > MAX_PEOPLE:
+            raise FileError(path, f"more than {MAX_PEOPLE} people, expected at most as many")
+    if not rows:
+        raise FileError(path, "no person in it, expected one or more")
+    tracks, skipped = [], {}
+    for person, pieces in rows.items():
+        track = _joined(person, pieces)
+        problem = find_problem(track)
+        if problem is None:
+            tracks.append(track)
+        elif skip_bad:
+            line = track.lines[problem[0]]
+            skipped[person] = f"line {line}: {problem[1]}"
+        else:
+            raise FileError(path, f"person {person!r}: {problem[1]}", int(track.lines[problem[0]]))
+    if not tracks:
+        raise FileError(path, f"all {len(skipped)} people are unusable, expected one or more")
+    _check_mirror(tracks, path)
+    return TrackSet(tuple(tracks), skipped)
+
+
+def _joined(person: str, pieces: Sequence[tuple[TrackRows, Indices]]) -> Track:
+    times, points, lines = (
+        np.concatenate([getattr(block, name)[rows] for block, rows in pieces])
+        for name in ("times", "points", "lines")
+    )
+    headings = None
+    if all(block.headings is not None for block, _ in pieces):
+        headings = np.concatenate([block.headings[rows] for block, rows in pieces])  # type: ignore[index]
+    return Track(person, times, points, headings, lines)
+
+
+def find_problem(track: Track) -> tuple[int, str] | None:
+    """Return the first sample of a track that cannot be used, and a sentence; None if all can."""
+    columns = [track.times, track.points.real, track.points.imag]
+    columns += [] if track.headings is None else [track.headings]
+    finite = np.isfinite(columns).all(axis=0)
+    if not finite.all():
+        return int(np.argmin(finite)), "a value that is no number, expected finite ones"
+    far = np.maximum(np.abs(track.points.real), np.abs(track.points.imag))
+    if far.max() > MAX_COORDINATE:
+        at = int(np.argmax(far))
+        return at, f"{far[at]:g} m from the origin, expected at most {MAX_COORDINATE:g} m"
+    if np.abs(track.times).max() > MAX_SECONDS:
+        at = int(np.argmax(np.abs(track.times)))
+        return at, f"time {track.times[at]:g} s, expected at most {MAX_SECONDS:g} s"
+    if len(track) < 2:
+        return 0, "one sample, expected two or more"
+    steps = np.diff(track.times)
+    if steps.min() <= 0.0:
+        at = int(np.argmax(steps <= 0.0)) + 1
+        time, before = track.times[at], track.times[at - 1]
+        if steps[at - 1] == 0.0:
+            return at, f"twice at time {time:g} s, expected one sample at a time"
+        return at, f"time goes back from {before:g} s to {time:g} s, expected ascending times"
+    ways = np.abs(np.diff(track.points))
+    jumps = (ways > JUMP) & (ways > FASTEST * steps)
+    if jumps.any():
+        at = int(np.argmax(jumps))
+        return at + 1, (
+            f"jumps {ways[at]:.2f} m in {steps[at]:g} s at {track.times[at + 1]:g} s, expected at "
+            f"most {FASTEST:g} m/s"
+        )
+    return None
+
+
+def _check_mirror(tracks: Sequence[Track], path: Path) -> None:
+    """Raise FileError where headings agree with travel only if y points down."""
+    straight, mirrored = [np.zeros(0, complex)], [np.zeros(0, complex)]
+    for track in tracks:
+        if track.headings is None:
+            continue
+        moving = track.speeds > MOVING
+        ways = np.diff(track.points)[moving]
+        faces = np.exp(1j * track.headings[:-1][moving])
+        ways /= np.abs(ways)
+        straight.append(faces * np.conj(ways))
+        mirrored.append(faces * -ways)
+    agreement, opposite = (
+        abs(np.concatenate(pairs).mean()) if sum(map(len, pairs)) else 0.0
+        for pairs in (straight, mirrored)
+    )
+    if opposite > MIRRORED and agreement < FOLLOWED:
+        raise FileError(
+            path,
+            f"headings agree with the mirrored direction of travel ({opposite:.2f}) and not with "
+            f"the direction itself ({agreement:.2f}), expected y north and angles from east "
+            "against the clock: is y down?",
+        )

@@ -1,0 +1,242 @@
+"""Crowds of people who walk along tracks."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from posefield.common import cancellation
+from posefield.common.errors import InvalidField
+from posefield.locomotion import floor_plane, locomotion_plan, walking_crowd
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.locomotion_plan import LocomotionPlan
+from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH, CrowdOrder
+from posefield.motion.clip import CrowdClip, Motions, Placement
+from posefield.synthesis import walking_feet
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.tracks import track_path, track_plan
+from posefield.tracks.track import Track
+from posefield.tracks.track_path import TrackPath
+from posefield.tracks.track_plan import TrackWalkers
+
+SIZES = (0.94, 1.06)
+"""Heights of people over those of the model's performers."""
+TAKES = 2**31
+"""Number of takes from which one is drawn for a person."""
+MOST_SPEED = 2.2
+"""Speed up to which people walk, m/s; beyond it their feet slide, which is told."""
+FAR, ASIDE = 0.08, np.radians(45.0)
+"""Distance from a track, m, and angle from a given heading, rad, that are told."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """Person who walks along a track: the same for the same id and seed.
+
+    number: random one that chooses the labels. phase, sway: random ones of the plan. scale: height
+    over that of the model. take: seed of the motion.
+    """
+
+    track: Track
+    path: TrackPath
+    number: float
+    phase: float
+    sway: float
+    scale: float
+    take: int
+
+
+@dataclass(frozen=True)
+class TrackCrowd:
+    """People on tracks, and how their motions are made.
+
+    people: in the order of the tracks. frames: of the clock that all share. begin: time of the
+    first frame, s, as in the file. skipped: reason by id of tracks too short for two frames.
+    """
+
+    model: Synthesizer
+    gait: Gait
+    order: CrowdOrder
+    people: tuple[Person, ...]
+    begin: float
+    frames: int
+    skipped: dict[str, str]
+
+    @cached_property
+    def walkers(self) -> TrackWalkers:
+        """Walkers of the model."""
+        return TrackWalkers(self.gait)
+
+    def motions(self, people: Sequence[Person]) -> tuple[LocomotionPlan, Motions]:
+        """Return the plan and the motions of people, each from the first frame of its own path.
+
+        The motions have the frames of the longest path, in the model's size; `placed` gives each
+        its height.
+        """
+        rate, card = self.order.fps, self.gait.session.card
+        combinations = self.gait.labels.draw(np.array([person.number for person in people]))
+        numbers = np.array([(person.phase, person.sway) for person in people])
+        scales = np.array([person.scale for person in people])
+        paths = [person.path for person in people]
+        plan = track_plan.plan_people(self.walkers, paths, combinations, numbers, scales, rate)
+        takes = walking_feet.of_order(card, replace(self.order, count=len(people)))
+        if takes is not None and takes.take == "index":
+            takes = replace(takes, seeds=np.array([person.take for person in people]))
+        make = walking_feet.motion_maker(
+            self.model, takes, walking_feet.wants_standing_feet(card, self.order)
+        )
+        relative = plan.relative_to_start()
+        levels = locomotion_plan.constant_schedule(self.order.level or 0, plan.phases.shape)
+        motions = make(self.gait.session, relative, np.arange(len(people)), levels)
+        size = scales.astype(np.float32)[:, None, None]
+        return plan, replace(
+            motions,
+            root_position=motions.root_position * size,
+            bone_offsets=motions.bone_offsets * size,
+        )
+
+    def batches(self) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
+        """Yield people with their plans and motions, as many together as fit a batch."""
+        first = 0
+        while first < len(self.people):
+            cancellation.check()
+            end, longest = first, 0
+            while end < len(self.people):
+                longest = max(longest, len(self.people[end].path))
+                if end > first and longest * (end + 1 - first) > POSES_PER_BATCH:
+                    break
+                end += 1
+            people = self.people[first:end]
+            yield people, *self.motions(people)
+            first = end
+
+
+def find_people(
+    model: Synthesizer, gait: Gait, order: CrowdOrder, tracks: Sequence[Track]
+) -> TrackCrowd:
+    """Return the people of tracks. order: frame rate, labels, takes, feet and seed.
+
+    Raises InvalidField for tracks that are too long or all too short.
+    """
+    walking_crowd.frame_count(1, 1.0, order.fps, order.seed)
+    gait = gait.with_labels(order.labels)
+    begin = min(float(track.times[0]) for track in tracks)
+    people, skipped = [], {}
+    poses = sum((track.times[-1] - track.times[0]) * order.fps + 1.0 for track in tracks)
+    if poses > MAX_POSES:
+        raise InvalidField("trajectories", f"{poses:.3g} poses, expected {MAX_POSES} at most")
+    for track in tracks:
+        path = track_path.follow(track, begin, order.fps)
+        if path is None:
+            skipped[track.person] = f"shorter than two frames at {order.fps:g} frames a second"
+            continue
+        people.append(Person(track, path, *_draw(track.person, order.seed)))
+    if not people:
+        raise InvalidField("trajectories", "all shorter than two frames, expected longer ones")
+    frames = max(person.path.first + len(person.path) for person in people)
+    return TrackCrowd(model, gait, order, tuple(people), begin, frames, skipped)
+
+
+def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
+    """Return the number, phase, sway, height and take of a person by the hash of the id."""
+    digest = hashlib.blake2b(f"{seed}:{person}".encode(), digest_size=40).digest()
+    words = np.frombuffer(digest, "<u8")
+    number, phase, sway, size = (words[:4] / 2.0**64).tolist()
+    low, high = SIZES
+    return number, phase, sway, low + (high - low) * size, 1 + int(words[4]) % (TAKES - 1)
+
+
+def build_crowd(
+    model: Synthesizer, gait: Gait, order: CrowdOrder, tracks: Sequence[Track]
+) -> CrowdClip:
+    """Return the crowd of people on tracks, on one clock; who is not there yet, or left, is hidden.
+
+    Raises InvalidField as `find_people` does.
+    """
+    crowd = find_people(model, gait, order, tracks)
+    card = crowd.gait.session.card
+    people, counts = crowd.people, [len(person.path) for person in crowd.people]
+    first = np.array([person.path.first for person in people])
+    presence = np.column_stack([first, first + counts])
+
+    def batches() -> Iterator[Motions]:
+        for group, _, motions in crowd.batches():
+            yield _on_clock(crowd, group, motions)
+
+    points = np.array([person.path.points[0] for person in people])
+    return CrowdClip(
+        card.skeleton,
+        order.fps,
+        crowd.frames,
+        Placement(floor_plane.at_height(points, np.zeros(len(points))), np.zeros(len(points))),
+        np.arange(len(people)),
+        batches(),
+        crowd_facts(crowd),
+        tuple(curve.name for curve in card.curves),
+        presence,
+    )
+
+
+def _on_clock(crowd: TrackCrowd, people: Sequence[Person], motions: Motions) -> Motions:
+    """Return motions in the frames of the shared clock: before and after, a person keeps still."""
+    rows = [
+        np.clip(np.arange(crowd.frames) - person.path.first, 0, len(person.path) - 1)
+        for person in people
+    ]
+    index = np.arange(len(people))[:, None], np.stack(rows)
+    curves = None if motions.curves is None else motions.curves[index]
+    return replace(
+        motions,
+        rotations=motions.rotations[index],
+        root_position=motions.root_position[index],
+        levels=motions.levels[index],
+        curves=curves,
+    )
+
+
+def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
+    """Return the facts of a crowd: its people, how near they keep to their tracks, and limits."""
+    card = crowd.gait.session.card
+    combinations = crowd.gait.labels.draw(np.array([person.number for person in crowd.people]))
+    errors = [person.path.errors for person in crowd.people]
+    return {
+        "model": f"{card.name}@{crowd.gait.session.digest}",
+        **crowd.gait.labels.facts(combinations),
+        "people": [person.track.person for person in crowd.people],
+        "begin": crowd.begin,
+        "scales": [round(person.scale, 4) for person in crowd.people],
+        "path_error_cm": {
+            "mean": round(100.0 * float(np.concatenate(errors).mean()), 2),
+            "worst": round(100.0 * float(max(error.max() for error in errors)), 2),
+        },
+        "outside_share": 0.0,
+        "level_shares": [1.0],
+        "skipped": crowd.skipped,
+        "warnings": [line for person in crowd.people for line in limits(crowd, person)],
+    }
+
+
+def limits(crowd: TrackCrowd, person: Person) -> Iterator[str]:
+    """Yield what a walker cannot do as the track does, with the time, and what it does instead."""
+    path, rate = person.path, crowd.order.fps
+    speeds = np.abs(path.velocities)
+    checks = [
+        (speeds / MOST_SPEED, "{:.1f} m/s, faster than a walk: its feet slide", MOST_SPEED),
+        (path.errors / FAR, "the path is left by {:.2f} m, which no walker can follow", FAR),
+    ]
+    if person.track.headings is not None:
+        times = crowd.begin + (path.first + np.arange(len(path))) / rate
+        stated = np.exp(1j * np.interp(times, person.track.times, np.unwrap(person.track.headings)))
+        aside = np.abs(np.angle(stated * np.exp(-1j * path.headings)))
+        degrees = float(np.degrees(ASIDE))
+        sentence = "faces the way it goes, {:.0f} degrees from its heading"
+        checks.append((aside / ASIDE, sentence, degrees))
+    for values, sentence, unit in checks:
+        at = int(np.argmax(values))
+        if values[at] > 1.0:
+            time = crowd.begin + (path.first + at) / rate
+            text = sentence.format(values[at] * unit)
+            yield f"person {person.track.person!r} at {time:.2f} s: {text}"

@@ -1,0 +1,147 @@
+"""Readers of tracks, and what is told of those that cannot be used."""
+
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import FileError, InvalidField
+from posefield.tracks import track_files
+from posefield.tracks.track import MAX_PEOPLE
+from posefield.tracks.track_files import TrackReading
+
+DEGREES = TrackReading("degrees")
+
+
+def write(tmp_path, name, text):
+    file = tmp_path / name
+    file.write_text(text)
+    return file
+
+
+def sumo(people, time=0.0, **values):
+    attributes = {"x": 0.0, "y": 0.0, "angle": 0.0, "speed": 0.0} | values
+    text = " ".join(f'{name}="{value}"' for name, value in attributes.items())
+    return "".join(
+        f'<timestep time="{time}"><person id="{one}" {text}/></timestep>' for one in people
+    )
+
+
+def database(file, rows, fps="10"):
+    with sqlite3.connect(file) as connection:
+        connection.execute("create table metadata(key text, value text)")
+        connection.execute("insert into metadata values ('fps', ?)", [fps])
+        columns = "frame integer, id integer, pos_x, pos_y, ori_x, ori_y"
+        connection.execute(f"create table trajectory_data({columns})")
+        connection.executemany("insert into trajectory_data values (?, ?, ?, ?, ?, ?)", rows)
+    connection.close()
+    return file
+
+
+def test_all_formats_give_the_same_person(tmp_path):
+    steps = [(0.0, 1.0, 2.0), (0.1, 1.1, 2.2)]
+    table = "time,id,x,y,heading\n" + "".join(f"{t},7,{x},{y},90\n" for t, x, y in steps)
+    xml = "".join(sumo(["7"], t, x=x, y=y, angle=0) for t, x, y in steps)
+    text = "# framerate: 10.0\n#id frame x/m y/m z/m\n" + "".join(
+        f"7 {round(10 * t)} {x} {y} 0\n" for t, x, y in steps
+    )
+    rows = [(round(10 * t), 7, x, y, 0.0, 1.0) for t, x, y in steps]
+    files = [
+        write(tmp_path, "a.csv", table),
+        write(tmp_path, "a.xml", f"<fcd-export>{xml}</fcd-export>"),
+        database(tmp_path / "a.sqlite", rows),
+        write(tmp_path, "a.txt", text),
+    ]
+    for file in files:
+        (track,) = track_files.read_tracks(file, DEGREES).tracks
+        assert track.person == "7"
+        np.testing.assert_array_equal(track.times, [0.0, 0.1])
+        # East is X, north is -Z.
+        np.testing.assert_allclose(track.points, [-2.0 + 1.0j, -2.2 + 1.1j], rtol=1e-12)
+        if file.suffix != ".txt":
+            # Northwards.
+            np.testing.assert_allclose(np.exp(1j * track.headings), -1.0, atol=1e-12)
+
+
+HEAD = "time,id,x,y\n"
+BAD = [
+    ("jump.csv", HEAD + "0,a,0,0\n1,a,30,0\n", "jump.csv:3: person 'a': jumps 30.00 m in 1 s"),
+    ("twice.csv", HEAD + "0,a,0,0\n0,a,1,0\n", "twice.csv:3: person 'a': twice at time 0 s"),
+    ("back.csv", HEAD + "1,a,0,0\n0,a,1,0\n", "goes back from 1 s to 0 s"),
+    ("one.csv", HEAD + "1,a,0,0\n", "one sample, expected two or more"),
+    ("nan.csv", HEAD + "0,a,0,0\n1,a,nan,0\n", "nan.csv:3: person 'a': a value that is no number"),
+    ("word.csv", HEAD + "0,a,zero,0\n", "word.csv:2: x 'zero', expected a number"),
+    ("cells.csv", HEAD + "0,a,0\n", "cells.csv:2: 3 cells, expected 4"),
+    ("head.csv", "t,id,x,y\n", "columns t, id, x, y, expected time,id,x,y"),
+    ("empty.csv", HEAD, "no person in it"),
+    ("far.csv", HEAD + "0,a,0,0\n1,a,1e9,0\n", "from the origin, expected at most"),
+    ("none.sqlite", "no database", "no SQLite database"),
+    ("none.txt", "1 0 0 0 0\n", "expected '# framerate:' above 0"),
+    ("none.xml", "<routes/>", "none.xml:1: root element 'routes', expected 'fcd-export'"),
+    ("cut.xml", "<fcd-export>", "no XML: no element found"),
+    (
+        "bomb.xml",
+        '<!DOCTYPE a [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export>&b;</fcd-export>',
+        "a document type or an entity",
+    ),
+    (
+        "globe.xml",
+        "<fcd-export>"
+        + "".join(sumo(["a"], t, x=13.0, y=52.0 + 1e-5 * t, speed=1.2) for t in range(20))
+        + "</fcd-export>",
+        "longitude and latitude",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "message"), BAD, ids=[name for name, *_ in BAD])
+def test_bad_files_are_told_with_line_found_and_expected(tmp_path, name, text, message):
+    with pytest.raises(FileError) as caught:
+        track_files.read_tracks(write(tmp_path, name, text))
+    assert message in str(caught.value)
+
+
+def test_headings_need_their_unit_and_agree_with_it(tmp_path):
+    file = write(tmp_path, "h.csv", "time,id,x,y,heading\n0,a,0,0,0\n1,a,1,0,90\n")
+    with pytest.raises(FileError, match="expected --heading-unit degrees or radians"):
+        track_files.read_tracks(file)
+    with pytest.raises(FileError, match=r"h.csv:3: heading 90 radians, .* degrees\?"):
+        track_files.read_tracks(file, TrackReading("radians"))
+    assert len(track_files.read_tracks(file, DEGREES).tracks) == 1
+
+
+def circle(sign):
+    angles = np.linspace(0.0, 6.0, 61)
+    rows = [
+        f"{t:.2f},a,{np.cos(t):.4f},{sign * np.sin(t):.4f},{(t + np.pi / 2) % (2 * np.pi):.4f}"
+        for t in angles
+    ]
+    return "time,id,x,y,heading\n" + "\n".join(rows) + "\n"
+
+
+def test_a_table_whose_y_points_down_is_told_by_its_headings(tmp_path):
+    up, down = (write(tmp_path, f"{sign}.csv", circle(sign)) for sign in (1, -1))
+    radians = TrackReading("radians")
+    assert len(track_files.read_tracks(up, radians).tracks) == 1
+    with pytest.raises(FileError, match="is y down"):
+        track_files.read_tracks(down, radians)
+
+
+def test_bad_people_are_left_out_and_told_where_that_is_asked_for(tmp_path):
+    file = write(tmp_path, "a.csv", HEAD + "0,a,0,0\n0,b,5,0\n1,a,1,0\n1,b,90,0\n")
+    found = track_files.read_tracks(file, skip_bad=True)
+    assert [track.person for track in found.tracks] == ["a"]
+    assert found.skipped.keys() == {"b"}
+    assert "line 5: jumps 85.00 m" in found.skipped["b"]
+
+
+def test_an_unknown_ending_is_refused():
+    with pytest.raises(InvalidField, match=r"'a\.json' ends in none of \.xml"):
+        track_files.read_tracks(Path("a.json"))
+
+
+def test_too_many_people_are_refused(tmp_path):
+    people = "".join(f"0,p{index},0,0\n" for index in range(MAX_PEOPLE + 1))
+    with pytest.raises(FileError, match=f"more than {MAX_PEOPLE} people"):
+        track_files.read_tracks(write(tmp_path, "many.csv", HEAD + people))
