@@ -6,8 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import posefield
 from posefield.common.errors import FileError, InvalidField
-from posefield.tracks import track_files
+from posefield.locomotion import floor_plane
+from posefield.locomotion.walking_crowd import CrowdOrder
+from posefield.motion import skeleton
+from posefield.tracks import track_crowd, track_files
 from posefield.tracks.track import MAX_PEOPLE
 from posefield.tracks.track_files import TrackReading
 
@@ -145,3 +149,40 @@ def test_too_many_people_are_refused(tmp_path):
     people = "".join(f"0,p{index},0,0\n" for index in range(MAX_PEOPLE + 1))
     with pytest.raises(FileError, match=f"more than {MAX_PEOPLE} people"):
         track_files.read_tracks(write(tmp_path, "many.csv", HEAD + people))
+
+
+def test_people_start_stand_and_turn_along_their_tracks(tmp_path):
+    """The pelvis keeps to the track; standing feet stand; nobody is below the floor."""
+    corner = [(t, 1.2 * t, 0.0) for t in range(5)] + [(t, 4.8, 0.0) for t in range(5, 8)]
+    corner += [(t, 4.8, 1.2 * (t - 7)) for t in range(8, 12)]
+    rows = "".join(f"{t},a,{x},{y}\n" for t, x, y in corner)
+    late = "".join(f"{t},b,0,{3 + 0.8 * t}\n" for t in range(4, 9))
+    file = write(tmp_path, "street.csv", HEAD + rows + late)
+    tracks = track_files.read_tracks(file).tracks
+    model = posefield.load("cmu_walk").synthesizer
+    crowd = track_crowd.build_crowd(model, model.gait, CrowdOrder(2), tracks)
+    motions = {}
+    first = 0
+    for batch in crowd.batches:
+        for index in range(len(batch)):
+            motions[first] = (
+                skeleton.positions(
+                    crowd.skeleton.parents,
+                    batch.rotations[index].astype(float),
+                    skeleton.translations(
+                        batch.bone_offsets[index].astype(float),
+                        batch.root_position[index].astype(float),
+                    ),
+                )
+                + crowd.placement.positions[first]
+            )
+            first += 1
+    assert crowd.frames == 11 * 30 + 1
+    np.testing.assert_array_equal(crowd.presence, [[0, 331], [120, 241]])
+    for index, track in enumerate(tracks):
+        frames = np.round(track.times * 30).astype(int)
+        pelvis = floor_plane.project(motions[index][frames, 0])
+        assert np.abs(pelvis - track.points).max() < 0.15
+        assert motions[index][..., 1].min() > 0.0
+    # Control: the other person is far away.
+    assert np.abs(floor_plane.project(motions[1][frames, 0]) - tracks[0].points[:5]).max() > 1.0

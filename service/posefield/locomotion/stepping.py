@@ -73,7 +73,7 @@ class Stepping:
         share, poses = self.shares[pair], self.poses
         rotations = quat.nlerp(walked.rotations, poses.rotations[combinations], share)
         heights = walked.heights + share * (poses.heights[combinations] - walked.heights)
-        points = walked.places + share * (poses.points[combinations] - walked.points)
+        points = walked.places + share * (poses.points[combinations] - walked.places)
         turn_legs(self.parents, rotations, poses.hips, self.turns[pair])
         return RelativePoses(rotations, heights, points, walked.curves)
 

@@ -20,8 +20,9 @@ from posefield.locomotion.floor_plane import FloorVectors
 MAX_PEOPLE = 100_000
 """Most people of one file."""
 FASTEST = 12.0
-"""Speed beyond which nobody runs, m/s: what is faster is a jump, if it is longer than `JUMP`, m."""
+"""Speed beyond which no person runs, m/s: a faster step is a jump if it is longer than `JUMP`."""
 JUMP = 0.5
+"""Shortest jump, m."""
 MAX_SECONDS = 1e9
 """Largest time stamp, s: a float64 still has 1e-7 s there."""
 MAX_ANGLE = {"radians": 2.0 * np.pi + 0.01, "degrees": 360.0}

@@ -73,8 +73,8 @@ class TrackCrowd:
     def motions(self, people: Sequence[Person]) -> tuple[LocomotionPlan, Motions]:
         """Return the plan and the motions of people, each from the first frame of its own path.
 
-        The motions have the frames of the longest path, in the model's size; `placed` gives each
-        its height.
+        The plan is in the world and in the model's size. The motions have the frames of the
+        longest path, begin at the start of their paths, and each has its person's size.
         """
         rate, card = self.order.fps, self.gait.session.card
         combinations = self.gait.labels.draw(np.array([person.number for person in people]))
@@ -88,7 +88,8 @@ class TrackCrowd:
         make = walking_feet.motion_maker(
             self.model, takes, walking_feet.wants_standing_feet(card, self.order)
         )
-        relative = plan.relative_to_start()
+        starts = np.array([path.points[0] for path in paths]) / scales
+        relative = replace(plan, places=plan.places - starts[:, None])
         levels = locomotion_plan.constant_schedule(self.order.level or 0, plan.phases.shape)
         motions = make(self.gait.session, relative, np.arange(len(people)), levels)
         size = scales.astype(np.float32)[:, None, None]
@@ -152,7 +153,7 @@ def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
 def build_crowd(
     model: Synthesizer, gait: Gait, order: CrowdOrder, tracks: Sequence[Track]
 ) -> CrowdClip:
-    """Return the crowd of people on tracks, on one clock; who is not there yet, or left, is hidden.
+    """Return the crowd of people on tracks, on one clock; they are hidden outside of their tracks.
 
     Raises InvalidField as `find_people` does.
     """

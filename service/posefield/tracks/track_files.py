@@ -33,7 +33,7 @@ GEOGRAPHIC = 0.01
 
 @dataclass(frozen=True)
 class TrackReading:
-    """How a file is read.
+    """Conventions of a table that the file does not state.
 
     heading_unit: of the headings of a table, from east against the clock; they are refused without
     it. y_down: whether y of a table points down, as in images; its angles turn over with it.

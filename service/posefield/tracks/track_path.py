@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import Frames
+from posefield.common.units import Floats, Frames
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat
 from posefield.tracks.track import Track
@@ -73,7 +73,7 @@ def follow(track: Track, origin: float, rate: float) -> TrackPath | None:
 
 
 def _interpolate(
-    times: Frames, points: Annotated[FloorVectors, "samples"], at: Frames
+    times: Annotated[Floats, "samples"], points: Annotated[FloorVectors, "samples"], at: Frames
 ) -> Annotated[FloorVectors, "frames"]:
     """Return the monotone cubic (Fritsch and Butland 1984) through samples at times (F,)."""
     steps = np.diff(times)
