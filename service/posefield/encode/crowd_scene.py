@@ -203,7 +203,8 @@ def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
                     prim, "skel:animationSource", MOTIONS.AppendChild(motion_name(motion))
                 )
             set_transforms(prims, crowd.placement.select(indices))
-            set_visibility(layer, prims, crowd, indices)
+            if crowd.presence is not None:
+                set_visibility(layer, prims, crowd.presence[indices], crowd.frames)
 
 
 def character_blocks(crowd: CrowdClip) -> Iterator[Indices]:
@@ -224,16 +225,14 @@ def set_transforms(prims: Sequence[Any], placement: Placement) -> None:
         layers.uniform_attribute(prim, "xformOpOrder", ValueTypes.TokenArray, order)
 
 
-def set_visibility(layer: Any, prims: Sequence[Any], crowd: CrowdClip, indices: Indices) -> None:
-    """Hide characters in the frames in which they are not there."""
-    if crowd.presence is None:
-        return
-    for prim, (begin, end) in zip(prims, crowd.presence[indices].tolist(), strict=True):
-        shown = {0: begin == 0, begin: True}
-        if end < crowd.frames:
-            shown[end] = False
+def set_visibility(layer: Any, prims: Sequence[Any], presence: Indices, frames: int) -> None:
+    """Hide characters in the frames in which they are not there. presence: as of the crowd."""
+    for prim, (begin, end) in zip(prims, presence.tolist(), strict=True):
+        visibility = {0: begin == 0, begin: True}
+        if end < frames:
+            visibility[end] = False
         layers.varying_attribute(prim, "visibility", ValueTypes.Token, "inherited")
-        for frame, visible in shown.items():
+        for frame, visible in visibility.items():
             path = prim.path.AppendProperty("visibility")
             layer.SetTimeSample(path, frame, "inherited" if visible else "invisible")
 
@@ -350,7 +349,8 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
                 character_prims.add_blend_shapes(prim, rig, crowd.curves)
                 character_prims.set_values(prim, values)
             set_transforms(prims, crowd.placement.select(indices))
-            set_visibility(layer, prims, crowd, indices)
+            if crowd.presence is not None:
+                set_visibility(layer, prims, crowd.presence[indices], crowd.frames)
 
 
 def _copy_motion(
