@@ -5,7 +5,7 @@ import pytest
 
 from posefield.inference import session
 from posefield.motion import skeleton
-from posefield.performance import act_motion, held_pose
+from posefield.performance import act_motion, holds
 from posefield.question.motion_question import MotionQuestion, Target
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -78,8 +78,8 @@ def test_a_joint_of_a_captured_body_is_held(made):
     joint, _ = joint_and_controls(model)
     found = act_motion.act_passage(model, MotionQuestion(controls={}))
     card = model.session.card
-    body = held_pose.body_of(card.skeleton, card.roles, found.bones)
-    held = held_pose.hold_passage(held_pose.come_to_rest(found.passage), body, 2.0, joint)[0]
+    body = holds.body_of(card.skeleton, card.roles, found.bones)
+    held = holds.hold_passage(holds.come_to_rest(found.passage), body, 2.0, joint)[0]
     moved = skeleton.translations(found.bones, held.roots)
     path = skeleton.positions(body.parents, held.rotations, moved)
     hand, head = (path[:, body.names.index(name)] for name in (joint, "head"))

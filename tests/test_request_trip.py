@@ -36,7 +36,7 @@ CEILINGS = {
     "standing feet": (56, 407, 43),
     "pose": (21, 61, 5),
     "crowd": (50, 411, 45),
-    "performance": (63, 477, 57),
+    "performance": (61, 477, 57),
 }
 """Most modules, functions and classes of each request."""
 

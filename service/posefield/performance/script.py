@@ -16,8 +16,9 @@ from posefield.feet.footsteps import Character
 from posefield.locomotion import stride
 from posefield.locomotion.gait import Gait
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import joint_roles
+from posefield.motion import hinges, joint_roles, quat
 from posefield.motion.contact_detection import FootContact
+from posefield.motion.hinges import Hinge
 from posefield.motion.skeleton import Skeleton
 from posefield.performance import join_quality
 from posefield.performance.passage import (
@@ -28,7 +29,6 @@ from posefield.performance.passage import (
     match_skeletons,
     scale_heights,
 )
-from posefield.performance.shared_hinges import shared_hinges
 from posefield.question.motion_question import MotionQuestion, check_number, check_range, check_take
 from posefield.question.performance_question import (
     Act,
@@ -406,3 +406,34 @@ def _feet(field: str, card: ModelCard, character: ScriptCharacter) -> tuple[int,
             f"of the feet of {character.identity}",
         )
     return tuple(columns.index(joint) for joint in character.feet)
+
+
+def shared_hinges(card: ModelCard, others: Sequence[ModelCard]) -> tuple[Hinge, ...]:
+    """Return the hinges of a character's model, whose ranges include those of other models.
+
+    Empty where one of the models has none, or another skeleton.
+    """
+    widened = list(card.hinges)
+    for other in {own.name: own for own in others}.values():
+        try:
+            match = match_skeletons(other.skeleton, card.skeleton)
+        except SkeletonsDiffer:
+            return ()
+        known = {hinge.joint: hinge for hinge in other.hinges}
+        widened = [
+            _widened(hinge, known[hinge.joint], match) for hinge in widened if hinge.joint in known
+        ]
+    return tuple(widened)
+
+
+def _widened(hinge: Hinge, other: Hinge, match: SkeletonMatch) -> Hinge:
+    """Return a hinge whose range includes that of the same joint in a skeleton that it matches."""
+    rotations = np.tile(quat.IDENTITY, (len(match.parents), 1))
+    rotations[other.joint] = other.reference
+    # The straight limb of the other skeleton is bent a little by the hinge of this one.
+    shift = hinges.from_card((hinge,)).angles(match.rotations(rotations))[0]
+    return replace(
+        hinge,
+        low=hinges.rounded(np.minimum(hinge.low, other.low + shift)),
+        high=hinges.rounded(np.maximum(hinge.high, other.high + shift)),
+    )

@@ -11,15 +11,14 @@ from posefield.constraints.take_variation import TakeSettings
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.model_file.model_card import PERFORMER
-from posefield.performance import standing_pose, standing_steps, walker
+from posefield.performance import standing_pose, standing_steps
 from posefield.performance.joins import Cut
 from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script, Source
-from posefield.performance.standing_pose import StandingPose
+from posefield.performance.standing_pose import StandingPose, Walker, WalkerKey
 from posefield.performance.timeline import Timeline
 from posefield.performance.walk_plan import WalkPlan
 from posefield.performance.walk_request import Disc, WalkRequest
-from posefield.performance.walker import Walker, WalkerKey
 from posefield.question.performance_question import PerformanceQuestion, Walk
 from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
@@ -210,7 +209,9 @@ def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> Walk
     if before is None or before.plan is None or before.model != source.model.identity:
         return None
     plan, rolling = before.plan, request.start == "rolling"
-    same = plan.walker.is_same(walker.find_walker(source.gait, request.labels, request.controls))
+    same = plan.walker.is_same(
+        standing_pose.find_walker(source.gait, request.labels, request.controls)
+    )
     if not (same and rolling and not plan.stops):
         return None
     low, high = source.gait.region.speeds
@@ -255,7 +256,7 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
         return continued
     if walk.join.cut == "end":
         timeline.exits = timeline.exits[-1:]
-    walking = walker.find_walker(source.gait, request.labels, request.controls)
+    walking = standing_pose.find_walker(source.gait, request.labels, request.controls)
     pose = standing_pose.find_standing_pose(walking) if request.start == "standing" else None
     if pose is not None:
         cut = timeline.find_cut(script.adapted(index, still(pose)), range(1))

@@ -22,10 +22,10 @@ from posefield.performance import (
     walk_request,
 )
 from posefield.performance.passage import RATE, FloorMotion
+from posefield.performance.standing_pose import Walker, find_walker
 from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import SpeedRamps, WalkNote, WalkRequest
-from posefield.performance.walker import Walker, find_walker
 from posefield.question.motion_question import check_number, check_range
 
 MAX_SCALING, SHORT_SCALING = 0.06, 0.15

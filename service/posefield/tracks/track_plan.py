@@ -20,7 +20,7 @@ from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.stepping import StandingPoses, Stepping
 from posefield.motion import quat
 from posefield.performance import standing_pose
-from posefield.performance.walker import Walker
+from posefield.performance.standing_pose import Walker
 from posefield.tracks.track_path import TrackPath, smooth
 
 KNOT_SECONDS = 0.2

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
-from posefield.performance import held_pose
+from posefield.performance import holds
 from posefield.performance.passage import FloorMotion
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -30,7 +30,7 @@ def measured_reach(model):
 def body(model, bones):
     """The skeleton of a model's character, for holds."""
     card = model.session.card
-    return held_pose.body_of(card.skeleton, card.roles, bones)
+    return holds.body_of(card.skeleton, card.roles, bones)
 
 
 def positions(model, passage, bones, by=None):

@@ -8,7 +8,7 @@ import pytest
 
 from posefield.inference import session
 from posefield.locomotion import floor_plane
-from posefield.performance import joins, walk_entries, walk_steps, walker
+from posefield.performance import joins, standing_pose, walk_entries, walk_steps
 from posefield.performance.act_motion import Act, StagedAct
 from posefield.performance.passage import FloorMotion
 from posefield.performance.script import resolve_script
@@ -36,7 +36,7 @@ def script(walk_path):
 def act(script):
     """An act that begins at a third of the cycle, turned and away from the origin."""
     source = script.sources[0]
-    who = walker.find_walker(source.gait, {}, {})
+    who = standing_pose.find_walker(source.gait, {}, {})
     controls = who.controls(np.array([float(source.gait.rates[:, 0].mean())]), np.zeros(1))
     cycle = walk_entries.cycle_passage(source.model, who, controls[0], FRAMES)
     moved = cycle.part(FRAMES // 3, FRAMES).placed(FloorMotion(0.7, 3.0 - 2.0j))

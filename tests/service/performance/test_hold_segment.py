@@ -9,7 +9,7 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.motion import quat, skeleton
-from posefield.performance import act_motion, held_pose
+from posefield.performance import act_motion, holds
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.question.motion_question import MotionQuestion
 from posefield.synthesis.synthesizer import Synthesizer
@@ -30,7 +30,7 @@ def act(reach):
 
 @pytest.fixture(scope="module")
 def rested(act):
-    return held_pose.come_to_rest(act.passage.part(0, act.event - 5))
+    return holds.come_to_rest(act.passage.part(0, act.event - 5))
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,8 @@ def line(frames, speed=1.0):
 
 def test_a_motion_comes_to_rest_in_its_last_pose():
     own = line(40)
-    found = held_pose.come_to_rest(own)
-    assert len(found) == 40 + held_pose.REST_FRAMES // 2
+    found = holds.come_to_rest(own)
+    assert len(found) == 40 + holds.REST_FRAMES // 2
     assert np.allclose(found.roots[-1], own.roots[-1], atol=1e-9)
     assert np.allclose(found.rotations[-1], own.rotations[-1], atol=1e-9)
     speeds = np.linalg.norm(np.diff(found.roots, axis=0), axis=-1) * RATE
@@ -62,14 +62,14 @@ def test_a_motion_comes_to_rest_in_its_last_pose():
     assert speeds[-1] < 0.01
     assert np.all(np.diff(speeds) < 1e-9)
     # The largest deceleration of 1 - 3 u^2 + 2 u^3 over its time.
-    steepest = 1.5 * RATE / held_pose.REST_FRAMES
+    steepest = 1.5 * RATE / holds.REST_FRAMES
     assert np.abs(np.diff(speeds)).max() * RATE == pytest.approx(steepest, rel=0.02)
     turned = quat.twist(found.rotations[:, 0], np.array([0.0, 1.0, 0.0]))
     assert np.allclose(turned, found.roots[:, 2], atol=1e-9)
 
 
 def test_a_held_hand_stays_while_the_body_sways(reach, act, rested, body):
-    found = held_pose.hold_passage(rested, body, 3.0, "RightHand", seed=3)[0]
+    found = holds.hold_passage(rested, body, 3.0, "RightHand", seed=3)[0]
     assert len(found) == 180
     place = path(reach, act, rested, "RightHand")[-1]
     hand = path(reach, act, found, "RightHand")
@@ -77,14 +77,14 @@ def test_a_held_hand_stays_while_the_body_sways(reach, act, rested, body):
     head = path(reach, act, found, "Head")
     assert 0.002 < np.linalg.norm(head - head[0], axis=-1).max() < 0.05
     # The hand of a body that only sways does not stay.
-    free = held_pose.hold_passage(rested, body, 3.0, seed=3)[0]
+    free = holds.hold_passage(rested, body, 3.0, seed=3)[0]
     moved = path(reach, act, free, "RightHand")
     assert np.linalg.norm(moved - place, axis=-1).max() > 10.0 * STILL
 
 
 def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, body):
     asked = 1.0, "RightHand", (2.0, 1.6, 3.0), 3
-    found, _ = held_pose.hold_passage(rested, body, *asked)
+    found, _ = holds.hold_passage(rested, body, *asked)
     assert np.allclose(found.roots[-1], rested.roots[-1], atol=1e-12)
     dots = np.abs(np.sum(found.rotations[-1] * rested.rotations[-1], axis=-1))
     assert np.allclose(dots, 1.0, atol=1e-9)
@@ -99,7 +99,7 @@ def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, b
     assert after <= own + 1e-9
     # Without coming to rest the motion stops at once.
     cut = act.passage.part(0, act.event - 5)
-    stopped = concatenate(cut, held_pose.hold_passage(cut, body, *asked)[0])
+    stopped = concatenate(cut, holds.hold_passage(cut, body, *asked)[0])
     x = acting.positions(reach, stopped, act.bones)
     assert np.linalg.norm(np.diff(x, 2, axis=0), axis=-1).mean(axis=-1).max() * RATE**2 > own
 
@@ -145,9 +145,9 @@ def test_neck_head_and_a_part_of_the_trunk_turn(posed):
     found, after, _ = turned(body, own, (1.0, 1.6, 2.0))
     apart = 2.0 * np.arccos(np.clip(np.abs(np.sum(after * own.rotations[-1], axis=-1)), -1.0, 1.0))
     total = np.linalg.norm(found.turn)
-    shares = {role: apart[body.joints[role]] / total for role in held_pose.TRUNK + held_pose.NECK}
-    trunk = sum(shares[role] for role in held_pose.TRUNK)
-    assert trunk == pytest.approx(held_pose.TRUNK_SHARE, abs=1e-3)
+    shares = {role: apart[body.joints[role]] / total for role in holds.TRUNK + holds.NECK}
+    trunk = sum(shares[role] for role in holds.TRUNK)
+    assert trunk == pytest.approx(holds.TRUNK_SHARE, abs=1e-3)
     assert shares["neck"] == pytest.approx(shares["head"], abs=1e-3)
     rest = np.ones(len(apart), dtype=bool)
     rest[[body.joints[role] for role in shares]] = False
@@ -168,8 +168,8 @@ def test_the_neck_turns_no_farther_than_it_can(posed, point):
 def test_the_gaze_turns_and_comes_back_smoothly(posed):
     body, own = posed
     point = (2.0, 1.6, 2.0)
-    held, miss = held_pose.hold_passage(own, body, 2.0, look_at=point)
-    still = held_pose.hold_passage(own, body, 2.0)[0]
+    held, miss = holds.hold_passage(own, body, 2.0, look_at=point)
+    still = holds.hold_passage(own, body, 2.0)[0]
     directions = [
         seen(body, *pair)[1] @ seen(body, *rest)[1]
         for pair, rest in zip(
@@ -195,4 +195,4 @@ def test_a_gaze_of_no_head_or_at_the_head_is_refused(posed):
         (body, tuple(place + 0.01), r"^look_at: 0\.0\d+ m from the head, expected at least"),
     ):
         with pytest.raises(InvalidField, match=said):
-            held_pose.hold_passage(own, who, 1.0, look_at=point)
+            holds.hold_passage(own, who, 1.0, look_at=point)

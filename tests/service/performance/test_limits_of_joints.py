@@ -10,8 +10,7 @@ from limited_models import excess, known_limits
 from posefield.motion import hinges
 from posefield.motion.hinges import MOST
 from posefield.performance import composition
-from posefield.performance.script import resolve_script
-from posefield.performance.shared_hinges import shared_hinges
+from posefield.performance.script import resolve_script, shared_hinges
 from posefield.question.json_decoding import decode_question
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.synthesis.synthesizer import Synthesizer

@@ -22,11 +22,11 @@ from posefield.performance import (
 from posefield.performance.act_motion import Act, StagedAct
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.script import resolve_script
+from posefield.performance.standing_pose import find_walker
 from posefield.performance.standing_steps import StandingEnds
 from posefield.performance.timeline import Timeline
 from posefield.performance.walk_plan import plan_walk
 from posefield.performance.walk_request import WalkRequest
-from posefield.performance.walker import find_walker
 from posefield.question import json_decoding
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.synthesis.synthesizer import Synthesizer
