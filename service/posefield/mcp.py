@@ -28,7 +28,7 @@ from msgspec import Struct
 from posefield import __version__
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField, MotionError, QueryError, did_you_mean
-from posefield.encode.formats import CLIP_ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS, encoder_for
 from posefield.http.api import contract
 from posefield.performance import composition
 from posefield.performance.script import Script, errors_under, resolve_script
@@ -108,8 +108,9 @@ class Toolbox:
         """Write a performance to a file; return its path and its report."""
         request = json_decoding.convert_question(FileRequest, arguments)
         path = self.folder / _file_name(request.file)
-        encoder, question = CLIP_ENCODERS[path.suffix[1:]], request.script
+        encoder, question = encoder_for(path), request.script
         with errors_under("script"):
+            encoder.check(None)
             convention = encoder.convention(question.unit, question.up, question.body)
         script = self._resolve(question)
         with errors_under("script"):

@@ -33,8 +33,7 @@ from posefield.question.results import ClipAnswer, PoseAnswer
 from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
-from posefield.robots import robot_clip, robot_formats
-from posefield.robots.robot import Robot
+from posefield.robots import robot_clip
 from posefield.robots.robot_motion import RobotMotion
 from posefield.synthesis import clips, poses, walking_feet
 from posefield.synthesis.poses import MAX_POSES
@@ -57,11 +56,10 @@ class Clip(ClipAnswer):
     it is, of a model of a robot.
     """
 
-    robot: Robot | None = None
-
     def robot_motion(self) -> RobotMotion:
         """Return the motion of the robot's base and hinges, Z up; InvalidField without a robot."""
-        return robot_clip.motion_of(self.robot, self.clip, "clip")
+        robot = robot_clip.require(self.robot, "robot_motion")
+        return robot_clip.of(robot).motion(self.clip, "clip", self.loops)
 
     def save(
         self,
@@ -73,17 +71,12 @@ class Clip(ClipAnswer):
     ) -> tuple[str, ...]:
         """Write a file in the format of the path's suffix; return its warnings.
 
-        Of a robot a name such as walk.mjlab.npz writes a reference motion, in its own units.
+        Of a robot a name such as walk.mjlab.npz writes a reference motion, in metres with Z up.
 
         unit, up, body: None for the format's defaults. Names of joints and the kind of root are
         those of the question. Raises UnknownFormat, InvalidField for a convention that the format
         does not allow, and FileError if the file cannot be written.
         """
-        if reference := robot_formats.of_file(Path(path).name):
-            name = Path(path).name
-            content = robot_clip.file_content(self.robot, self.clip, reference, name)
-            atomic_files.write(content, Path(path))
-            return ()
         encoder = encoder_for(Path(path))
         content = encoder.encode(self, encoder.convention(unit, up, body))
         atomic_files.write(content, Path(path))
@@ -159,7 +152,7 @@ class Model:
     def clip(self, **fields: Any) -> Clip:
         """Return a clip. fields: of a ClipQuestion, such as fps, names and root, and controls."""
         answer = clips.synthesize_clip(self.synthesizer, decode(ClipQuestion, fields))
-        return Clip(answer.clip, answer.trust, self.synthesizer.session.card.robot)
+        return Clip(answer.clip, answer.trust, answer.robot, answer.loops)
 
     def crowd(self, **fields: Any) -> Crowd:
         """Return a crowd of a cyclic model on random paths. fields: of a WalkQuestion."""

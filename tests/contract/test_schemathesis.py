@@ -212,6 +212,8 @@ def narrowed(spec, card):
         ):
             del narrow["paths"][path]
     schemas, parameters = (narrow["components"][part] for part in ("schemas", "parameters"))
+    # Reference motions are of models of robots.
+    parameters["clipEnding"] = parameters["clipFormat"]
     clip = schemas["ClipQuestion"]["properties"]
 
     def only(name, schema, *names):

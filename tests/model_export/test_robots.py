@@ -8,16 +8,23 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
+from asking import asker
 
 import posefield
 import posefield_train
-from posefield.common.errors import MotionFileError
+from posefield.common.errors import InvalidField, MotionFileError
+from posefield.encode.formats import ROBOT_ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.inference import session
 from posefield.model_file import card_check, checked_file
 from posefield.motion import quat
 from posefield.motion.clip import Clip
+from posefield.registry import model_registry
 from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
 from posefield.robots.robot_motion import RobotMotion
+from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.robots import doctor, robot_file
 
 # A biped whose left leg branches before its right, with a hinge beside its body's origin, a body
@@ -414,24 +421,116 @@ def test_a_model_of_a_robot_answers_with_its_angles_between_the_commands(family,
     assert motion.base_path[39, 0] == pytest.approx(0.45 * 39 / 40, abs=1e-3)
 
 
+def numbers(robot, content, name, folder):
+    """The motion in the bytes of a file that a service or an archive sent."""
+    path = folder / f"sent{robot_formats.WRITTEN[name].suffix}"
+    path.write_bytes(content)
+    order = "wxyz" if name == "qpos.csv" else "xyzw"
+    return robot_formats.read(path, Conventions(robot, rate=40.0, quaternions=order))
+
+
 @pytest.mark.parametrize("ending", ["mjlab.npz", "unitree.csv", "gmr.pkl"])
 def test_a_clip_of_a_robot_is_saved_for_its_readers(ending, family, robot, command):
     output = family / f"walk.{ending}"
     words = ["clip", family / "biped.onnx", "-c", "pace=0.45", "--fps", "40", "-o", output]
     assert command(*words)[0] == 0
-    stated = Conventions(robot, rate=40.0, quaternions="xyzw")
-    written = robot_formats.read(output, stated)
+    written = numbers(robot, output.read_bytes(), ending, family)
     assert written.format == ending
     np.testing.assert_allclose(
         np.degrees(written.angles[:40]), np.degrees(gait(robot, 0.45).angles[:40]), atol=0.2
     )
 
 
+@pytest.fixture(scope="module")
+def service(family):
+    """Function that asks a service with the robot's model."""
+    registry = model_registry.load([family / "biped.onnx"])
+    return asker(create_app(registry, Settings()))
+
+
+@pytest.mark.parametrize("ending", robot_formats.WRITTEN)
+def test_a_service_gives_each_reference_motion_at_its_ending(ending, service, family, robot):
+    sent = service("GET", f"/v1/models/biped/clip.{ending}?pace=0.45&fps=40")
+    assert sent.status_code == 200, sent.text
+    assert sent.headers["content-type"].partition(";")[0] == ROBOT_ENCODERS[ending].media_type
+    assert sent.headers["content-disposition"].endswith(f'"biped.{ending}"')
+    motion = numbers(robot, sent.content, ending, family)
+    assert motion.format == ending
+    expected = posefield.load(family / "biped.onnx").clip(pace=0.45, fps=40.0)
+    np.testing.assert_allclose(motion.angles, expected.robot_motion().angles, atol=1e-6)
+    body = {"controls": {"pace": 0.45}, "fps": 40}
+    assert service("POST", f"/v1/models/biped/clip.{ending}", json=body).content == sent.content
+    expected.save(family / f"saved.{ending}")
+    assert (family / f"saved.{ending}").read_bytes() == sent.content
+
+
+REFUSED = {
+    "stroll/clip.mjlab.npz?speed=1&turn=0": "this is a motion of none",
+    "biped/clip.mjlab.npz?pace=0.45&up=y": "expected 'z'",
+    "biped/clip.mjlab.npz?pace=0.45&body=bones": "carry no body",
+    "biped/clip.mjlab.npy?pace=0.45": "mjlab.npz",
+}
+
+
+@pytest.mark.parametrize("path", REFUSED)
+def test_a_service_says_why_it_gives_no_reference_motion(path, family, walk_path):
+    registry = model_registry.load([family / "biped.onnx", walk_path])
+    sent = asker(create_app(registry, Settings()))("GET", f"/v1/models/{path}")
+    assert sent.status_code in (404, 422)
+    assert sent.headers["content-type"] == "application/problem+json"
+    assert REFUSED[path] in sent.text
+
+
+@pytest.fixture(scope="module")
+def limited(family, robot):
+    """Model whose left knee may turn half as far as the fastest gait turns it."""
+    card = checked_file.load_card((family / "biped.onnx").read_bytes(), "biped.onnx")
+    ranges = card.robot.ranges.copy()
+    knee = robot.hinges.index("left_knee")
+    reach = np.ptp(gait(robot, 0.9).angles[:, knee])
+    ranges[knee] = gait(robot, 0.9).angles[:, knee].mean() + np.array([-0.25, 0.25]) * reach
+    opened = session.open_bytes((family / "biped.onnx").read_bytes(), "biped@0")
+    narrow = replace(card, robot=replace(card.robot, ranges=ranges))
+    return posefield.Model(Synthesizer("biped", replace(opened, card=narrow)))
+
+
+def test_limits_that_a_command_breaks_are_told_or_refused(limited, robot):
+    slow, fast = (limited.clip(pace=pace, fps=40.0).trust for pace in (0.25, 0.85))
+    assert slow.limits == ()
+    (broken,) = fast.limits
+    assert broken.joint == "left_knee"
+    assert broken.sentence in fast.warnings
+    angles = gait(robot, 0.85).angles[:, robot.hinges.index("left_knee")]
+    swing = abs(broken.angle - angles.mean())
+    assert swing == pytest.approx(np.abs(angles - angles.mean()).max(), abs=np.radians(0.2))
+    assert limited.clip(pace=0.25, limits="refuse").trust.limits == ()
+    with pytest.raises(InvalidField, match="left_knee turns to"):
+        limited.clip(pace=0.85, limits="refuse")
+
+
+def test_commands_are_swept_into_a_folder_of_reference_motions(family, robot, tmp_path, command):
+    words = ["export", family / "biped.onnx", "--grid", "pace=0.3:1.5:5", "--fps", "40"]
+    assert command(*words, "--format", "mjlab.npz", "-o", tmp_path / "sweep")[0] == 0
+    lines = (tmp_path / "sweep/manifest.jsonl").read_text().splitlines()
+    entries = [json.loads(line) for line in lines]
+    assert [entry["controls"]["pace"] for entry in entries] == pytest.approx(
+        [0.3, 0.6, 0.9, 1.2, 1.5]
+    )
+    assert [entry["supported"] for entry in entries] == [True, True, True, False, False]
+    for entry in entries[:3]:
+        content = (tmp_path / "sweep" / entry["file"]).read_bytes()
+        angles = numbers(robot, content, "mjlab.npz", tmp_path).angles
+        expected = gait(robot, entry["controls"]["pace"]).angles
+        np.testing.assert_allclose(np.degrees(angles[:40]), np.degrees(expected[:40]), atol=0.3)
+
+
 def test_a_clip_of_no_robot_is_no_reference_motion(walk_path, tmp_path, command):
     output = tmp_path / "walk.mjlab.npz"
-    code, _, errors = command("clip", walk_path, "-o", output)
-    assert code and "this model is of none" in errors
-    assert not output.exists()
+    grid = ["--grid", "speed=1:1.2:2", "--grid", "turn=0", "--format", "mjlab.npz"]
+    for words in (["clip", walk_path], ["export", walk_path, *grid]):
+        code, _, errors = command(*words, "-o", output)
+        assert code and "this is a motion of none" in errors
+        assert not output.exists()
 
 
 BAD_CARDS = {

@@ -21,6 +21,7 @@ from posefield_client.generated import (
     Control,
     Extrapolate,
     FeetMode,
+    Limits,
     Liveness,
     ModelCard,
     ModelList,
@@ -260,8 +261,8 @@ class AsyncSaving:
         return f"{type(self).__name__}({self.files.about})"
 
     async def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
-        """Write the result to a file atomically; the path's suffix selects the format."""
-        form = Path(path).suffix[1:].lower()
+        """Write the result to a file atomically; the end of its name selects the format."""
+        form = self.files.ending(Path(path).name)
         part = Part(Path(path), progress)
         call = self.files.request(form, partial(part.saved, form, self.files))
         with part:
@@ -438,6 +439,7 @@ class AsyncModel:
         targets: Targets | None = None,
         feet: FeetMode = None,
         floor: FloorValue | None = None,
+        limits: Limits | None = None,
         take: int | None = None,
         variety: float | None = None,
         detail: bool | None = None,

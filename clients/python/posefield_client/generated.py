@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Required, TypedDict
 
 from msgspec import Struct
 
-CONTRACT = "5.1.0"
+CONTRACT = "5.2.0"
 """Version of the contract that this client was made for."""
 
 
@@ -49,6 +49,8 @@ Unit = Literal["m", "cm"] | None
 Up = Literal["y", "z"] | None
 
 Body = Literal["none", "mannequin", "bones"] | None
+
+Limits = Literal["refuse", "report"]
 
 Extrapolate = Literal["ok", "warn", "refuse"]
 
@@ -101,6 +103,7 @@ class NamedClipQuestion(TypedDict, total=False):
     targets: Sequence[Target]
     feet: FeetMode
     floor: float | Floor
+    limits: Limits
     take: int
     variety: float
     detail: bool
@@ -546,6 +549,15 @@ class Retargeting(Struct, frozen=True, kw_only=True):
     hands_missed: tuple[float, ...]
 
 
+class BrokenLimit(Struct, frozen=True, kw_only=True):
+    """A joint of a robot beyond its limits, where it is worst. Since 5.2.0."""
+
+    joint: str
+    time: float
+    angle: float
+    limits: tuple[float, float]
+
+
 class Trust(Struct, frozen=True, kw_only=True):
     """Provenance and uncertainty of a response."""
 
@@ -569,6 +581,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     targets: tuple[Met, ...] = ()
     feet: FeetResult | None = None
     retargeting: Retargeting | None = None
+    limits: tuple[BrokenLimit, ...] = ()
 
 
 class Backing(Struct, frozen=True, kw_only=True):
@@ -670,6 +683,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     measured: dict[str, float] = {}
     targets: tuple[Met, ...] = ()
     retargeting: Retargeting | None = None
+    limits: tuple[BrokenLimit, ...] = ()
 
 
 class Liveness(Struct, frozen=True, kw_only=True):
@@ -924,6 +938,9 @@ OPERATIONS = {
                 "application/x-npz",
                 "application/vnd.apache.arrow.stream",
                 "application/vnd.msgpack",
+                "text/csv",
+                "text/plain",
+                "application/octet-stream",
             ),
             {
                 "usda": "model/vnd.usda",
@@ -935,6 +952,19 @@ OPERATIONS = {
                 "npz": "application/x-npz",
                 "arrow": "application/vnd.apache.arrow.stream",
                 "msgpack": "application/vnd.msgpack",
+                "unitree.csv": "text/csv",
+                "qpos.csv": "text/csv",
+                "holosoma.npz": "application/x-npz",
+                "mjlab.npz": "application/x-npz",
+                "beyondmimic.npz": "application/x-npz",
+                "isaaclab.npz": "application/x-npz",
+                "locomujoco.npz": "application/x-npz",
+                "qpos.npz": "application/x-npz",
+                "gmr.pkl": "application/octet-stream",
+                "mimickit.pkl": "application/octet-stream",
+                "asap.pkl": "application/octet-stream",
+                "awd.json": "text/plain",
+                "amp.txt": "text/plain",
             },
         ),
         Operation(
@@ -951,6 +981,9 @@ OPERATIONS = {
                 "application/x-npz",
                 "application/vnd.apache.arrow.stream",
                 "application/vnd.msgpack",
+                "text/csv",
+                "text/plain",
+                "application/octet-stream",
             ),
             {
                 "usda": "model/vnd.usda",
@@ -962,6 +995,19 @@ OPERATIONS = {
                 "npz": "application/x-npz",
                 "arrow": "application/vnd.apache.arrow.stream",
                 "msgpack": "application/vnd.msgpack",
+                "unitree.csv": "text/csv",
+                "qpos.csv": "text/csv",
+                "holosoma.npz": "application/x-npz",
+                "mjlab.npz": "application/x-npz",
+                "beyondmimic.npz": "application/x-npz",
+                "isaaclab.npz": "application/x-npz",
+                "locomujoco.npz": "application/x-npz",
+                "qpos.npz": "application/x-npz",
+                "gmr.pkl": "application/octet-stream",
+                "mimickit.pkl": "application/octet-stream",
+                "asap.pkl": "application/octet-stream",
+                "awd.json": "text/plain",
+                "amp.txt": "text/plain",
             },
         ),
         Operation(

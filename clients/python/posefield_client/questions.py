@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 from urllib.parse import quote_plus
 
@@ -182,6 +183,12 @@ class Files:
     about: str
     count: int | None = None
     entry: type[Entry] = ManifestEntry
+
+    def ending(self, name: str) -> str:
+        """Return the format that the name of a file ends in: the longest, such as mjlab.npz."""
+        double = [form for form in OPERATIONS[self.operation].formats if "." in form]
+        endings = (form for form in double if name.lower().endswith(f".{form}"))
+        return next(endings, Path(name).suffix[1:].lower())
 
     def request(self, form: str, read: Callable[[Reply], T]) -> Call[T]:
         """Return the request for a format; WrongQuestion for an unknown one."""

@@ -9,6 +9,7 @@ import { type Script, scriptQuestion } from "./scripts.ts";
 import type {
   ArchiveOptions,
   CharacterList,
+  ClipEnding,
   ClipFormat,
   ClipQuestion,
   CrowdFormat,
@@ -141,7 +142,7 @@ export class Client {
   /** A clip as a file. */
   async file(
     model: string,
-    format: ClipFormat,
+    format: ClipEnding,
     question: ClipQuestion,
     signal?: AbortSignal,
   ): Promise<Download> {
@@ -212,7 +213,7 @@ export class Client {
   }
 
   /** The link to the file of a clip or, without controls, of a crowd that walks. */
-  url(model: string, format: ClipFormat, question: ClipQuestion | WalkQuestion): string {
+  url(model: string, format: ClipEnding, question: ClipQuestion | WalkQuestion): string {
     const kind = "controls" in question ? "clip" : "crowd";
     const path = link(under(model, `/${kind}.${format}`), question);
     return (this.base || (globalThis.location?.origin ?? "")) + path;

@@ -175,22 +175,22 @@ export interface paths {
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
                  * @example usda
                  */
-                format: components["parameters"]["clipFormat"];
+                format: components["parameters"]["clipEnding"];
             };
             cookie?: never;
         };
         /**
          * Get a clip in a format
-         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up.
+         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up. A model of a robot also has the reference motions that programs which train robots read, such as `mjlab.npz`, always in metres with Z up (since 5.2.0).
          */
         get: operations["getClipInFormat"];
         put?: never;
         /**
          * Query a clip in a format
-         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up.
+         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up. A model of a robot also has the reference motions that programs which train robots read, such as `mjlab.npz`, always in metres with Z up (since 5.2.0).
          */
         post: operations["queryClipInFormat"];
         delete?: never;
@@ -882,6 +882,25 @@ export interface components {
          */
         CharacterName: string | null;
         /**
+         * @description Policy for clips in which a joint of a robot turns beyond its limits. `report` gives the clip
+         *     with `limits` in its trust, and one warning for each such joint; `refuse` returns an error.
+         *     Without effect for models of no robot. Since 5.2.0.
+         * @default report
+         * @enum {string}
+         */
+        Limits: "refuse" | "report";
+        /** @description A joint of a robot beyond its limits, where it is worst. Since 5.2.0. */
+        BrokenLimit: {
+            /** @description Name of the joint. */
+            joint: string;
+            /** @description Time of the frame from the first, in seconds. */
+            time: number;
+            /** @description Its angle in radians. */
+            angle: number;
+            /** @description Its least and largest angle in radians. */
+            limits: number[];
+        };
+        /**
          * @description Policy for controls without similar captured clips and for targets out of reach. `ok`
          *     reports the controls only in `supported`. `warn` adds one sentence for each control outside
          *     its sampled range, or one sentence if the controls lie in a gap between the samples, and one
@@ -983,6 +1002,7 @@ export interface components {
             targets?: components["schemas"]["Targets"];
             feet?: components["schemas"]["FeetMode"];
             floor?: components["schemas"]["FloorValue"];
+            limits?: components["schemas"]["Limits"];
             take?: components["schemas"]["Take"];
             variety?: components["schemas"]["Variety"];
             detail?: components["schemas"]["Detail"];
@@ -1674,6 +1694,7 @@ export interface components {
             targets?: components["schemas"]["Targets"];
             feet?: components["schemas"]["FeetMode"];
             floor?: components["schemas"]["FloorValue"];
+            limits?: components["schemas"]["Limits"];
             take?: components["schemas"]["Take"];
             variety?: components["schemas"]["Variety"];
             detail?: components["schemas"]["Detail"];
@@ -1714,6 +1735,8 @@ export interface components {
             /** @description As in Trust. */
             targets?: components["schemas"]["Met"][];
             retargeting?: components["schemas"]["Retargeting"];
+            /** @description As in Trust. */
+            limits?: components["schemas"]["BrokenLimit"][];
         };
         /** @description The take of a response; absent if it is the prediction. Since 3.3.0. */
         TakeFacts: {
@@ -1808,7 +1831,7 @@ export interface components {
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations`, and one for each target that is not reached. */
+            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations` and of `limits`, and one for each target that is not reached. */
             warnings: string[];
             /** @description Requested controls whose value the motion does not have. Absent if there is none. Since 3.1.0. */
             deviations?: components["schemas"]["Deviation"][];
@@ -1822,6 +1845,8 @@ export interface components {
             /** @description Feet that were made to stand. Absent for feet as predicted. Since 4.0.0. */
             feet?: components["schemas"]["FeetResult"];
             retargeting?: components["schemas"]["Retargeting"];
+            /** @description Joints of a robot that turn beyond their limits in a clip. Absent if there is none. Since 5.2.0. */
+            limits?: components["schemas"]["BrokenLimit"][];
         };
         /** @description Feet that were made to stand, over the whole motion. */
         FeetResult: {
@@ -2505,6 +2530,38 @@ export interface components {
                 "application/vnd.msgpack": string;
             };
         };
+        /** @description The clip in the format of the path. */
+        ClipFile: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                ETag: components["headers"]["ETag"];
+                Vary: components["headers"]["Vary"];
+                "Content-Disposition": components["headers"]["Disposition"];
+                "Posefield-Model": components["headers"]["Model"];
+                "Posefield-Sigma": components["headers"]["Sigma"];
+                "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Inferred": components["headers"]["Inferred"];
+                "Posefield-Supported": components["headers"]["Supported"];
+                "Posefield-Warning": components["headers"]["Warning"];
+                "Posefield-Missed": components["headers"]["Missed"];
+                [name: string]: unknown;
+            };
+            content: {
+                "model/vnd.usdc": string;
+                "model/vnd.usda": string;
+                "model/vnd.usdz+zip": string;
+                "application/json": components["schemas"]["ClipDocument"];
+                "application/x-bvh": string;
+                "model/gltf-binary": string;
+                "application/x-npz": string;
+                "application/vnd.apache.arrow.stream": string;
+                "application/vnd.msgpack": string;
+                "text/csv": string;
+                "text/plain": string;
+                "application/octet-stream": string;
+            };
+        };
         /** @description Suggested clips to capture. */
         Suggestions: {
             headers: {
@@ -2868,6 +2925,11 @@ export interface components {
          */
         clipFormat: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
         /**
+         * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
+         * @example usda
+         */
+        clipEnding: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack" | "unitree.csv" | "qpos.csv" | "holosoma.npz" | "mjlab.npz" | "beyondmimic.npz" | "isaaclab.npz" | "locomujoco.npz" | "qpos.npz" | "gmr.pkl" | "mimickit.pkl" | "asap.pkl" | "awd.json" | "amp.txt";
+        /**
          * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
          * @example json
          */
@@ -2935,6 +2997,8 @@ export interface components {
         root: components["schemas"]["Root"];
         /** @description Whether the clip is one whole cycle. */
         loop: components["schemas"]["Loop"];
+        /** @description Policy for clips in which a robot's joint turns beyond its limits. */
+        limits: components["schemas"]["Limits"];
         /** @description Whether the trust includes sigma for each joint. */
         jointSigma: components["schemas"]["JointSigma"];
         /**
@@ -3650,6 +3714,8 @@ export interface operations {
                  * @example 0,0,0.15
                  */
                 floor?: components["parameters"]["floor"];
+                /** @description Policy for clips in which a robot's joint turns beyond its limits. */
+                limits?: components["parameters"]["limits"];
                 /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
                 take?: components["parameters"]["take"];
                 /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
@@ -3809,6 +3875,8 @@ export interface operations {
                  * @example 0,0,0.15
                  */
                 floor?: components["parameters"]["floor"];
+                /** @description Policy for clips in which a robot's joint turns beyond its limits. */
+                limits?: components["parameters"]["limits"];
                 /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
                 take?: components["parameters"]["take"];
                 /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
@@ -3838,16 +3906,16 @@ export interface operations {
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
                  * @example usda
                  */
-                format: components["parameters"]["clipFormat"];
+                format: components["parameters"]["clipEnding"];
             };
             cookie?: never;
         };
         requestBody?: never;
         responses: {
-            200: components["responses"]["Clip"];
+            200: components["responses"]["ClipFile"];
             304: components["responses"]["NotModified"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
@@ -3873,16 +3941,16 @@ export interface operations {
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
                  * @example usda
                  */
-                format: components["parameters"]["clipFormat"];
+                format: components["parameters"]["clipEnding"];
             };
             cookie?: never;
         };
         requestBody: components["requestBodies"]["ClipQuestion"];
         responses: {
-            200: components["responses"]["Clip"];
+            200: components["responses"]["ClipFile"];
             400: components["responses"]["BadRequest"];
             401: components["responses"]["Unauthenticated"];
             403: components["responses"]["Forbidden"];
@@ -4937,7 +5005,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "5.1.0";
+export const CONTRACT = "5.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -5095,6 +5163,19 @@ export const MEDIA_TYPES = {
   "npz": "application/x-npz",
   "arrow": "application/vnd.apache.arrow.stream",
   "msgpack": "application/vnd.msgpack",
+  "unitree.csv": "text/csv",
+  "qpos.csv": "text/csv",
+  "holosoma.npz": "application/x-npz",
+  "mjlab.npz": "application/x-npz",
+  "beyondmimic.npz": "application/x-npz",
+  "isaaclab.npz": "application/x-npz",
+  "locomujoco.npz": "application/x-npz",
+  "qpos.npz": "application/x-npz",
+  "gmr.pkl": "application/octet-stream",
+  "mimickit.pkl": "application/octet-stream",
+  "asap.pkl": "application/octet-stream",
+  "awd.json": "text/plain",
+  "amp.txt": "text/plain",
   "zip": "application/zip",
   "tar": "application/x-tar"
 } as const;

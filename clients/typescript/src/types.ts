@@ -67,12 +67,13 @@ type Walk = NonNullable<operations["getCrowdInFormat"]["parameters"]["query"]>;
 type Asked<Question, Needed extends keyof Question> = Pick<Question, Needed> & Partial<Question>;
 
 export type ClipFormat = Schemas["ClipsQuestion"]["format"];
+export type ClipEnding = Format<"getClipInFormat">;
 export type CrowdFormat = Format<"getCrowdInFormat">;
 
 /** Archives of many clips. */
 export type ArchiveFormat = Format<"queryClipsInFormat">;
 
-type Format<Id extends "getCrowdInFormat" | "queryClipsInFormat"> =
+type Format<Id extends "getClipInFormat" | "getCrowdInFormat" | "queryClipsInFormat"> =
   operations[Id]["parameters"]["path"]["format"];
 
 /** Poses of the joints that the model's card names, at S times: metres, seconds, Y up. */

@@ -9,10 +9,8 @@ import numpy as np
 from posefield.common.units import Booleans, Floats
 from posefield.motion.contact_detection import ContactThresholds, detect_contacts
 from posefield.robots.robot import Robot, velocities
-from posefield.robots.robot_motion import RobotMotion
+from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
 
-LIMIT_TOLERANCE = np.radians(0.1)
-"""Angle beyond a limit that rounding explains."""
 SUNK, FLOATING, SKATING = 0.002, 0.02, 0.05
 """Depth of a sole below the floor, m, height of the lowest sole above it, m, and mean speed of a
 standing foot, m/s, from which each is told."""
@@ -123,7 +121,7 @@ def diagnose(motion: RobotMotion, robot: Robot | None) -> Diagnosis:
 
 
 def _beyond_limits(motion: RobotMotion, robot: Robot) -> list[Finding]:
-    excess = np.maximum(robot.ranges[:, 0] - motion.angles, motion.angles - robot.ranges[:, 1])
+    excess = motion.beyond_limits(robot)
     return [
         Finding(
             "limit",

@@ -18,7 +18,7 @@ from posefield.batch.target import open_target
 from posefield.common import cancellation
 from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode.conventions import Convention
-from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, left_out
+from posefield.encode.formats import ALL_ENCODERS, ClipEncoder, left_out
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clip_draft, clips
@@ -210,13 +210,13 @@ def _encode(
     return files
 
 
-@lru_cache(maxsize=len(CLIP_ENCODERS))
+@lru_cache(maxsize=len(ALL_ENCODERS))
 def clip_format(work: WorkerInput, extension: str) -> ClipFormat:
     """Return the format of the files of an export with this extension.
 
     Raises InvalidField for what files of the format cannot hold.
     """
-    encoder, job = CLIP_ENCODERS[extension], work.job
+    encoder, job = ALL_ENCODERS[extension], work.job
     if work.character is not None:
         # Modules that only exports for a character need.
         from posefield.characters import delivery

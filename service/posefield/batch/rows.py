@@ -30,10 +30,11 @@ from posefield.batch import tables
 from posefield.batch.tables import TABLES, Column, Columns, RawRow, RawRows, shortened_text
 from posefield.common.errors import InvalidField, QueryError, UnknownFormat, did_you_mean
 from posefield.common.units import Floats
-from posefield.encode.formats import CLIP_ENCODERS
+from posefield.encode.formats import ALL_ENCODERS, CLIP_ENCODERS
 from posefield.model_file.model_card import ModelCard
 from posefield.question import json_decoding, text_decoding
 from posefield.question.motion_question import LEGAL_NAME, ClipQuestion
+from posefield.robots.robot import Robot
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -125,7 +126,7 @@ class RowReader:
         values: dict[str, Any] = {}
         for column, cell in cells:
             if column.field == "format":
-                extension = _checked_format(cell)
+                extension = _checked_format(cell, self.model.session.card.robot)
             elif column.field == "name":
                 name = _checked_name(cell)
             elif isinstance(cell, str) and (self.text or column.field in TEXT_FIELDS):
@@ -153,12 +154,17 @@ def _merged(defaults: ClipQuestion, row: ClipQuestion, fields: Iterable[str]) ->
     return structs.replace(defaults, **values)
 
 
-def _checked_format(cell: object) -> str:
-    """Return the extension of a format; UnknownFormat for any other value."""
-    if isinstance(cell, str) and cell in CLIP_ENCODERS:
+def _checked_format(cell: object, robot: Robot | None) -> str:
+    """Return the extension of a format of a model's clips; robot: of the model, or None.
+
+    Raises UnknownFormat for any other value, and InvalidField as `ClipEncoder.check` does.
+    """
+    if isinstance(cell, str) and cell in ALL_ENCODERS:
+        ALL_ENCODERS[cell].check(robot)
         return cell
-    hint = did_you_mean(cell, CLIP_ENCODERS) if isinstance(cell, str) else ""
-    expected = f"expected one of {', '.join(CLIP_ENCODERS)}"
+    formats = CLIP_ENCODERS if robot is None else ALL_ENCODERS
+    hint = did_you_mean(cell, formats) if isinstance(cell, str) else ""
+    expected = f"expected one of {', '.join(formats)}"
     raise UnknownFormat("format", f"{shortened_text(cell)}{hint}, {expected}")
 
 
@@ -210,8 +216,8 @@ def open_source(
     for name, option in (("method", method), ("seed", seed)):
         if option is not None and sample is None:
             raise InvalidField(name, "without --sample, expected with it")
-    _checked_format(format)
     card = model.session.card
+    _checked_format(format, card.robot)
     middle = {control.name: control.default for control in card.controls}
     clips.check(model, structs.replace(question, controls=middle))
     columns = tables.table_columns(card)

@@ -118,6 +118,12 @@ class UserCharacter:
                 "body",
                 f"{axes.body!r} with a character, expected none given: the body is in its file",
             )
+        if form.of_robots:
+            raise InvalidField(
+                "character",
+                f"a character with the format {form.extension}, expected none given: the file "
+                "holds angles of the robot's hinges",
+            )
         if form.extension == "usdz" and self.stage is not None:
             raise InvalidField(
                 "character",

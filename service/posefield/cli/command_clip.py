@@ -21,7 +21,6 @@ from posefield.encode.formats import POSE_ENCODERS, ClipEncoder, encoder_for
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.question.results import ClipAnswer
 from posefield.question.walk_question import WalkQuestion
-from posefield.robots import robot_clip, robot_formats
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_files
@@ -60,15 +59,8 @@ def clip(
     Of a model of a robot a name such as walk.mjlab.npz writes a reference motion, in any format
     that `posefield doctor` writes.
     """
-    reference = robot_formats.of_file(output.name)
-    encoder = None if reference else encoder_for(output)
-    opened = open_model(model)
-    if reference:
-        answer = clips.synthesize_clip(opened, question)
-        robot = opened.session.card.robot
-        content = robot_clip.file_content(robot, answer.clip, reference, output.name)
-    if encoder:
-        answer, content = _clip_file(opened, encoder, output, question, character)
+    encoder = encoder_for(output)
+    answer, content = _clip_file(open_model(model), encoder, output, question, character)
     atomic_files.write(content, output)
     print_warnings(answer.trust)
     typer.echo(written_message(output, answer, json))
@@ -82,6 +74,7 @@ def _clip_file(
     character: CharacterOptions,
 ) -> tuple[ClipAnswer, bytes]:
     """Return a clip and its file, of the model's own or of a user's character."""
+    encoder.check(opened.session.card.robot)
     delivery = character.delivery(encoder, question, output)
     if delivery is None:
         convention = encoder.convention(question.unit, question.up, question.body)

@@ -36,6 +36,9 @@ from posefield.question.motion_question import BodyKind
 from posefield.question.performance_question import PerformanceLayout
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, SigmaGrid
+from posefield.robots import robot_clip, robot_formats
+from posefield.robots.robot import Robot
+from posefield.robots.robot_formats import RobotFormat
 
 
 def bvh(answer: SampledClip, convention: Convention) -> bytes:
@@ -62,7 +65,7 @@ class ClipEncoder(Format):
     default_convention: the convention, which its readers expect. convention_fixed: whether the
     format allows no other convention. inline_limit: number of frames up to which a file is written
     in a millisecond or two, so that other requests may wait for it. has_body, has_curves: whether
-    the format carries a body and curves.
+    the format carries a body and curves. of_robots: whether it holds reference motions of robots.
     """
 
     write: Callable[[Sequence[SampledClip], Convention], list[bytes]]
@@ -73,6 +76,12 @@ class ClipEncoder(Format):
     inline_limit: int = 200
     has_body: bool = False
     has_curves: bool = True
+    of_robots: bool = False
+
+    def check(self, robot: Robot | None) -> None:
+        """Raise InvalidField for a reference motion of a model of no robot."""
+        if self.of_robots:
+            robot_clip.require(robot, self.extension)
 
     def convention(
         self, unit: LengthUnit | None, up: UpAxis | None, body: BodyKind | None = None
@@ -108,7 +117,8 @@ class ClipEncoder(Format):
         if answer.clip.curves is not None and not self.has_curves:
             notes.append(left_out(answer.clip.curves.names, self.extension))
         if answer.clip.root_bone and not (self.has_body or self.extension == "bvh"):
-            notes.append(f"{self.extension} files have no root bone: the hips travel")
+            hips = "the base travels" if self.of_robots else "the hips travel"
+            notes.append(f"{self.extension} files have no root bone: {hips}")
         warnings = (*answer.trust.warnings, *notes)
         if not notes:
             return answer
@@ -216,8 +226,50 @@ CLIP_ENCODERS = by_extension(
 )
 
 
+def _robot_encoder(form: RobotFormat) -> ClipEncoder:
+    """Return the encoder of a format of reference motions, which has metres and Z up."""
+
+    def encode(answer: SampledClip, _: Convention) -> bytes:
+        # A performance, or a clip of a user's character, is of no robot.
+        single = answer if isinstance(answer, ClipAnswer) else None
+        robot = robot_clip.require(single.robot if single else None, form.name)
+        assert single
+        source = single.trust.model.partition("@")[0]
+        return form.content(robot_clip.of(robot).motion(single.clip, source, single.loops), robot)
+
+    return ClipEncoder(
+        form.name,
+        ROBOT_MEDIA_TYPES[form.suffix],
+        sequential_writer(encode),
+        # A body has 13 numbers and a hinge 2 in files of arrays.
+        bytes_per_joint=130,
+        working=700,
+        default_convention=Convention(1.0, "z"),
+        convention_fixed=True,
+        inline_limit=0,
+        has_curves=False,
+        of_robots=True,
+    )
+
+
+ROBOT_MEDIA_TYPES = {
+    ".csv": "text/csv",
+    ".npz": NPZ,
+    # No type is registered for pickles.
+    ".pkl": "application/octet-stream",
+    # Of other fields than the JSON documents of the contract.
+    ".json": "text/plain",
+    ".txt": "text/plain",
+}
+ROBOT_ENCODERS = by_extension(*map(_robot_encoder, robot_formats.WRITTEN.values()))
+"""Encoders of reference motions, of models of robots alone."""
+ALL_ENCODERS = {**CLIP_ENCODERS, **ROBOT_ENCODERS}
+
+
 def encoder_for(path: Path) -> ClipEncoder:
-    """Return the encoder for a path's suffix; UnknownFormat if there is none."""
+    """Return the encoder for the end of a path's name; UnknownFormat if there is none."""
+    if reference := robot_formats.of_file(path.name):
+        return ROBOT_ENCODERS[reference.name]
     extension = path.suffix.removeprefix(".")
     if extension not in CLIP_ENCODERS:
         extensions, hint = ", ".join(CLIP_ENCODERS), did_you_mean(extension, CLIP_ENCODERS)
@@ -311,6 +363,8 @@ def performance_encoder(form: ClipEncoder, layout: PerformanceLayout) -> Perform
 
     Raises InvalidField for a layout of segments in a format that has none.
     """
+    if form.of_robots:
+        form.check(None)
     if layout == "whole":
         return form.encode
     if form.extension not in SEGMENTED:

@@ -98,7 +98,7 @@ def _characters(settings: Settings) -> CharacterFolder:
 
 def _routes(operation: Operation, handler: Handler) -> Iterator[Route]:
     """Yield the routes of an operation: one per format if its path ends in `{format}`, else one."""
-    encoders = FORMATS.get(operation.id.removesuffix("InFormat"), {})
+    encoders = FORMATS.get(operation.id, FORMATS.get(operation.id.removesuffix("InFormat"), {}))
     _check_formats(operation, encoders)
     if not operation.formats:
         offers = tuple((name, encoder.media_type) for name, encoder in encoders.items())

@@ -8,8 +8,10 @@ from posefield.characters import delivery
 from posefield.constraints.targets import ConstraintSet
 from posefield.encode.conventions import JSON
 from posefield.encode.formats import (
+    ALL_ENCODERS,
     CLIP_ENCODERS,
     POSE_ENCODERS,
+    ROBOT_ENCODERS,
     ClipEncoder,
     TableEncoder,
     max_poses,
@@ -19,12 +21,15 @@ from posefield.http.request import ServiceRequest
 from posefield.http.worker_threads import POSE_LIMITER, SYNTHESIS_LIMITER, run_in_thread
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer
+from posefield.robots import robot_clip
 from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.poses import MAX_POSES, PreparedPoseQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
 # The default of Accept is binary USD.
 CLIP_FORMATS = {"usdc": CLIP_ENCODERS["usdc"], **CLIP_ENCODERS}
+CLIP_FILES = {**CLIP_FORMATS, **ROBOT_ENCODERS}
+"""Formats that end a path; reference motions of robots have equal media types."""
 
 
 async def answer_pose(request: ServiceRequest) -> Response:
@@ -63,7 +68,9 @@ def _encode_poses(
 
 async def answer_clip(request: ServiceRequest) -> Response:
     """Answer with one clip as a file, and the facts of its trust in headers."""
-    model, encoder = request.model, CLIP_ENCODERS[request.format]
+    model, encoder = request.model, ALL_ENCODERS[request.format]
+    if encoder.of_robots:
+        robot_clip.require(model.session.card.robot, encoder.extension)
     question = await request.decode(FileQuestion)
     if question.character is not None:
         return await _answer_delivered_clip(request, encoder, question, question.character)

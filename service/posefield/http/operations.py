@@ -18,7 +18,7 @@ from posefield.encode.formats import (
 from posefield.http import metrics, responses
 from posefield.http.archive_operations import answer_clips, answer_performances
 from posefield.http.crowd_operations import WALK_FORMATS, answer_crowd, answer_walk
-from posefield.http.motion_operations import CLIP_FORMATS, answer_clip, answer_pose
+from posefield.http.motion_operations import CLIP_FILES, CLIP_FORMATS, answer_clip, answer_pose
 from posefield.http.performance_operations import PERFORMANCE_FORMATS, answer_performance
 from posefield.http.request import ServiceRequest
 from posefield.http.routing import Handler
@@ -140,6 +140,8 @@ _FORMATTED: dict[str, tuple[Handler, Mapping[str, Format]]] = {
     "querySigma": (answer_sigma, GRID_ENCODERS),
 }
 FORMATS = {name: formats for name, (_, formats) in _FORMATTED.items()}
+# Endings of paths, where they are more than the formats of Accept.
+FORMATS |= {"getClipInFormat": CLIP_FILES, "queryClipInFormat": CLIP_FILES}
 """Encoders of the operations that have formats, the default of Accept first."""
 PAGES = ("getContract", "getContractJson", "getDocs", "getProblems", "getViewer")
 OPERATIONS: dict[str, Handler] = {

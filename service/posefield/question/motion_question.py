@@ -35,6 +35,7 @@ RootMode = Literal["travelling", "in_place"]
 FileRoot = Literal["travelling", "in_place", "bone"]
 """Root of a clip; "bone" is a joint of its own, on the floor above the hips."""
 FeetMode = Literal["stand", "as_predicted"]
+LimitsPolicy = Literal["refuse", "report"]
 
 
 class Floor(Struct, frozen=True, forbid_unknown_fields=True):
@@ -219,7 +220,8 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     stays in place, else it is the first one moved by the cycle's travel and turn. It plays N / fps
     seconds, which is the rounded duration. feet: "stand" plans stances and swings over the whole
     motion and places the legs; None is "stand" for models that travel and know contacts. floor:
-    plane in the frame of the clip; standing feet, swings and the pelvis follow it.
+    plane in the frame of the clip; standing feet, swings and the pelvis follow it. limits: "refuse"
+    is an error where a robot's hinge turns beyond its limits.
     """
 
     fps: Annotated[
@@ -261,6 +263,10 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
             extra={"metavar": "HEIGHT|HEIGHT,SLOPE_X,SLOPE_Z"},
         ),
     ] = 0.0
+    limits: Annotated[
+        LimitsPolicy,
+        Meta(description="whether a clip with a robot's joint beyond its limits is refused"),
+    ] = "report"
 
     @property
     def root_bone(self) -> bool:

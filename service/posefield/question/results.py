@@ -13,6 +13,7 @@ from posefield.common.units import MICROMETRES, Booleans, Floats, Singles
 from posefield.model_file.model_card import Control
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import Floor, LabelValue
+from posefield.robots.robot import Robot
 
 Number = TypeVar("Number", bound=np.floating[Any])
 
@@ -125,6 +126,27 @@ class FeetResult(Struct, frozen=True, omit_defaults=True):
     floor: Floor | None = None
 
 
+class BrokenLimit(Struct, frozen=True):
+    """A hinge of a robot beyond its limits in a clip, where it is worst.
+
+    time: s, of its frame from the first. angle: rad. limits: least and largest angle, rad.
+    """
+
+    joint: str
+    time: float
+    angle: float
+    limits: tuple[float, float]
+
+    @property
+    def sentence(self) -> str:
+        """Return the fact in words, for warnings."""
+        low, high = self.limits
+        return (
+            f"{self.joint} turns to {self.angle:.4g} rad at {self.time:.4g} s, and its limits are "
+            f"{low:.4g} to {high:.4g} rad"
+        )
+
+
 class Trust(Struct, frozen=True, omit_defaults=True):
     """Provenance and uncertainty of a result.
 
@@ -145,7 +167,7 @@ class Trust(Struct, frozen=True, omit_defaults=True):
     prediction. stretch: largest distance in time of a moment of the motion from its frame, s, which
     puts its event, its targets and its end on frames, or gives a loop whole steps; at most half a
     frame, None for frames at equal times. retargeting: report on the motion of a user's character;
-    empty for the model's own.
+    empty for the model's own. limits: hinges of a robot that turn beyond theirs.
     """
 
     model: str
@@ -167,6 +189,7 @@ class Trust(Struct, frozen=True, omit_defaults=True):
     take: Mapping[str, float] = {}
     stretch: float | None = None
     retargeting: Mapping[str, Any] = {}
+    limits: tuple[BrokenLimit, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """Return the Trust (schema of the contract): the facts and the band of sigma."""
@@ -218,9 +241,15 @@ class SampledClip:
 
 @dataclass(frozen=True)
 class ClipAnswer(SampledClip):
-    """A clip of one model."""
+    """A clip of one model.
+
+    robot: whose motion it is; None for a model of no robot. loops: whether its last frame equals
+    its first.
+    """
 
     trust: Trust
+    robot: Robot | None = None
+    loops: bool = False
 
 
 @dataclass(frozen=True)

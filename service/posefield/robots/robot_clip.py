@@ -6,6 +6,7 @@ has Y up and faces +Z; in its rest pose all angles are zero.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -17,7 +18,6 @@ from posefield.motion import skeleton as joint_trees
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.robots.robot import Robot
-from posefield.robots.robot_formats import RobotFormat
 from posefield.robots.robot_motion import RobotMotion
 
 
@@ -43,8 +43,8 @@ class RobotSkeleton:
         path = _to_y_up(motion.base_path)
         return rotations, joint_trees.translations(self.skeleton.offsets, path)
 
-    def motion(self, clip: Clip, source: str) -> RobotMotion:
-        """Return the robot's motion of a clip of its skeleton.
+    def motion(self, clip: Clip, source: str, loops: bool | None = None) -> RobotMotion:
+        """Return the robot's motion of a clip of its skeleton; source, loops: of a RobotMotion.
 
         An angle is taken between turns of the whole circle that lies nearest to its range.
         """
@@ -67,30 +67,25 @@ class RobotSkeleton:
             angles - 2.0 * np.pi * turns,
             clip.rate,
             self.robot.hinges,
+            loops,
         )
 
 
-def file_content(robot: Robot | None, clip: Clip, form: RobotFormat, name: str) -> bytes:
-    """Return a file of a robot's clip in a format of reference motions.
+def require(robot: Robot | None, name: str) -> Robot:
+    """Return the robot of a model or a clip; InvalidField if it is of none.
 
-    Raises InvalidField for a clip of no robot.
+    name: of the format of reference motions.
     """
-    motion = motion_of(robot, clip, name)
-    assert robot is not None and form.write is not None
-    return form.write(motion, robot)
-
-
-def motion_of(robot: Robot | None, clip: Clip, name: str) -> RobotMotion:
-    """Return the robot's motion of a clip; InvalidField for a clip of no robot."""
     if robot is None:
         raise InvalidField(
-            "output",
-            f"{name!r} is a reference motion of a robot, and this model is of none: expected a "
-            "model whose recipe has [robot]",
+            "format",
+            f"{name!r} is a reference motion of a robot, and this is a motion of none: expected a "
+            "clip of a model whose recipe has [robot]",
         )
-    return of(robot).motion(clip, name)
+    return robot
 
 
+@lru_cache(maxsize=16)
 def of(robot: Robot) -> RobotSkeleton:
     """Return the skeleton of a robot: a joint at each hinge, and at each body without one."""
     still = np.zeros((1, len(robot.hinges)))

@@ -50,6 +50,11 @@ class RobotFormat:
         """Return the suffix of its files."""
         return PurePosixPath(self.name).suffix
 
+    def content(self, motion: RobotMotion, robot: Robot) -> bytes:
+        """Return a file of a motion; only for formats that are written."""
+        assert self.write is not None
+        return self.write(motion, robot)
+
 
 FORMATS = (
     RobotFormat(

@@ -15,6 +15,10 @@ NORM_TOLERANCE = 1e-3
 """Deviation from a unit quaternion's norm that digits cut off explain."""
 
 
+LIMIT_TOLERANCE = np.radians(0.1)
+"""Angle beyond a limit that rounding explains."""
+
+
 @dataclass(frozen=True)
 class RobotMotion:
     """Frames of a robot's base and hinges, Z up.
@@ -101,6 +105,11 @@ class RobotMotion:
             )
         angles = self.angles[:, [self.hinges.index(name) for name in robot.hinges]]
         return replace(self, angles=angles, hinges=robot.hinges)
+
+    def beyond_limits(self, robot: Robot) -> HingeAngles:
+        """Return by how much each hinge is beyond its limits (F, H), rad; negative within them."""
+        low, high = robot.ranges.T
+        return np.asarray(np.maximum(low - self.angles, self.angles - high))
 
     def body_poses(self, robot: Robot) -> tuple[BodyPositions, BodyRotations]:
         """Return the positions (F, B, 3), m, and rotations (F, B, 4) of the robot's bodies."""

@@ -33,6 +33,7 @@ from posefield.question.motion_question import (
     check_range,
 )
 from posefield.question.results import (
+    BrokenLimit,
     ConstraintResult,
     FeetResult,
     PoseAnswer,
@@ -40,6 +41,8 @@ from posefield.question.results import (
     round_micrometres,
     split_results,
 )
+from posefield.robots.robot import Robot
+from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
 from posefield.synthesis import synthesizer
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
@@ -321,6 +324,19 @@ def of_frames(model: Synthesizer, draft: ClipDraft) -> Trust:
         return trust
     feet = trust.feet and _at_frames(draft, trust.feet)
     return structs.replace(trust, duration=draft.duration, stretch=stretch or None, feet=feet)
+
+
+def with_limits(trust: Trust, motion: RobotMotion, robot: Robot) -> Trust:
+    """Return the trust with the hinges of a robot that turn beyond their limits, and warnings."""
+    excess = motion.beyond_limits(robot)
+    limits = []
+    for hinge in np.flatnonzero(excess.max(axis=0) > LIMIT_TOLERANCE).tolist():
+        frame = int(excess[:, hinge].argmax())
+        low, high = robot.ranges[hinge].tolist()
+        time, angle = round(frame / motion.rate, 6), round(float(motion.angles[frame, hinge]), 6)
+        limits.append(BrokenLimit(robot.hinges[hinge], time, angle, (low, high)))
+    warnings = (*trust.warnings, *(limit.sentence for limit in limits))
+    return structs.replace(trust, limits=tuple(limits), warnings=warnings)
 
 
 def _at_frames(draft: ClipDraft, feet: FeetResult) -> FeetResult:

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import structs
 
 from posefield.common import cancellation
-from posefield.common.errors import QueryError
+from posefield.common.errors import InvalidField, QueryError
 from posefield.constraints import constrained_motion
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.targets import NO_CONSTRAINTS
@@ -22,6 +22,7 @@ from posefield.motion.clip import assemble
 from posefield.motion.curves import CurveValues
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
+from posefield.robots import robot_clip
 from posefield.synthesis import clip_draft, poses, standing_feet
 from posefield.synthesis.clip_draft import ClipDraft
 from posefield.synthesis.poses import MAX_POSES, OutputRow
@@ -174,7 +175,7 @@ def _set_strides(model: Synthesizer, draft: ClipDraft, duration: float) -> None:
         draft.plan_times = standing_feet.plan_times(duration, draft.cycle is not None)
 
 
-def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer:
+def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer | QueryError:
     question, answer = draft.question, draft.answer
     trust = clip_draft.of_frames(model, draft)
     if draft.strides is not None:
@@ -187,7 +188,13 @@ def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer:
     clip = assemble(draft.skeleton, turns, path, offsets, float(question.fps))
     if answer.curves is not None:
         clip = replace(clip, curves=CurveValues(model.session.card.curves, answer.curves))
-    return ClipAnswer(replace(clip, root_bone=question.root_bone), trust)
+    clip = replace(clip, root_bone=question.root_bone)
+    robot = model.session.card.robot
+    if robot is not None:
+        trust = clip_draft.with_limits(trust, robot_clip.of(robot).motion(clip, ""), robot)
+        if trust.limits and question.limits == "refuse":
+            return InvalidField("limits", f"'refuse', and {trust.limits[0].sentence}")
+    return ClipAnswer(clip, trust, robot, question.loop)
 
 
 def _without_travel(answer: PoseAnswer[np.float64], strides: Strides) -> PoseAnswer[np.float64]:
