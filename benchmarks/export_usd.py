@@ -21,8 +21,7 @@ from rows import Row, record, table
 from timing import in_turn
 
 from posefield.encode import character, crate_template, extent, layers, usd_clip, usd_library
-from posefield.encode.character import CharacterRig
-from posefield.encode.conventions import METRES
+from posefield.encode.character import METRES, CharacterRig
 from posefield.encode.crate_template import LayerBuilder, LayerContent
 from posefield.motion import clip as clips
 from posefield.motion import quat

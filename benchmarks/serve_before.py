@@ -22,7 +22,7 @@ from serve import ALONE, MANY, QUESTIONS, TOGETHER, crowd_body, get_requests, po
 from serve_load import Cost, Load, in_turn, post
 from serve_process import POSEFIELD, Server, free_port, started
 
-from posefield.encode.conventions import METRES
+from posefield.encode.character import METRES
 from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS
 from posefield.http import crowd_operations
 from posefield.inference import session

@@ -13,7 +13,7 @@ import typer
 from rich.text import Text
 
 from posefield import __version__, cli
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry

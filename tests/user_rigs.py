@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
 
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip

@@ -1,6 +1,6 @@
 """Clips as files of the service's own encoders, in each of the formats that training reads."""
 
-from posefield.encode.conventions import METRES, Convention
+from posefield.encode.character import METRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.results import SampledClip, Trust
 

@@ -17,7 +17,7 @@ from posefield.batch.rows import CheckedRow, Row, RowFault
 from posefield.batch.target import open_target
 from posefield.common import cancellation
 from posefield.common.errors import FileError, InvalidField, QueryError
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import ALL_ENCODERS, ClipEncoder, left_out
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer

@@ -21,7 +21,7 @@ from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField, did_you_mean
 from posefield.encode import extent
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles
 from posefield.question.motion_question import ClipQuestion

@@ -9,7 +9,7 @@ from msgspec import structs
 
 from posefield.characters.user_character import FileAxes, UserCharacter
 from posefield.common.errors import InvalidField
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.motion import quat
 from posefield.motion.clip import Clip

@@ -13,7 +13,7 @@ import numpy as np
 from posefield.common.errors import FileError, InvalidField, did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import glb
-from posefield.encode.conventions import METRES, Convention
+from posefield.encode.character import METRES, Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.motion import root_bone
 from posefield.motion.clip import Clip

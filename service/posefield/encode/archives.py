@@ -1,4 +1,6 @@
-"""Archives, tar or zip, streamed while their files are computed; equal files give equal bytes.
+"""Names of formats, and archives, tar or zip, which are streamed while their files are computed.
+
+Equal files give equal bytes.
 
 The members of zip archives are stored at multiples of 64 bytes, as USDZ requires, whose readers
 take the first member as the root layer. An archive larger than USDZ allows continues as a Zip64.
@@ -11,9 +13,32 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
 
 from posefield.common import atomic_files
-from posefield.encode.conventions import Format, by_extension
+
+JSON = "application/json"
+ARROW = "application/vnd.apache.arrow.stream"
+MSGPACK = "application/vnd.msgpack"
+# No type is registered for archives of arrays; some browsers would unpack application/zip.
+NPZ = "application/x-npz"
+
+
+@dataclass(frozen=True)
+class Format:
+    """Name and media type of a format; the name is the extension of its files."""
+
+    extension: str
+    media_type: str
+
+
+F = TypeVar("F", bound=Format)
+
+
+def by_extension(*formats: F) -> dict[str, F]:
+    """Return formats by their extensions, in the given order."""
+    return {kind.extension: kind for kind in formats}
+
 
 ALIGNMENT = 64
 PADDING_ID = 0x1986

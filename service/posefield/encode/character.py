@@ -1,4 +1,8 @@
-"""Character without motion: a skeleton in its rest pose and the body mesh skinned to it.
+"""Character without motion, in the convention of a file: unit of length, up axis and body.
+
+It is a skeleton in its rest pose and the body mesh skinned to it. For Z up the whole character is
+rotated with the axes, including the joints' own axes, so that the rotations of the rest pose remain
+the identity: (x, y, z) becomes (x, -z, y), which is exact. Numbers other than -0 never become -0.
 
 With a colon, hyphen, space or leading digit in a joint name some readers of USD silently drop the
 whole skeleton; readers that identify joints by their leaf name alone merge joints with equal names.
@@ -7,16 +11,15 @@ whole skeleton; readers that identify joints by their leaf name alone merge join
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.units import Floats, Singles
-from posefield.encode import conventions, extent, skinned_mesh
-from posefield.encode.conventions import METRES, Convention
+from posefield.common.units import Floats, LengthUnit, Singles, UpAxis
+from posefield.encode import extent, skinned_mesh
 from posefield.encode.extent import PointTree
 from posefield.encode.mannequin import mannequin
 from posefield.encode.skinned_mesh import BodyBounds, SkinnedMesh, bones_body
@@ -24,6 +27,87 @@ from posefield.motion import joint_roles, root_bone
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
+
+METRES_PER_UNIT: dict[LengthUnit, float] = {"m": 1.0, "cm": 0.01}
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Unit of length, as metres per unit, up axis, and kind of body of a file.
+
+    Formats without a body take no notice of it. A character whose up axis is Z still faces its
+    front: Y up, +Z ahead becomes Z up, -Y ahead.
+    """
+
+    metres_per_unit: float
+    up: UpAxis
+    body: BodyKind = DEFAULT_BODY
+
+
+METRES = Convention(1.0, "y")
+CENTIMETRES = Convention(0.01, "y")
+
+
+Coordinates = TypeVar("Coordinates", Floats, Singles)
+
+Z_UP_ORDER = [0, 2, 1]
+
+
+def convert_positions(convention: Convention, metres: Coordinates) -> Coordinates:
+    """Return positions or displacements (..., 3) in the unit and axes of a file.
+
+    metres: with Y up.
+    """
+    unit = convention.metres_per_unit
+    return convert_directions(convention, metres if unit == 1.0 else metres / unit)
+
+
+def convert_directions(convention: Convention, along: Coordinates) -> Coordinates:
+    """Return directions (..., 3) in the axes of a file.
+
+    along: with Y up.
+    """
+    if convention.up == "y":
+        return along
+    return along[..., Z_UP_ORDER] * np.array([1, -1, 1], along.dtype) + along.dtype.type(0.0)
+
+
+def convert_rotations(convention: Convention, turns: Singles) -> Singles:
+    """Return quaternions (..., 4), real part last, in the axes of a file.
+
+    turns: with Y up.
+    """
+    if convention.up == "y":
+        return turns
+    return turns[..., [*Z_UP_ORDER, 3]] * np.array([1, -1, 1, 1], turns.dtype) + turns.dtype.type(
+        0.0
+    )
+
+
+def convert_clip(convention: Convention, clip: Clip) -> Clip:
+    """Return the clip, with its skeleton, in the unit and axes of a file."""
+    if convention == METRES:
+        return clip
+    joints, turns = clip.skeleton, clip.rotations
+    offsets, tips = (convert_positions(convention, o) for o in (joints.offsets, joints.tip_offsets))
+    turned = np.concatenate(
+        [turns[..., :1], convert_directions(convention, turns[..., 1:])], axis=-1
+    )
+    return replace(
+        clip,
+        skeleton=replace(joints, offsets=offsets, tip_offsets=tips),
+        rotations=turned,
+        translations=convert_positions(convention, clip.translations),
+    )
+
+
+def convert_box(convention: Convention, corners: Floats) -> Floats:
+    """Return the lowest and highest corner (..., 2, 3) of boxes in the unit and axes of a file.
+
+    corners: m, with Y up.
+    """
+    return np.sort(convert_positions(convention, corners), axis=-2)
+
 
 LEGAL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -158,7 +242,7 @@ def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.ND
     local = _translation_matrices(convention, rest.offsets)
     arrays: dict[str, npt.NDArray[Any]] = {"bind": bind, "rest": local}
     if rest.rig.body is not None:
-        points = conventions.convert_positions(convention, rest.points)
+        points = convert_positions(convention, rest.points)
         arrays["points"] = points
     return arrays
 
@@ -180,5 +264,5 @@ def _translation_matrices(convention: Convention, metres: Floats) -> Floats:
     matrices[...] = np.eye(4)
     # To a tenth of a micrometre: short as decimals, and still near their float32 values.
     decimals = 7 + math.floor(math.log10(convention.metres_per_unit))
-    matrices[..., 3, :3] = conventions.convert_positions(convention, metres).round(decimals) + 0.0
+    matrices[..., 3, :3] = convert_positions(convention, metres).round(decimals) + 0.0
     return matrices

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.encode import crate_sections, layers
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.crate_sections import (
     DOUBLE,
     MARK,

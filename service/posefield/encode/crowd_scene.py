@@ -30,18 +30,9 @@ from pxr import Sdf, Vt
 
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, Singles
-from posefield.encode import (
-    archives,
-    character,
-    character_prims,
-    crate_template,
-    crowd_size,
-    extent,
-    layers,
-)
+from posefield.encode import archives, character, crate_template, crowd_size, extent, layers
 from posefield.encode.archives import ZipMember
-from posefield.encode.character import CharacterRig
-from posefield.encode.conventions import METRES
+from posefield.encode.character import METRES, CharacterRig
 from posefield.encode.crate_template import LayerContent
 from posefield.encode.extent import AnimationSamples
 from posefield.encode.layers import WEIGHTS, Samples, ValueTypes
@@ -307,15 +298,15 @@ def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKi
     """Return a layer in which every character refers to one prototype; the caller must hold it."""
     layer, rig = new_layer(crowd, form), character.rig(crowd.skeleton, body)
     root = layer.GetPrimAtPath(ROOT)
-    prototype = character_prims.root(root, PROTOTYPE.name, rig)
-    character_prims.add_blend_shapes(prototype, rig, crowd.curves)
-    character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
+    prototype = layers.add_character(root, PROTOTYPE.name, rig)
+    layers.add_blend_shapes(prototype, rig, crowd.curves)
+    layers.set_character(prototype, layers.usd_values(character.rest_pose_arrays(rig)))
     prototype.specifier = Sdf.SpecifierClass
     group = layers.prim(root, MOTIONS.name, "Scope")
     summaries = []
     for index, (samples, summary) in enumerate(all_motions(crowd, rig)):
         name = motion_name(index)
-        animation = character_prims.animation(group, name, rig.paths, crowd.curves)
+        animation = layers.add_animation(group, name, rig.paths, crowd.curves)
         layers.set_time_samples(animation, samples)
         summaries.append(summary)
     add_references(layer, crowd, instanced)
@@ -340,14 +331,14 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
     # their names' addresses, which differs between processes and shows in binary files.
     group, values = (
         characters_prim(layer),
-        character_prims.values(character.rest_pose_arrays(rig)),
+        layers.usd_values(character.rest_pose_arrays(rig)),
     )
     for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
-            prims = [character_prims.root(group, character_name(i), rig) for i in indices]
+            prims = [layers.add_character(group, character_name(i), rig) for i in indices]
             for prim in prims:
-                character_prims.add_blend_shapes(prim, rig, crowd.curves)
-                character_prims.set_values(prim, values)
+                layers.add_blend_shapes(prim, rig, crowd.curves)
+                layers.set_character(prim, values)
             set_transforms(prims, crowd.placement.select(indices))
             if crowd.presence is not None:
                 set_visibility(layer, prims, crowd.presence[indices], crowd.frames)
@@ -365,14 +356,14 @@ def _copy_motion(
     for index in np.flatnonzero(crowd.motion == played).tolist():
         cancellation.check()
         root = layer.GetPrimAtPath(character_path(index))
-        skel_animation = character_prims.animation(root, root.name, rig.paths, crowd.curves)
+        skel_animation = layers.add_animation(root, root.name, rig.paths, crowd.curves)
         if first is None:
             layers.set_time_samples(skel_animation, samples)
             first = skel_animation.path
         else:
             # Each spec lacks at most one field, so the order of copying does not matter.
             Sdf.CopySpec(layer, first, layer, skel_animation.path)
-        character_prims.bind_animation(root, skel_animation.path)
+        layers.bind_animation(root, skel_animation.path)
 
 
 LAYER_FOLDER, CHARACTER_FILE, SUMMARY_FILE = "crowd_clips", "character.usdc", "summary.usdc"
@@ -398,9 +389,9 @@ def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, b
     """Yield name and content of each other layer, one at a time."""
     rig, summaries = character.rig(crowd.skeleton, body), list[MotionSummary]()
     standing = _part_layer("Character", crowd)
-    prim = character_prims.root(standing, "Character", rig)
-    character_prims.add_blend_shapes(prim, rig, crowd.curves)
-    character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
+    prim = layers.add_character(standing, "Character", rig)
+    layers.add_blend_shapes(prim, rig, crowd.curves)
+    layers.set_character(prim, layers.usd_values(character.rest_pose_arrays(rig)))
     yield CHARACTER_FILE, layers.crate_bytes(standing)
     for index, (samples, summary) in enumerate(all_motions(crowd, rig)):
         summaries.append(summary)

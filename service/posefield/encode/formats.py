@@ -4,7 +4,7 @@ The table of archives is `archives.ARCHIVE_WRITERS`.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -14,24 +14,14 @@ from msgspec import structs
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField, UnknownFormat, did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode import conventions, glb, model_tables, motion_tables
+from posefield.encode import character, glb, model_tables, motion_tables
 from posefield.encode import table as tables
-from posefield.encode.conventions import (
-    ARROW,
-    CENTIMETRES,
-    JSON,
-    METRES,
-    METRES_PER_UNIT,
-    MSGPACK,
-    NPZ,
-    Convention,
-    Format,
-    by_extension,
-)
+from posefield.encode.archives import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
+from posefield.encode.character import CENTIMETRES, METRES, METRES_PER_UNIT, Convention
 from posefield.encode.crowd_size import STREAMS
 from posefield.encode.table import Table, arrow_stream, npz_table
 from posefield.motion import bvh_writer, root_bone
-from posefield.motion.clip import CrowdClip, CrowdPoses
+from posefield.motion.clip import CrowdPoses
 from posefield.question.motion_question import BodyKind
 from posefield.question.performance_question import PerformanceLayout
 from posefield.question.performance_report import PerformanceAnswer
@@ -46,7 +36,7 @@ def bvh(answer: SampledClip, convention: Convention) -> bytes:
     converted = answer.clip
     if converted.root_bone:
         converted = root_bone.add_root(converted, root_bone.with_root(converted.skeleton))
-    clip = conventions.convert_clip(Convention(1.0, convention.up), converted)
+    clip = character.convert_clip(Convention(1.0, convention.up), converted)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
 
 
@@ -333,23 +323,8 @@ GRID_ENCODERS: dict[str, TableEncoder[SigmaGrid]] = by_extension(
 )
 
 
-@dataclass(frozen=True)
-class CrowdWriter(Format):
-    """Writer of walking crowds as streams of USD in one format."""
-
-    def stream(self, crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
-        """Return an iterator over the bytes of a crowd.
-
-        Raises InvalidField as `crowd_writer.stream` does.
-        """
-        from posefield.encode import crowd_writer
-
-        return crowd_writer.stream(crowd, self.extension, instancing, body)
-
-
-CROWD_WRITERS = by_extension(
-    *(CrowdWriter(name, CLIP_ENCODERS[name].media_type) for name in STREAMS)
-)
+CROWD_FORMATS = by_extension(*(Format(name, CLIP_ENCODERS[name].media_type) for name in STREAMS))
+"""Formats in which `crowd_writer.stream` writes walking crowds."""
 
 
 SEGMENTED = ("usda", "usdc", "usdz")

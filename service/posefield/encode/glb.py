@@ -23,8 +23,7 @@ import orjson
 
 from posefield.common.units import Floats, Singles
 from posefield.encode import character, skinned_mesh
-from posefield.encode.character import CharacterRig, RestPose
-from posefield.encode.conventions import Convention
+from posefield.encode.character import CharacterRig, Convention, RestPose
 from posefield.encode.skinned_mesh import SkinnedMesh
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip

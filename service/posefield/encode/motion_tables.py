@@ -8,9 +8,9 @@ import numpy as np
 
 from posefield.common import atomic_files
 from posefield.common.units import Floats
-from posefield.encode import conventions
+from posefield.encode import character
 from posefield.encode import table as tables
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.table import Column, Table, as_float32
 from posefield.motion import quat
 from posefield.motion.clip import Clip, CrowdClip, CrowdPoses
@@ -35,7 +35,7 @@ def clip_json(answer: SampledClip, convention: Convention) -> bytes:
     Numbers are rounded, unlike those of `table`, since the time to write JSON grows with its
     digits.
     """
-    clip = conventions.convert_clip(convention, answer.clip)
+    clip = character.convert_clip(convention, answer.clip)
     content = {
         "units": unit_names(convention),
         "names": clip.skeleton.names,
@@ -55,7 +55,7 @@ def clip_json(answer: SampledClip, convention: Convention) -> bytes:
 
 def clip_table(answer: SampledClip, convention: Convention) -> Table:
     """Return the clip as a table of one row per frame; bone offsets are one array for all."""
-    clip = conventions.convert_clip(convention, answer.clip)
+    clip = character.convert_clip(convention, answer.clip)
     numbers = {name: tables.as_float32(values) for name, values in motion_arrays(clip).items()}
     fixed = {"bone_offsets": numbers.pop("bone_offsets")}
     facts = {

@@ -19,8 +19,8 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from posefield.common.units import Booleans
-from posefield.encode import character_prims, layers, usd_clip
-from posefield.encode.conventions import Convention
+from posefield.encode import layers, usd_clip
+from posefield.encode.character import Convention
 from posefield.encode.crate_template import LayerContent
 from posefield.encode.layers import ValueTypes
 from posefield.encode.usd_clip import ClipLayerBuilder
@@ -87,7 +87,7 @@ def _add_segment(
     content: LayerContent,
 ) -> None:
     name = f"s{index:03}"
-    prim = character_prims.animation(group, name, builder.rig.paths, builder.curves)
+    prim = layers.add_animation(group, name, builder.rig.paths, builder.curves)
     prim.customData = {layers.FACTS: layers.usd_dictionary(facts)}
     frames = segment_frames(facts["begins"], facts["ends"], builder.rate, content.frames)
     rows = slice(frames.start, frames.stop)

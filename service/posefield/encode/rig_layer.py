@@ -18,8 +18,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
 
 from posefield.common.errors import UsdError
 from posefield.common.units import Floats, JointWeights, Positions, Rotations, Singles
-from posefield.encode import character, character_prims, layers
-from posefield.encode.conventions import METRES, Convention
+from posefield.encode import character, layers
+from posefield.encode.character import METRES, Convention
 from posefield.encode.layers import ValueTypes
 from posefield.motion import joint_roles, quat
 from posefield.question.results import SampledClip
@@ -199,7 +199,7 @@ def referring_layer(answer: SampledClip, rest: RestJoints, stage: RigStage, refe
         root.referenceList.prependedItems = [Sdf.Reference(reference, root.path)]
         _set_extent(layer, answer, rest, stage)
         skeleton = Sdf.CreatePrimInLayer(layer, stage.skeleton)
-        schemas = Sdf.TokenListOp.Create(prependedItems=list(character_prims.BINDING_SCHEMAS))
+        schemas = Sdf.TokenListOp.Create(prependedItems=list(layers.BINDING_SCHEMAS))
         skeleton.SetInfo("apiSchemas", schemas)
         animation = Sdf.Path(stage.animation)
         layers.add_relationship(skeleton, "skel:animationSource", animation)
@@ -214,7 +214,7 @@ def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
     paths = character.joint_paths(
         character.legal_names(rest_in_metres.names), rest_in_metres.parents
     )
-    schemas = character_prims.BINDING_SCHEMAS
+    schemas = layers.BINDING_SCHEMAS
     with Sdf.ChangeBlock():
         _set_metadata(layer, answer, SKELETON_ROOT, METRES)
         root = layers.prim(layer, SKELETON_ROOT, "SkelRoot", schemas)
@@ -224,7 +224,7 @@ def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
         _add_extent(root, box)
         _add_skeleton(root, paths, rest_in_metres)
         _add_animation(root, ANIMATION, paths, answer, rest_in_metres)
-        character_prims.bind_animation(root, root.path.AppendChild(ANIMATION))
+        layers.bind_animation(root, root.path.AppendChild(ANIMATION))
     return layer
 
 
@@ -249,7 +249,7 @@ def _add_extent(root: Any, box: Floats) -> None:
 
 def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
     """Add a skeleton, whose bind pose is its rest pose."""
-    skeleton = layers.prim(root, "Skel", "Skeleton", character_prims.BINDING_SCHEMAS)
+    skeleton = layers.prim(root, "Skel", "Skeleton", layers.BINDING_SCHEMAS)
     layers.add_relationship(root, "skel:skeleton", skeleton.path)
     positions = rest.skeleton.at_rest(rest.skeleton.offsets)
     tokens = {"joints": list(paths), "jointNames": list(rest.names)}
@@ -272,7 +272,7 @@ def _add_animation(
         "rotations": _as_float32(rotations[..., [1, 2, 3, 0]]),
         "translations": _as_float32(rest.file_translations(clip.translations)),
     }
-    skel_animation = character_prims.animation(root, name, tuple(joints))
+    skel_animation = layers.add_animation(root, name, tuple(joints))
     sizes = Vt.Vec3hArray([Gf.Vec3h(*size) for size in rest.scales.tolist()])
     skel_animation.attributes["scales"].default = sizes
     layers.set_time_samples(skel_animation, samples)

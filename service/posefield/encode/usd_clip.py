@@ -18,17 +18,8 @@ from pxr import Sdf
 
 from posefield.common import cancellation
 from posefield.common.units import Singles
-from posefield.encode import (
-    archives,
-    character,
-    character_prims,
-    conventions,
-    crate_template,
-    extent,
-    layers,
-)
-from posefield.encode.character import CharacterRig
-from posefield.encode.conventions import Convention
+from posefield.encode import archives, character, crate_template, extent, layers
+from posefield.encode.character import CharacterRig, Convention
 from posefield.encode.crate_template import Array, LayerBuilder, LayerContent
 from posefield.encode.extent import AnimationSamples
 from posefield.encode.layers import WEIGHTS, Samples
@@ -94,8 +85,8 @@ def _curve_names(clip: Clip) -> tuple[str, ...]:
 def _samples(
     samples: AnimationSamples, answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[Samples]:
-    translations = conventions.convert_positions(convention, samples.translations)
-    rotations = conventions.convert_rotations(convention, samples.rotations)
+    translations = character.convert_positions(convention, samples.translations)
+    rotations = character.convert_rotations(convention, samples.rotations)
     for answer, (first, last) in zip(answers, pairwise(samples.starts), strict=True):
         arrays = {"translations": translations[first:last], "rotations": rotations[first:last]}
         yield arrays | _weights(answer.clip)
@@ -126,9 +117,7 @@ class ClipLayerBuilder(LayerBuilder):
         layer.TransferContent(_character_prims(self.rig, self.convention, self.curves))
         with Sdf.ChangeBlock():
             self.set_metadata(layer, ROOT.name, content)
-            character_prims.set_values(
-                layer.GetPrimAtPath(ROOT), character_prims.values(content.values)
-            )
+            layers.set_character(layer.GetPrimAtPath(ROOT), layers.usd_values(content.values))
             layers.set_time_samples(layer.GetPrimAtPath(ANIMATION), content.samples)
         return layer
 
@@ -140,10 +129,10 @@ def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[st
     Cached, since building it takes as long as exporting it.
     """
     layer = Sdf.Layer.CreateAnonymous("prims.usda")
-    root = character_prims.root(layer, ROOT.name, rig, convention)
-    character_prims.add_blend_shapes(root, rig, curves)
-    animation = character_prims.animation(root, ANIMATION.name, rig.paths, curves)
-    character_prims.bind_animation(root, animation.path)
+    root = layers.add_character(layer, ROOT.name, rig, convention)
+    layers.add_blend_shapes(root, rig, curves)
+    animation = layers.add_animation(root, ANIMATION.name, rig.paths, curves)
+    layers.bind_animation(root, animation.path)
     return layer
 
 
@@ -179,7 +168,7 @@ def builders_and_contents(
         rest = character.rest_pose(rig, animation.offsets)
         boxes = extent.bounding_boxes(rig.tree, animation, rest.radii)
         values = character.character_arrays(rest, convention)
-        values["extent"] = conventions.convert_box(convention, boxes).astype(np.float32)
+        values["extent"] = character.convert_box(convention, boxes).astype(np.float32)
         for index, samples in enumerate(_samples(animation, clips, convention)):
             clip = clips[index].clip
             builder = ClipLayerBuilder(clip.rate, convention, rig, _curve_names(clip))
@@ -203,7 +192,7 @@ class AnimationLayerBuilder(LayerBuilder):
         self.set_metadata(layer, ANIMATION_NAME, content)
         with Sdf.ChangeBlock():
             layers.set_time_samples(
-                character_prims.animation(layer, ANIMATION_NAME, self.paths, self.curves),
+                layers.add_animation(layer, ANIMATION_NAME, self.paths, self.curves),
                 content.samples,
             )
         return layer

@@ -19,9 +19,8 @@ import numpy as np
 from pxr import Sdf
 
 from posefield.common.units import Floats
-from posefield.encode import character, character_prims, conventions, layers
-from posefield.encode.character import CharacterRig
-from posefield.encode.conventions import Convention
+from posefield.encode import character, layers
+from posefield.encode.character import CharacterRig, Convention
 from posefield.motion.skeleton import Skeleton
 
 ROOT = Sdf.Path("/Character")
@@ -63,10 +62,10 @@ def library_stage(
     rig = character.rig(skeleton, convention.body, has_root)
     character_layer = _character_layer(rig, convention, rate, entries)
     root = character_layer.GetPrimAtPath(ROOT)
-    character_prims.add_blend_shapes(root, rig, curves)
+    layers.add_blend_shapes(root, rig, curves)
     layers.prim(root, CLIPS.name, "Scope")
     for name in prims[:1]:
-        character_prims.bind_animation(root, CLIPS.AppendChild(name))
+        layers.bind_animation(root, CLIPS.AppendChild(name))
     text: str = character_layer.ExportToString()
     head, opening, tail = text.rpartition(CLIPS_SCOPE)
     clips = "\n".join(_clip_prims(prims, entries))
@@ -80,10 +79,10 @@ def _character_layer(
     layer = Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((entry.frames - 1) / entry.rate for entry in entries) if entries else 0.0
     layers.set_layer_metadata(layer, ROOT.name, round(lasting * rate) + 1, rate, convention)
-    root = character_prims.root(layer, ROOT.name, rig, convention)
+    root = layers.add_character(layer, ROOT.name, rig, convention)
     numbers = character.rest_pose_arrays(rig, convention)
     extent = _library_box(numbers["extent"], entries, convention)
-    character_prims.set_values(root, character_prims.values({**numbers, "extent": extent}))
+    layers.set_character(root, layers.usd_values({**numbers, "extent": extent}))
     return layer
 
 
@@ -105,5 +104,5 @@ def _asset_path(file: str) -> str:
 def _library_box(rest: Floats, entries: Sequence[LibraryEntry], convention: Convention) -> Floats:
     """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
     boxes = np.array([(entry.low, entry.high) for entry in entries]).reshape(-1, 2, 3)
-    box = np.concatenate([rest[None], conventions.convert_box(convention, boxes)])
+    box = np.concatenate([rest[None], character.convert_box(convention, boxes)])
     return np.stack([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]).astype(np.float32)

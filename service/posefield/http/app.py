@@ -7,7 +7,7 @@ from pathlib import Path
 
 from posefield.characters import user_character
 from posefield.characters.user_character import EMPTY, CharacterFolder
-from posefield.encode.conventions import Format
+from posefield.encode.archives import Format
 from posefield.http import request, responses, static_page
 from posefield.http.access import access_control
 from posefield.http.api import contract

@@ -15,7 +15,7 @@ from typing import Any
 from anyio import to_thread
 
 from posefield.common import cancellation
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.http import metrics, worker_threads
 from posefield.question.motion_question import ClipQuestion

@@ -18,7 +18,7 @@ from posefield.encode import character, crowd_size
 from posefield.encode.crowd_size import CrowdCounts
 from posefield.encode.formats import (
     CROWD_ENCODERS,
-    CROWD_WRITERS,
+    CROWD_FORMATS,
     max_poses,
 )
 from posefield.http import responses
@@ -50,7 +50,7 @@ from posefield.validation.crowd_validation import (
 )
 
 # The default of Accept is binary USD.
-WALK_FORMATS = {"usdc": CROWD_WRITERS["usdc"], **CROWD_WRITERS}
+WALK_FORMATS = {"usdc": CROWD_FORMATS["usdc"], **CROWD_FORMATS}
 DEFAULT_PIXELS = 1.0
 VALUES, FEWEST = 64, 100_000
 """Maximum values of a character, and minimum number of characters that the limit allows for."""
@@ -286,19 +286,22 @@ async def answer_crowd(request: ServiceRequest) -> Response:
 
 async def answer_walk(request: ServiceRequest) -> Response:
     """Answer with a walking crowd as USD, whose motions are computed as they are sent."""
-    model, writer = request.model, CROWD_WRITERS[request.format]
+    model, form = request.model, CROWD_FORMATS[request.format]
     question = await request.decode(WalkQuestion)
-    order = checked_order(question, writer.extension, model.session.card, request.service.settings)
+    order = checked_order(question, form.extension, model.session.card, request.service.settings)
 
     def work() -> tuple[CrowdClip, Iterator[bytes]]:
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode import crowd_writer
+
         # The gait of a model is measured at its first use.
         crowd = walking_feet.build_crowd(model, model.gait, order)
         body = question.body or DEFAULT_BODY
-        return crowd, writer.stream(crowd, question.instancing, body)
+        return crowd, crowd_writer.stream(crowd, form.extension, question.instancing, body)
 
     crowd, pieces = await run_in_thread(work, limiter=CROWD_LIMITER)
     share, warnings = float(crowd.facts["outside_share"]), list(crowd.facts.get("warnings", ()))
     if share:
         outside = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
         warnings.insert(0, outside)
-    return responses.stream(pieces, writer, model.name, warnings, CROWD_LIMITER, model.identity)
+    return responses.stream(pieces, form, model.name, warnings, CROWD_LIMITER, model.identity)

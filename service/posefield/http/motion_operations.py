@@ -6,7 +6,7 @@ from starlette.responses import Response
 
 from posefield.characters import delivery
 from posefield.constraints.targets import ConstraintSet
-from posefield.encode.conventions import JSON
+from posefield.encode.archives import JSON
 from posefield.encode.formats import (
     ALL_ENCODERS,
     CLIP_ENCODERS,

@@ -7,8 +7,7 @@ from starlette.responses import Response
 
 from posefield.common.errors import InvalidField
 from posefield.encode import glb, model_tables
-from posefield.encode.archives import ARCHIVE_WRITERS
-from posefield.encode.conventions import Format
+from posefield.encode.archives import ARCHIVE_WRITERS, Format
 from posefield.encode.formats import (
     CLIP_ENCODERS,
     CROWD_ENCODERS,

@@ -26,7 +26,7 @@ from starlette.responses import Response, StreamingResponse
 
 import posefield
 from posefield.common.errors import InvalidField
-from posefield.encode.conventions import Format
+from posefield.encode.archives import Format
 from posefield.http import worker_threads
 from posefield.question.performance_report import PerformanceReport
 from posefield.question.results import Trust

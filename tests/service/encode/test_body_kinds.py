@@ -11,7 +11,7 @@ from pxr import Usd, UsdShade, UsdSkel
 
 from posefield.common.errors import InvalidField
 from posefield.encode import crowd_writer
-from posefield.encode.formats import CLIP_ENCODERS, CROWD_WRITERS
+from posefield.encode.formats import CLIP_ENCODERS
 
 BODILESS = [name for name, each in CLIP_ENCODERS.items() if not each.has_body]
 KINDS = ("none", "mannequin", "bones")
@@ -93,5 +93,5 @@ def test_a_crowd_has_the_body_that_is_asked_for(tmp_path, instancing, kind):
     meshes = [prim for prim in stage.TraverseAll() if prim.GetTypeName() == "Mesh"]
     assert (not meshes) == (kind == "none")
     again = crowds.crowd(person, crowds.motions(person, 2, 5), np.array([0, 1, 1]))
-    sent = b"".join(CROWD_WRITERS["usda"].stream(again, instancing, kind))
+    sent = b"".join(crowd_writer.stream(again, "usda", instancing, kind))
     assert sent == path.read_bytes()

@@ -19,7 +19,7 @@ import pytest
 from pxr import Sdf, UsdUtils
 
 from posefield.common.errors import FileError, InvalidField
-from posefield.encode import character, character_prims, crowd_size, crowd_writer, layers
+from posefield.encode import character, crowd_size, crowd_writer, layers
 
 FOLDER = Path(__file__).parent
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
@@ -174,7 +174,7 @@ def print_digests():
             )
             print(ending, instancing, hashlib.sha256(sent).hexdigest())  # noqa: T201
     layer, copy = Sdf.Layer.CreateAnonymous("x.usdc"), Sdf.Layer.CreateAnonymous("x.usdc")
-    prim = character_prims.root(layer, "Character", character.rig(person))
+    prim = layers.add_character(layer, "Character", character.rig(person))
     Sdf.CopySpec(layer, prim.path, copy, prim.path)
     print("CopySpec", hashlib.sha256(layers.crate_bytes(copy)).hexdigest())  # noqa: T201
 

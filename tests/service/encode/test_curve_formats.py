@@ -9,7 +9,7 @@ import pytest
 from pxr import Usd, UsdSkel
 
 from posefield.encode import character, layers, usd_clip
-from posefield.encode.conventions import METRES
+from posefield.encode.character import METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion.curves import Curve, CurveValues
 from posefield.question.results import ClipAnswer

@@ -5,7 +5,7 @@ import numpy as np
 import orjson
 import pytest
 
-from posefield.encode.conventions import CENTIMETRES, METRES, Convention
+from posefield.encode.character import CENTIMETRES, METRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import skeleton
 from posefield_train.source import bvh

@@ -8,7 +8,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
 from posefield.encode import extent, layers, usd_clip, usd_library
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CENTIMETRES, METRES
 from posefield.question.results import ClipAnswer
 

@@ -12,7 +12,7 @@ from user_rigs import glb_positions, still
 from posefield.characters.delivery import deliver
 from posefield.characters.user_character import open_character
 from posefield.common.errors import InvalidField
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import quat, root_bone
 from posefield.motion.skeleton import Skeleton

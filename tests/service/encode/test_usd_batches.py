@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from posefield.encode import crate_template, layers, usd_clip
-from posefield.encode.conventions import CENTIMETRES, Convention
+from posefield.encode.character import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.motion import clip as clips
 from posefield.motion import quat

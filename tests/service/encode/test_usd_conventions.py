@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CENTIMETRES, CLIP_ENCODERS, METRES
 
 CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), Convention(0.0254, "z")]

@@ -7,7 +7,7 @@ from user_rigs import glb_positions, glb_rig, read_glb, stage_positions, usd_rig
 
 from posefield.characters.user_character import open_character
 from posefield.common.errors import FileError, InvalidField
-from posefield.encode.conventions import Convention
+from posefield.encode.character import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import FileQuestion

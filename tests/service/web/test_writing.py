@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from msgspec import structs
 
-from posefield.encode.conventions import CENTIMETRES, METRES
+from posefield.encode.character import CENTIMETRES, METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import batching
 from posefield.http.batching import ClipBatcher
