@@ -17,7 +17,7 @@ from posefield_train.align import phase_alignment, time_alignment, travel
 from posefield_train.align.time_alignment import AlignedClips, Refinement
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import CanonicalTiming, WarpBasis
-from posefield_train.contacts import contact_model
+from posefield_train.contacts import common_stances, contact_model
 from posefield_train.graph import onnx_export, truncation_cost, warped_errors
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.onnx_export import ExportedModel
@@ -184,7 +184,8 @@ def _vectorize(
         aligned, travels["travel"] = travel.remove_travel(aligned)
     offsets = np.stack([example.offsets for example in examples])
     parents, curves = examples[0].clip.skeleton.parents, examples[0].clip.curves
-    numbers, chart, noticed = motion_tensor.pose_vectors(aligned, parents, offsets)
+    hinged = examples[0].robot is not None
+    numbers, chart, noticed = motion_tensor.pose_vectors(aligned, parents, offsets, hinged)
     if samples.inducing is not None:
         aligned = aligned.without_poses()
     tensor = motion_tensor.build_tensor(
@@ -436,6 +437,7 @@ def _fit_and_truncate(
         reference.evaluate(reduced),
         joint_error_shares(reference, full, fits.pose, residuals.get("travel")),
         contacts=contacts,
+        soles=common_stances.find(examples[0].robot, clips.aligned, clips.travels.get("travel")),
         contact_notes=tuple(notes),
     )
 

@@ -74,6 +74,7 @@ def training_notes(trained: TrainedModel) -> list[str]:
         *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
         *phase_alignment.shift_notes(trained.examples),
         *trained.contact_notes,
+        *trained.soles.notes,
     ]
 
 
@@ -199,6 +200,7 @@ def build_card(
         captured_acceleration=captured_acceleration(examples),
         hinges=captured_hinges.measure_hinges(examples, roles),
         robot=examples[0].robot,
+        soles=trained.soles.points,
     )
 
 

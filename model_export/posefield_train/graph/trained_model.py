@@ -1,6 +1,6 @@
 """A trained model with its training data and diagnostics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align.time_alignment import AlignedClips
+from posefield_train.contacts.common_stances import CommonStances
 from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging.kriging_tuning import TunedKriging
@@ -52,7 +53,7 @@ class TrainedModel:
     leave-one-out residuals (N, m) of each quantity but the pose. truncation_errors: of the reduced
     tensor. joints: leave-one-out error (J,) of each joint as a share of the root mean square of
     all. outliers: evidence against clips that do not fit. contacts: of the feet, None without them.
-    contact_notes: assumptions about them. notes: of the import.
+    contact_notes: assumptions about them. soles: of a robot. notes: of the import.
     """
 
     recipe: Recipe
@@ -76,6 +77,7 @@ class TrainedModel:
     outliers: tuple[Outlier, ...] = ()
     contacts: FittedContacts | None = None
     contact_notes: tuple[str, ...] = ()
+    soles: CommonStances = field(default_factory=CommonStances)
     notes: tuple[str, ...] = ()
 
     @property

@@ -151,15 +151,16 @@ class MotionTensor:
 
 
 def pose_vectors(
-    aligned: AlignedClips, parents: tuple[int, ...], offsets: ClipBones
+    aligned: AlignedClips, parents: tuple[int, ...], offsets: ClipBones, hinged: bool = False
 ) -> tuple[PoseVectors, PoseChart, list[Finding]]:
     """Return pose vectors (N, T, D) of aligned clips, their chart, and flips and far joints.
 
-    offsets: bone offsets (N, J, 3) of each clip's performer, m.
+    offsets: bone offsets (N, J, 3) of each clip's performer, m. hinged: whether the joints are a
+    robot's hinges, whose angles are linear in the numbers.
     """
     small = canonical.small_joints(parents, offsets.mean(axis=0))
     rotations, flipped = canonical.remove_flips(aligned.rotations, small)
-    own_chart, far = chart.fit_chart(rotations)
+    own_chart, far = chart.fit_chart(rotations, linear=hinged)
     numbers = own_chart.numbers(rotations, aligned.root_path)
     if aligned.curves is not None:
         numbers = np.concatenate([numbers, aligned.curves], axis=-1)

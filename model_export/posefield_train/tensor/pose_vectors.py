@@ -119,10 +119,11 @@ class PoseChart:
         return quat.log(quat.mul(quat.conj(self.means), rotations))
 
 
-def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:
+def fit_chart(rotations: ClipRotations, linear: bool = False) -> tuple[PoseChart, list[Finding]]:
     """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints.
 
-    It is stereographic unless a rotation lies farther than FARTHEST from its mean.
+    It is stereographic unless a rotation lies farther than FARTHEST from its mean, or is to be
+    linear in the angle of a hinge.
     """
     plain = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])), "rotation_vector")
     farthest, far = 0.0, []
@@ -130,7 +131,7 @@ def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:
         vectors = plain.rotation_vectors(rotations[rows])
         far += _far_joints(vectors, rows.start)
         farthest = max(farthest, float(np.linalg.norm(_unwrap(vectors), axis=-1).max()))
-    return plain if farthest > FARTHEST else replace(plain, chart="stereographic"), far
+    return plain if linear or farthest > FARTHEST else replace(plain, chart="stereographic"), far
 
 
 def _jumps(vectors: ClipPositions) -> Annotated[Booleans, "clips joints"]:

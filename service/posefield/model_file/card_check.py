@@ -343,6 +343,7 @@ def _check_hinges(card: ModelCard) -> None:
 
 def _check_robot(card: ModelCard) -> None:
     robot = card.robot
+    _expect(robot is not None or not card.soles, "soles", len(card.soles), "none without a robot")
     if robot is None:
         return
     bodies, hinges = len(robot.bodies), len(robot.hinges)
@@ -369,6 +370,16 @@ def _check_robot(card: ModelCard) -> None:
         _expect(unit, f"robot.{name}", lengths.tolist(), "lengths of 1")
     skeleton = robot_clip.of(robot).skeleton
     _expect(skeleton.same_tree(card.skeleton), "robot", robot.name, "the joints of the skeleton")
+    for index, point in enumerate(card.soles):
+        path, steps = f"soles[{index}]", card.frames - 1
+        _expect(0 < point.body < bodies, f"{path}.body", point.body, f"1 to {bodies - 1}")
+        begin = 0
+        for first, last in point.stances:
+            in_order = begin <= first < steps and first <= last < first + steps
+            _expect(in_order, f"{path}.stances", [first, last], "frames of a cycle in order")
+            begin = last + 1
+        ends = bool(point.stances) and begin <= point.stances[0][0] + steps
+        _expect(ends, f"{path}.stances", point.stances, "stances that do not overlap")
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:

@@ -35,6 +35,7 @@ from posefield.motion.measures import Measure
 from posefield.motion.quat import ChartName
 from posefield.motion.skeleton import Skeleton
 from posefield.robots.robot import Robot
+from posefield.robots.standing_soles import SolePoint
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,15 @@ def shape_rows(output: str, rows: Singles, questions: int, joints: int) -> Any:
 
 FORMAT = 5
 PREFIX = "posefield."
-OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration", "hinges", "robot")
+OPTIONAL_ENTRIES = (
+    "presets",
+    "curves",
+    "contacts",
+    "captured_acceleration",
+    "hinges",
+    "robot",
+    "soles",
+)
 """Entries that a file lacks where they are empty, or None."""
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
@@ -244,7 +253,8 @@ class ModelCard:
     the clips of the training, with which joins of performances are compared; None in files of
     earlier versions. hinges: limits of knees and elbows, not sent to clients; empty without roles
     and in files of earlier versions, whose joints have no limits. robot: whose bodies the joints
-    are, not sent to clients; None for others.
+    are, not sent to clients; None for others. soles: points of the robot's soles that stand, not
+    sent to clients; empty where its gaits have no stances in common.
     """
 
     name: Slug
@@ -277,6 +287,7 @@ class ModelCard:
     captured_acceleration: CapturedAcceleration | None = None
     hinges: tuple[Hinge, ...] = ()
     robot: Robot | None = None
+    soles: tuple[SolePoint, ...] = ()
 
     @property
     def clip_labels(self) -> Floats:
@@ -339,6 +350,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
     plain = _plain_fields(card)
     plain.pop("hinges")
     plain.pop("robot")
+    plain.pop("soles")
     for preset in plain["presets"]:
         preset["performer"] = preset["labels"].pop(PERFORMER, None)
     return {**plain, "performers": list(card.performers), "moved_by": list(card.moved_by)}

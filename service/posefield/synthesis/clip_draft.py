@@ -59,10 +59,11 @@ class ClipDraft:
 
     question: as received. frame_limit: largest number of frames. error: that of the first stage
     that cannot be done. rate: frames a second. validated, skeleton (with the requested names),
-    constraints and stands (whether feet are placed): of the validation. motion: corrected motion;
-    None for the prediction. target_times: of the targets in the motion, s. times: of the frames in
-    it (F,), s. duration: as it is played, s. strides: cycle or line of the root, where the path of
-    the root is changed or feet stand. answer: the poses of the frames.
+    constraints, stands (whether feet are placed) and is_robot (whether a robot's limits are kept,
+    and its soles stand): of the validation. unlimited: the robot's motion as predicted. motion:
+    corrected motion; None for the prediction. target_times: of the targets in the motion, s. times:
+    of the frames in it (F,), s. duration: as it is played, s. strides: cycle or line of the root,
+    where the path of the root is changed or feet stand. answer: the poses of the frames.
 
     Of the plan of standing feet: its times (G,), s, over the whole motion; rotations (G, J, 4) and
     root positions (G, 3), m, at them; and the floor motion of a cycle, None for a motion without.
@@ -76,6 +77,8 @@ class ClipDraft:
     skeleton: Skeleton = field(init=False)
     constraints: ConstraintSet | None = None
     stands: bool = False
+    is_robot: bool = False
+    unlimited: RobotMotion | None = None
     motion: ConstrainedMotion | None = None
     target_times: Sequence[float] = ()
     times: Floats = field(init=False)
@@ -102,7 +105,8 @@ class ClipDraft:
         own_names = question.names == "own"
         self.skeleton = card.skeleton if own_names else model.skeleton(question.names)
         self.constraints = model.constraints(self.validated, question)
-        self.stands = wants_standing_feet(card, question)
+        self.is_robot = card.robot is not None and keeps_to_robot(card, question)
+        self.stands = not self.is_robot and wants_standing_feet(card, question)
 
     def set_times(self, model: Synthesizer, duration: float) -> None:
         """Set the times of the frames of a clip that lasts `duration` seconds.
@@ -197,8 +201,26 @@ def is_predicted(model: Synthesizer, question: ClipQuestion) -> bool:
 
     Raises as `wants_standing_feet` does.
     """
-    stands = wants_standing_feet(model.session.card, question)
-    return not (model.measures or question.has_constraints or stands)
+    card = model.session.card
+    if model.measures or question.has_constraints:
+        return False
+    if card.robot is not None and keeps_to_robot(card, question):
+        return False
+    return not wants_standing_feet(card, question)
+
+
+def keeps_to_robot(card: ModelCard, question: ClipQuestion) -> bool:
+    """Return whether joints of a robot keep their limits and its soles, where known, stand.
+
+    Raises InvalidField if feet are asked to stand without common stances, and for a floor.
+    """
+    if question.feet == "as_predicted":
+        return False
+    if question.feet == "stand" and not card.soles:
+        raise InvalidField("feet", "'stand', but the gaits of this robot have no stances in common")
+    if question.ground != LEVEL_FLOOR:
+        raise InvalidField("floor", "other than 0, expected 0: robots stand as they were recorded")
+    return True
 
 
 def wants_standing_feet(card: ModelCard, question: ClipQuestion) -> bool:

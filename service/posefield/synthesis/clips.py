@@ -23,7 +23,7 @@ from posefield.motion.curves import CurveValues
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
 from posefield.robots import robot_clip
-from posefield.synthesis import clip_draft, poses, standing_feet
+from posefield.synthesis import clip_draft, poses, robot_feet, standing_feet
 from posefield.synthesis.clip_draft import ClipDraft
 from posefield.synthesis.poses import MAX_POSES, OutputRow
 from posefield.synthesis.synthesizer import Synthesizer, check_targets
@@ -63,6 +63,9 @@ def synthesize_clips(
         _predict(model, predicted)
     if standing := [draft for draft in valid if draft.stands and not draft.error]:
         standing_feet.stand(model, standing)
+    for draft in valid:
+        if draft.is_robot and not draft.error:
+            robot_feet.keep_to_robot(model, draft)
     return [draft.error or _finished_clip(model, draft) for draft in drafts]
 
 
@@ -191,7 +194,8 @@ def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer | QueryEr
     clip = replace(clip, root_bone=question.root_bone)
     robot = model.session.card.robot
     if robot is not None:
-        trust = clip_draft.with_limits(trust, robot_clip.of(robot).motion(clip, ""), robot)
+        motion = draft.unlimited or robot_clip.of(robot).motion(clip, "")
+        trust = clip_draft.with_limits(trust, motion, robot)
         if trust.limits and question.limits == "refuse":
             return InvalidField("limits", f"'refuse', and {trust.limits[0].sentence}")
     return ClipAnswer(clip, trust, robot, question.loop)

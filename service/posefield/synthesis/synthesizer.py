@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
+import numpy as np
 from msgspec import structs
 
 from posefield.common.errors import OutOfReach, OutsideSamples
@@ -18,6 +19,7 @@ from posefield.locomotion.gait import Gait, fit_gait
 from posefield.model_file.model_card import PERFORMER
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion, check_take
 from posefield.question.results import ConstraintResult, Deviation, Trust, split_results
+from posefield.robots.standing_soles import StandingSoles
 from posefield.validation import question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
@@ -37,6 +39,14 @@ class Synthesizer(NamedModel):
     def gait(self) -> Gait:
         """Gait of this model; raises InvalidField as `fit_gait` does."""
         return fit_gait(self.session)
+
+    @cached_property
+    def soles(self) -> StandingSoles | None:
+        """Solver of the legs of a robot; None for other models."""
+        card = self.session.card
+        if card.robot is None:
+            return None
+        return StandingSoles(np, np.asarray, card.robot, card.soles, card.frames - 1)
 
     @cached_property
     def validator(self) -> QuestionValidator:
