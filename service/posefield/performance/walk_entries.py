@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.units import Floats, PerPoint, PointControls
 from posefield.common.value_cache import ValueCache
 from posefield.constraints.take_variation import TakeSettings
-from posefield.locomotion import floor_plane, stride
+from posefield.locomotion import floor_plane, stepping, stride
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.model_file.model_card import PERFORMER
 from posefield.performance import standing_pose, standing_steps
@@ -41,6 +41,10 @@ def walk_passage(
     phases = plan.phases % 1.0
     done = plan.walker.strides(plan.controls, level)
     posed = _poses(model, plan.walker, plan.controls, done, phases, level, take)
+    pose = None if plan.legs is None else standing_pose.find_standing_pose(plan.walker)
+    if pose is not None and plan.legs is not None:
+        hips = tuple(leg.upper for leg in pose.legs)
+        stepping.turn_legs(pose.parents, posed.rotations, hips, plan.legs)
     roots = plan.places + posed.places * np.exp(1j * plan.headings)
     walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),

@@ -90,7 +90,7 @@ def point_count(length: float) -> int:
 WINDOW, WINDOW_SHARE = 0.8, 0.2
 # Radii in multiples of the smallest, and the detour, as a ratio of lengths, for which a larger one
 # is taken: people turn gently where there is room.
-GENTLENESS, DETOUR = (4.0, 2.8, 2.0, 1.4, 1.0), 1.05
+GENTLENESS, DETOUR = (8.0, 5.6, 4.0, 2.8, 2.0, 1.4, 1.0), 1.1
 # Windows for what no curve with the whole one reaches, as shares of it.
 SMALLER = (1.0, 0.3, 0.1)
 # Longest curve that is taken for want of another one, over the shortest.

@@ -13,6 +13,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Frames, PerPoint, PointControls
+from posefield.locomotion import stepping
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.performance import (
@@ -38,16 +39,22 @@ SYNTHESISED = "synthesised"
 
 
 def plan_phases(
-    walker: Walker, distances: Frames, ways: Frames, phase: float, end_kinds: tuple[str, str]
+    walker: Walker,
+    distances: Frames,
+    ways: Frames,
+    phase: float,
+    end_kinds: tuple[str, str],
+    extra: Frames | float = 0.0,
 ) -> tuple[Frames, StandingEnds | None, list[WalkNote]]:
     """Return the phases (F,) of a walk, without wrapping, steps at its standing ends, and notes.
 
     The steps are None for a walk without any. distances: (F,), m. ways: lengths of the stride (F,),
     m. phase: at the first frame. end_kinds: whether the walk begins and ends "standing". A walk
-    that is too short for an opening or a closing step begins or ends in double support.
+    that is too short for an opening or a closing step begins or ends in double support. extra:
+    phases of each frame (F,) beyond those of the way, of turns on planned steps.
     """
     steps = np.diff(distances) * 0.5 * (1.0 / ways[1:] + 1.0 / ways[:-1])
-    gone = np.pad(np.cumsum(steps), (1, 0))
+    gone = np.pad(np.cumsum(steps + np.broadcast_to(extra, len(ways))[1:]), (1, 0))
     begin, stop = (end == "standing" for end in end_kinds)
     if not (begin or stop):
         return phase + gone, None, []
@@ -130,11 +137,14 @@ def _left_notes(left: float, stride_length: float, closed: bool) -> Iterator[Wal
     yield WalkNote("stops-in-mid-stride", "stop", message)
 
 
-PIVOT = 0.3
-"""Rate of turning beyond the captured ones, rad/s, by which a walker is turned as a whole. A foot
-0.2 m from the root then slides by 6 cm/s."""
-RADIUS_SHARE = 0.9
-"""Share of the largest curvature that curves to a place use."""
+PIVOT = 1.3
+"""Rate of turning beyond the captured ones, rad/s, that planned steps reach: 40° in each."""
+SLOWEST_CURVE = 0.25
+"""Speed at which the sharpest curves are walked, m/s."""
+RADIUS_SHARE = 1.8
+"""Curvature that curves to a place may have over the largest at full speed: walkers slow down."""
+CURVE_SHARE, CURVE_SPEEDS = 0.95, 24
+"""Share of the largest rate of turning in curves, and the number of speeds at which it is known."""
 DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 """Clearances of ways around obstacles that are tried, as shares of the larger radius."""
 UNSEEN_PIVOT = 0.2
@@ -153,7 +163,8 @@ class WalkPlan:
 
     path: that the root follows in the mean over a cycle. distances: (F,), along it, m. places: (F,)
     and headings: (F,), rad, of the frame that travels with the walker. phases: (F,), of the cycle,
-    without wrapping. controls: (F, d). speeds: (F,), m/s. notes: on what is not as captured.
+    without wrapping. controls: (F, d). speeds: (F,), m/s. legs: turns of both about the vertical
+    (F, 2), rad; None for other models. notes: on what is not as captured.
     stops: whether it ends standing. standing: steps at standing ends; None without them.
     """
 
@@ -165,6 +176,7 @@ class WalkPlan:
     phases: Annotated[Floats, "frames"]
     controls: Annotated[Floats, "frames controls"]
     speeds: Annotated[Floats, "frames"]
+    legs: Annotated[Floats, "frames 2"] | None = None
     notes: tuple[WalkNote, ...] = ()
     stops: bool = False
     standing: StandingEnds | None = None
@@ -178,7 +190,8 @@ class WalkPlan:
         names = ("distances", "places", "headings", "phases", "controls", "speeds")
         arrays = {name: getattr(self, name)[begin:end] for name in names}
         standing = self.standing and self.standing.part(len(self), begin, end)
-        return replace(self, **arrays, standing=standing)
+        legs = None if self.legs is None else self.legs[begin:end]
+        return replace(self, **arrays, standing=standing, legs=legs)
 
     @property
     def closes(self) -> bool:
@@ -219,13 +232,45 @@ def plan_walk(
     done = walker.strides(knot_controls)
     ways = _between(len(distances), knots, np.abs(done.travels))
     end_kinds = (request.start, request.stop)
-    phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, end_kinds)
     centres, tangents = path.at(distances)
+    turning = np.gradient(tangents) * RATE
+    beyond = turning - np.interp(np.arange(len(distances)), knots, rates[1]) * np.minimum(
+        speeds / gait.region.speeds[0], 1.0
+    )
+    extra = _stepping_cadences(speeds / ways, beyond) / RATE
+    phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, end_kinds, extra)
+    legs = _leg_turns(walker, phases, beyond)
     headings = tangents - _between(len(distances), knots, done.drifts)
     origins = centres - np.exp(1j * headings) * _offsets(walker, controls)
-    fields = walker, path, distances, origins, headings, phases, controls, speeds
+    fields = walker, path, distances, origins, headings, phases, controls, speeds, legs
     all_notes = *notes, *pivots, *phase_notes
     return WalkPlan(*fields, all_notes, request.stop == "standing", standing)
+
+
+def _stepping_cadences(walked: Frames, beyond: Frames) -> Frames:
+    """Return the cadences (F,), 1/s, of steps that turn, besides those of the walk (F,), 1/s.
+
+    beyond: rates of turning that no captured walk has (F,), rad/s.
+    """
+    turned = np.abs(beyond) / stepping.TURN_OF_CYCLE
+    power = stepping.POWER
+    return np.asarray((walked**power + turned**power) ** (1.0 / power) - walked)
+
+
+def _leg_turns(
+    walker: Walker, phases: Frames, beyond: Frames
+) -> Annotated[Floats, "frames 2"] | None:
+    """Return the turns of the legs (F, 2), rad, so that feet stand while a walker turns.
+
+    None for a model without two feet that step in turn.
+    """
+    pose = standing_pose.find_standing_pose(walker)
+    if pose is None:
+        return None
+    passings = np.empty(2)
+    for passing in pose.passings:
+        passings[passing.swinging] = passing.phase
+    return stepping.leg_turns(phases, np.cumsum(beyond) / RATE, passings)
 
 
 def _route(
@@ -242,8 +287,27 @@ def _route(
         turns = _turns(request, gone, limits[0])
         return walk_paths.turning(start or FloorMotion(), gone, turns), gone, []
     path, notes = _path(gait, request, start, curve[1])
-    gone = walk_request.distances_over_length(curve, request.speed_over, path.length, ramps)
+    slower = path.distances, _curve_speeds(gait, path)
+    scale, length = request.speed_over, path.length
+    gone = walk_request.distances_over_length(curve, scale, length, ramps, slower)
     return path, gone, notes
+
+
+def _curve_speeds(gait: Gait, path: FloorPath) -> PerPoint:
+    """Return the largest speeds (K,), m/s, at which the curves of a path are walked."""
+    speeds = np.linspace(*gait.region.speeds, CURVE_SPEEDS)
+    right, left = _turning_limits(gait, speeds)
+    # The smallest radius of each speed; below the slowest one the limit of the slowest holds.
+    curvatures = path.curvatures
+    limits = np.empty(len(curvatures))
+    for side, rates in ((1.0, left), (-1.0, -right)):
+        sharpest = np.minimum.accumulate(CURVE_SHARE * rates / speeds)
+        sharp = np.maximum(side * curvatures, 1e-9)
+        walked = np.interp(-sharp, -sharpest, speeds)
+        slow = np.clip(CURVE_SHARE * rates[0] / sharp, SLOWEST_CURVE, speeds[0])
+        chosen = np.where(sharp > sharpest[0], slow, walked)
+        limits = np.where(side * curvatures >= 0.0, chosen, limits)
+    return limits
 
 
 def _ramps(request: WalkRequest, limits: tuple[float, float]) -> SpeedRamps:
@@ -344,7 +408,8 @@ def _rates(
     """
     low, high = gait.region.speeds
     paced = np.clip(speeds, low, high)
-    turning = paced * np.interp(gone, path.distances, path.curvatures)
+    curvatures = np.interp(gone, path.distances, path.curvatures)
+    turning = np.minimum(speeds, high) * curvatures
     right, left = _turning_limits(gait, paced)
     beyond = np.maximum(turning - left, right - turning)
     if beyond.max() > 0.0:
@@ -356,9 +421,9 @@ def _rates(
             f"expected {right[at]:.2f} to {left[at]:.2f} rad/s at {paced[at]:.2f} m/s; positive is "
             "left. A wider turn or a lower speed mends it",
         )
-    walked_right, walked_left = gait.region.turning(paced)
-    walked = np.clip(turning, walked_right, walked_left)
-    return (paced, walked), _notes(request, path, gone, turning - walked)
+    walked = np.clip(paced * curvatures, *gait.region.turning(paced))
+    pivots = turning - walked * np.minimum(speeds / low, 1.0)
+    return (paced, walked), _notes(request, path, gone, pivots)
 
 
 def _notes(
@@ -368,8 +433,8 @@ def _notes(
     if abs(pivots[at]) < UNSEEN_PIVOT:
         return []
     message = (
-        f"turns by up to {abs(pivots[at]):.2f} rad/s more than captured walkers do at this speed; "
-        "the walker is turned as a whole by the rest"
+        f"turns by up to {abs(pivots[at]):.2f} rad/s more than captured walkers do at this speed: "
+        "on planned steps, which are synthesised"
     )
     return [WalkNote("turns-beyond-captured", _field(request, path, float(gone[at])), message)]
 

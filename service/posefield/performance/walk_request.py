@@ -32,6 +32,8 @@ COMFORTABLE = 0.4
 """Acceleration of starts, stops and changes of speed that have no curve, m/s²."""
 MAX_ACCELERATION = 1.5
 """Largest acceleration of a speed curve, m/s²."""
+CURVE_ACCELERATION = 0.8
+"""Acceleration before and after curves that are walked slower than the rest, m/s²."""
 MAX_SECONDS = 1_600.0
 """Longest walk, s: 96,000 frames."""
 # Points of a profile: metres and seconds between them, and seconds over which speed is averaged.
@@ -98,9 +100,17 @@ def check_speeds(curve: Curve, scale: Scale, limits: tuple[float, float]) -> tup
 
 
 def distances_over_length(
-    curve: tuple[Floats, Floats], scale: Scale, length: float, ramps: SpeedRamps
+    curve: tuple[Floats, Floats],
+    scale: Scale,
+    length: float,
+    ramps: SpeedRamps,
+    slower: tuple[Floats, Floats] | None = None,
 ) -> Annotated[Floats, "frames"]:
-    """Return the distances (F,), m, at `RATE` frames a second, of a walk of a length, m."""
+    """Return the distances (F,), m, at `RATE` frames a second, of a walk of a length, m.
+
+    slower: distances (K,), m, and the largest speeds there (K,), m/s, which curves of the path
+    allow; None for no such limit. A walker slows down before a curve, and is faster after it.
+    """
     gone = np.linspace(0.0, length, max(int(np.ceil(length / METRES)), 8) + 1)
     if scale == "distance":
         squares = _begun(gone, np.interp(gone, *curve), ramps)
@@ -114,6 +124,11 @@ def distances_over_length(
     if ramps.last is not None:
         back = ramps.last**2 + 2.0 * ramps.acceleration * (length - gone)
         squares = np.minimum(squares, back)
+    if slower is not None:
+        most, up = np.interp(gone, *slower) ** 2, 2.0 * CURVE_ACCELERATION * gone
+        after = np.minimum.accumulate(most - up) + up
+        before = np.minimum.accumulate((most + up)[::-1])[::-1] - up
+        squares = np.minimum(squares, np.minimum(after, before))
     times = _times(gone, np.sqrt(squares))
     if times[-1] > MAX_SECONDS:
         raise InvalidField("speed", f"a walk of {times[-1]:.0f} s, expected {MAX_SECONDS:g} s")

@@ -11,10 +11,12 @@ from posefield.common.errors import InvalidField
 from posefield.constraints.take_variation import TakeSettings
 from posefield.inference import session
 from posefield.locomotion import floor_plane, gait
+from posefield.motion import skeleton
 from posefield.performance import composition, walk_entries
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.walk_plan import plan_walk
 from posefield.performance.walk_request import Disc, WalkRequest
+from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
 ORIGIN = FloorMotion()
@@ -64,15 +66,15 @@ def test_walks_follow_their_paths(walk, walking, name):
     found = composition.path_errors(plan, made.roots, made.rotations)
     assert found.lateral < 0.005
     assert found.along < 0.005
-    assert np.degrees(found.heading) < 0.5
+    assert np.degrees(found.heading) < 0.7
     assert np.degrees(found.facing) < 1.0
-    assert found.speed < 0.01
+    assert found.speed < 0.015
     # The measure sees a body that is 2 cm beside its path and one that crabs.
     left = np.exp(1j * plan.path.at(plan.distances)[1]) * 0.02j
     beside = made.roots + floor_plane.at_height(left, np.zeros(len(plan)))
     assert composition.path_errors(plan, beside, made.rotations).lateral > 0.015
     crabs = made.roots + floor_plane.at_height(0.03 * plan.distances * 1j, np.zeros(len(plan)))
-    assert np.degrees(composition.path_errors(plan, crabs, made.rotations).heading) > 0.5
+    assert np.degrees(composition.path_errors(plan, crabs, made.rotations).heading) > 0.7
 
 
 @pytest.mark.parametrize("name", WALKS)
@@ -80,9 +82,16 @@ def test_the_phase_advances_by_the_distance_over_the_stride(walking, name):
     plan = planned(walking, replace(WALKS[name], stop="rolling"))
     ways = np.abs(plan.walker.strides(plan.controls).travels)
     by = np.diff(plan.phases) * 0.5 * (ways[1:] + ways[:-1])
-    assert np.allclose(by, np.diff(plan.distances), rtol=2e-3, atol=1e-7)
+    gone = np.diff(plan.distances)
+    # A turn that no walker was captured in takes steps of its own.
+    turning = plan.speeds * np.interp(plan.distances, plan.path.distances, plan.path.curvatures)
+    right, left = walking.region.turning(plan.speeds)
+    captured = ((turning < left + 0.3) & (turning > right - 0.3))[1:]
+    assert captured.mean() > 0.5
+    assert np.allclose(by[captured], gone[captured], rtol=2e-3, atol=1e-7)
+    assert (by > gone * (1.0 - 2e-3)).all()
     shorter = 0.99 * by
-    assert not np.allclose(shorter, np.diff(plan.distances), rtol=2e-3, atol=1e-7)
+    assert not np.allclose(shorter[captured], gone[captured], rtol=2e-3, atol=1e-7)
 
 
 def test_a_walk_stops_where_a_foot_passes_the_other_one(walking):
@@ -201,7 +210,8 @@ def test_a_walk_leads_around_obstacles(walking):
     assert note.message.startswith("leads around obstacles and is 0.")
     clear = replace(crossed, obstacles=(Disc(2.0, 5.0, 1.0),), detour=True)
     assert planned(walking, clear).notes == ()
-    walled = tuple(Disc(x, 7.0, 0.7) for x in np.arange(-9.0, 9.0))
+    ring = 4.0 * np.exp(2j * np.pi * np.arange(18) / 18)
+    walled = tuple(Disc(point.imag, point.real, 0.9) for point in ring)
     with pytest.raises(InvalidField, match="no way around them"):
         planned(walking, replace(crossed, obstacles=walled, detour=True))
 
@@ -266,3 +276,36 @@ def gentle_waypoints(rng, start):
     turns = start.turn + np.cumsum(rng.uniform(-0.3, 0.3, 4))
     places = start.shift + np.cumsum(5.0 * np.exp(1j * turns))
     return np.column_stack([places.imag, places.real])
+
+
+def test_corners_and_goals_beside_and_behind_are_walked_on_planned_steps(walk, walking):
+    """An L at 1 m/s, three metres to the left, and behind: no refusal, no tour, no sliding foot."""
+    corner = np.array([[0.0, 4.0], [4.0, 4.0], [4.0, 8.0]])
+    requests = {
+        "corner": (WalkRequest(1.0, along=corner, **BOTH), 12.0),
+        "left": (WalkRequest(1.1, to=(3.0, 0.0), **BOTH), 3.0),
+        "behind": (WalkRequest(1.1, to=(0.0, -4.0), **BOTH), 4.0),
+    }
+    for request, length in requests.values():
+        plan = plan_walk(walking, request, ORIGIN, 0.1)
+        assert plan.path.length < 1.5 * length + 0.5
+        assert len(plan) < 90.0 * length + 240.0
+        assert any(note.code == "turns-beyond-captured" for note in plan.notes)
+        turned, whole = (foot_turns(walk, replace(plan, legs=legs)) for legs in (plan.legs, None))
+        assert turned < 0.5 * whole
+
+
+def foot_turns(walk, plan):
+    """Return the mean rate at which standing feet turn in curves, rad/s."""
+    made = walk_entries.walk_passage(walk, plan)
+    bones = walk.session.run(plan.controls[:1], None, "bone_offsets", labels=plan.walker.labels(1))
+    local = skeleton.translations(bones[0][0].astype(float), made.roots)
+    joints = skeleton.positions(walk.session.card.skeleton.parents, made.rotations, local)
+    curvatures = np.interp(plan.distances, plan.path.distances, plan.path.curvatures)
+    turning, rates = np.abs(plan.speeds * curvatures), []
+    for foot, contact in enumerate(walking_feet.foot_contacts(walk.session.card)):
+        ankle = walk.session.card.skeleton.parents[contact.joint]
+        way = floor_plane.project(joints[:, contact.joint] - joints[:, ankle])
+        stands = (made.contacts[1:, foot] > 0.95) & (turning[1:] > 0.7)
+        rates.append(np.abs(np.angle(way[1:] / way[:-1]))[stands] * RATE)
+    return np.concatenate(rates).mean()
