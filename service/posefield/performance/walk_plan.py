@@ -139,6 +139,8 @@ def _left_notes(left: float, stride_length: float, closed: bool) -> Iterator[Wal
 
 PIVOT = 1.3
 """Rate of turning beyond the captured ones, rad/s, that planned steps reach: 40° in each."""
+UNSTEPPED = 0.1
+"""Rate of turning beyond the captured ones, rad/s, up to which walks have no steps for it."""
 SLOWEST_CURVE = 0.25
 """Speed at which the sharpest curves are walked, m/s."""
 RADIUS_SHARE = 1.8
@@ -237,9 +239,10 @@ def plan_walk(
     beyond = turning - np.interp(np.arange(len(distances)), knots, rates[1]) * np.minimum(
         speeds / gait.region.speeds[0], 1.0
     )
-    extra = _stepping_cadences(speeds / ways, beyond) / RATE
+    stepped = bool(np.abs(beyond).max() > UNSTEPPED)
+    extra = _stepping_cadences(speeds / ways, beyond) / RATE if stepped else 0.0
     phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, end_kinds, extra)
-    legs = _leg_turns(walker, phases, beyond)
+    legs = _leg_turns(walker, phases, beyond) if stepped else None
     headings = tangents - _between(len(distances), knots, done.drifts)
     origins = centres - np.exp(1j * headings) * _offsets(walker, controls)
     fields = walker, path, distances, origins, headings, phases, controls, speeds, legs
@@ -287,7 +290,8 @@ def _route(
         turns = _turns(request, gone, limits[0])
         return walk_paths.turning(start or FloorMotion(), gone, turns), gone, []
     path, notes = _path(gait, request, start, curve[1])
-    slower = path.distances, _curve_speeds(gait, path)
+    bent = np.abs(path.curvatures).max() > 0.1
+    slower = (path.distances, _curve_speeds(gait, path)) if bent else None
     scale, length = request.speed_over, path.length
     gone = walk_request.distances_over_length(curve, scale, length, ramps, slower)
     return path, gone, notes
