@@ -17,16 +17,15 @@ from typing import Any, TypeVar
 import msgspec
 
 from posefield.common import atomic_files
-from posefield.common.errors import FileError, ModelError, UnknownFormat
+from posefield.common.errors import FileError, ModelError
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode import formats
-from posefield.encode.crowd_size import FILES
+from posefield.encode import crowd_formats, formats
 from posefield.encode.formats import encoder_for
 from posefield.locomotion import walking_crowd
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
-from posefield.question.motion_question import DEFAULT_BODY, BodyKind, ClipQuestion, PoseQuestion
+from posefield.question.motion_question import BodyKind, ClipQuestion, PoseQuestion
 from posefield.question.performance_question import PerformanceLayout, PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.question.results import ClipAnswer, PoseAnswer
@@ -113,23 +112,16 @@ class Crowd:
     question: WalkQuestion
 
     def save(self, path: str | Path) -> Mapping[str, Any]:
-        """Write usd, usda, usdc, usdz or npz by the path's suffix; return the facts of the crowd.
+        """Write a file by the ending of its path (`crowd_formats`); return the crowd's facts.
 
         Raises UnknownFormat, InvalidField for a crowd that the model or the limits do not permit,
         and FileError if the file cannot be written.
         """
-        # usd-core takes 0.12 CPU seconds to import.
-        from posefield.encode import crowd_writer, motion_tables
-
-        path, question, extensions = Path(path), self.question, (*FILES, "npz")
-        if path.suffix.removeprefix(".") not in extensions:
-            raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(extensions)}")
+        path, question = Path(path), self.question
+        crowd_formats.ending_of(path, question)
         order = walking_crowd.from_question(question)
         crowd = walking_feet.build_crowd(self.synthesizer, self.synthesizer.gait, order)
-        if path.suffix == ".npz":
-            motion_tables.write_npz(crowd, path)
-        else:
-            crowd_writer.write(crowd, path, question.instancing, question.body or DEFAULT_BODY)
+        crowd_formats.write(crowd, path, question, self.synthesizer.session.card.roles)
         return crowd.facts
 
 

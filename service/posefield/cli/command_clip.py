@@ -95,7 +95,11 @@ def crowd(
     model: ModelPath,
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="output file: usd, usda, usdc, usdz or npz"),
+        typer.Option(
+            "--output",
+            "-o",
+            help="output file: usd, usda, usdc, usdz, npz, bones.npz, arrow, osi, carla.npz or sdf",
+        ),
     ],
     question: WalkQuestion,
     count: Annotated[

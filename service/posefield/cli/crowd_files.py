@@ -9,24 +9,21 @@ from typing import Any
 import numpy as np
 import orjson
 
-from posefield.common.errors import FileError, InvalidField
+from posefield.common.errors import FileError
 from posefield.common.units import Floats
 from posefield.console.progress import ProgressBar
-from posefield.encode import crowd_size, crowd_writer, motion_tables
+from posefield.encode import crowd_formats
 from posefield.locomotion import gait, walking_crowd
 from posefield.locomotion import paths as given
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.paths import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
-from posefield.question.motion_question import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_crowd
 from posefield.tracks.track import TrackSet
-
-EXTENSIONS = (*crowd_size.FILES, "npz")
 
 
 def write_crowd(
@@ -43,13 +40,7 @@ def write_crowd(
     Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
     written.
     """
-    ending = output.suffix.removeprefix(".")
-    if ending not in EXTENSIONS:
-        raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(EXTENSIONS)}")
-    if ending == "npz" and question.body is not None:
-        raise InvalidField(
-            "body", f"{question.body!r}, expected none given: npz files carry no body"
-        )
+    crowd_formats.ending_of(output, question)
     opened = gait.fit_gait(model.session)
     if tracks is None:
         crowd = walking_feet.build_crowd(model, opened, order)
@@ -57,10 +48,7 @@ def write_crowd(
         crowd = track_crowd.build_crowd(model, opened, order, tracks.tracks)
     feet = _FootSkateMeter(opened, order.fps)
     watched = _with_progress(crowd, order.motions or len(crowd.motion), feet)
-    if ending == "npz":
-        motion_tables.write_npz(watched, output)
-    else:
-        crowd_writer.write(watched, output, question.instancing, question.body or DEFAULT_BODY)
+    crowd_formats.write(watched, output, question, model.session.card.roles)
     return {
         "file": str(output),
         "model": crowd.facts["model"],

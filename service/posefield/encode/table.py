@@ -14,7 +14,7 @@ import json
 import math
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import Any
@@ -146,7 +146,7 @@ def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
     for label, values in arrays.items():
         # As numpy.save: an array whose columns lie together is written in that order.
         array = values.T if values.flags.fnc else values
-        head = _array_header(values.dtype, values.shape, values.flags.fnc)
+        head = array_header(values.dtype, values.shape, values.flags.fnc)
         name = f"{label}.npy".encode("ascii")
         data = np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
         size = len(head) + len(data)
@@ -164,8 +164,14 @@ def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
     return b"".join((*pieces, central, end))
 
 
+def array_file(value: Any) -> bytes:
+    """Return an .npy file of a fact, as an archive has it."""
+    array = _npz_array(value)
+    return array_header(array.dtype, array.shape, False) + array.tobytes()
+
+
 @lru_cache(maxsize=256)
-def _array_header(dtype: np.dtype[Any], shape: tuple[int, ...], columns_first: bool) -> bytes:
+def array_header(dtype: np.dtype[Any], shape: tuple[int, ...], columns_first: bool) -> bytes:
     """Return the head of an .npy file of version 1.0."""
     stream = io.BytesIO()
     described = np.lib.format.dtype_to_descr(dtype)
@@ -178,21 +184,30 @@ _TYPES = {
     "float32": nanoarrow.float32,
     "float64": nanoarrow.float64,
     "int8": nanoarrow.int8,
+    "int32": nanoarrow.int32,
     "bool": nanoarrow.bool_,
 }
 
 
 def arrow_stream(table: Table) -> bytes:
     """Return the Arrow IPC stream of a table; equal tables give equal bytes."""
-    kinds = tuple((name, _kind(column)) for name, column in table.columns.items())
-    schema = nanoarrow.c_schema(_rows(kinds)).modify(metadata=_metadata(table))
-    batch = nanoarrow.c_array_from_buffers(
-        schema, len(table), [None], children=[_arrow_array(c) for c in table.columns.values()]
-    )
     pieces = _ChunkList()
-    with StreamWriter.from_writable(pieces) as writer:
-        writer.write_stream(batch)
+    write_arrow([table], pieces)
     return b"".join(pieces)
+
+
+def write_arrow(blocks: Iterable[Table], file: Any) -> None:
+    """Write tables of equal columns and facts as one Arrow IPC stream, a record batch for each."""
+    schema = None
+    with StreamWriter.from_writable(file) as writer:
+        for table in blocks:
+            if schema is None:
+                kinds = tuple((name, _kind(column)) for name, column in table.columns.items())
+                schema = nanoarrow.c_schema(_rows(kinds)).modify(metadata=_metadata(table))
+            children = [_arrow_array(column) for column in table.columns.values()]
+            writer.write_stream(
+                nanoarrow.c_array_from_buffers(schema, len(table), [None], children=children)
+            )
 
 
 def _metadata(table: Table) -> dict[str, str]:

@@ -1,0 +1,77 @@
+"""Table of the files of crowds, by the ending of their names."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField, UnknownFormat
+from posefield.encode import actor_scene, bone_tables, crowd_size, motion_tables, osi_trace
+from posefield.encode.conventions import ARROW, NPZ, Format, by_extension
+from posefield.motion.clip import CrowdClip
+from posefield.question.motion_question import DEFAULT_BODY
+from posefield.question.walk_question import WalkQuestion
+
+Roles = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class CrowdFile(Format):
+    """Writer of crowds in one format.
+
+    write: writes a crowd of a model with these roles of its joints to a path, which it need not do
+    atomically. beside: whether it writes other files beside the path, and all of them atomically.
+    """
+
+    write: Callable[[CrowdClip, Path, Roles], None]
+    beside: bool = False
+
+
+CROWD_FILES = by_extension(
+    CrowdFile("npz", NPZ, lambda crowd, path, _: motion_tables.write_npz(crowd, path)),
+    CrowdFile("bones.npz", NPZ, lambda crowd, path, _: bone_tables.write_npz(crowd, path)),
+    CrowdFile("arrow", ARROW, lambda crowd, path, _: bone_tables.write_arrow(crowd, path)),
+    CrowdFile("osi", "application/vnd.asam.osi", osi_trace.write),
+    CrowdFile("carla.npz", NPZ, bone_tables.write_carla),
+    CrowdFile(
+        "sdf", "application/x-sdf", lambda crowd, path, _: actor_scene.write(crowd, path), True
+    ),
+)
+"""Formats of crowds besides USD."""
+ENDINGS = (*crowd_size.FILES, *CROWD_FILES)
+
+
+def ending_of(path: Path, question: WalkQuestion) -> str:
+    """Return the ending of a crowd's file: the longest that fits.
+
+    Raises UnknownFormat for another, and InvalidField for a body in a format without bodies.
+    """
+    fitting = [ending for ending in ENDINGS if path.name.endswith(f".{ending}")]
+    if not fitting:
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(ENDINGS)}")
+    ending = max(fitting, key=len)
+    if ending in CROWD_FILES and question.body is not None:
+        raise InvalidField(
+            "body", f"{question.body!r}, expected none given: {ending} files carry no body"
+        )
+    return ending
+
+
+def write(crowd: CrowdClip, path: Path, question: WalkQuestion, roles: Roles) -> None:
+    """Write a crowd atomically in the format of the path's ending.
+
+    question: has the body and the instancing in USD. roles: of the skeleton's joints. Raises as
+    `ending_of` does, InvalidField for a crowd that the format cannot have, and FileError if the
+    file cannot be written.
+    """
+    form = CROWD_FILES.get(ending_of(path, question))
+    if form is None:
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode import crowd_writer
+
+        crowd_writer.write(crowd, path, question.instancing, question.body or DEFAULT_BODY)
+    elif form.beside:
+        form.write(crowd, path, roles)
+    else:
+        with atomic_files.replacing(path) as temporary:
+            form.write(crowd, temporary, roles)
