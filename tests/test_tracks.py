@@ -50,7 +50,8 @@ def test_all_formats_give_the_same_person(tmp_path):
     text = "# framerate: 10.0\n#id frame x/m y/m z/m\n" + "".join(
         f"7 {round(10 * t)} {x} {y} 0\n" for t, x, y in steps
     )
-    rows = [(round(10 * t), 7, x, y, 0.0, 1.0) for t, x, y in steps]
+    # JuPedSim's first frame has no orientation yet.
+    rows = [(round(10 * t), 7, x, y, 0.0, float(t > 0.0)) for t, x, y in steps]
     files = [
         write(tmp_path, "a.csv", table),
         write(tmp_path, "a.xml", f"<fcd-export>{xml}</fcd-export>"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField, UnknownFormat
 from posefield.encode import actor_scene, bone_tables, crowd_size, motion_tables, osi_trace
-from posefield.encode.conventions import ARROW, NPZ, Format, by_extension
+from posefield.encode.archives import ARROW, NPZ, Format, by_extension
 from posefield.motion.clip import CrowdClip
 from posefield.question.motion_question import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion

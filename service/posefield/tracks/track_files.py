@@ -186,6 +186,10 @@ def _jupedsim_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
             rate = _number(path, str(stated[0]) if stated else "none", "metadata fps", 1)
             if not 0.0 < rate < math.inf:
                 raise FileError(path, f"metadata fps {rate:g}, expected a number above 0")
+            # The first frame is written before anybody is turned: its orientation is the next one.
+            turned = "select id, min(frame), ori_x, ori_y from trajectory_data "
+            turned += "where ori_x != 0 or ori_y != 0 group by id"
+            axes = {person: axis for person, _, *axis in database.execute(turned)}
             rows = database.execute(
                 "select rowid, frame, id, pos_x, pos_y, ori_x, ori_y from trajectory_data "
                 "order by frame, id"
@@ -196,6 +200,9 @@ def _jupedsim_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
                         path, f"values {frame}, {values} in trajectory_data, expected numbers", line
                     )
                 x, y, east, north = map(float, values)
+                if east or north:
+                    axes[person] = [east, north]
+                east, north = axes.get(person, (0.0, 0.0))
                 angle = math.atan2(north, east) if (east or north) else math.nan
                 yield str(person), frame / rate, x, y, angle, line
     except sqlite3.Error as fault:
