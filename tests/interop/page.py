@@ -10,6 +10,7 @@ import debian
 import environment
 import httpx
 import running
+import runtime_answers
 import trained
 
 CLIENTS = environment.ROOT / "clients"
@@ -57,6 +58,7 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
     told = {
         "POSEFIELD_URL": address,
         "POSEFIELD_MODELS": str(models),
+        "POSEFIELD_ANSWERS": str(runtime_answers.write(models.parent)),
         "POSEFIELD_COMMAND": str(Path(sys.executable).with_name("posefield")),
     }
     return [f"page: {file.name}" for file in tests if not _passed(node, file, told)]

@@ -1,6 +1,7 @@
 /** Poses, clips and walkers of a posefield model, computed here by onnxruntime-web. */
 
 export type { Control, FootContact, LabelSet, ModelCard } from "./card.ts";
+export type { Clip, ClipOptions, Stance } from "./clip.ts";
 export { InvalidField, ModelError, OutsideSamples, RuntimeFault } from "./errors.ts";
 export { type Controls, type LoadOptions, load, Model, type Options, type Poses } from "./model.ts";
 export type { Onnxruntime } from "./session.ts";

@@ -2,6 +2,7 @@
 
 import type { ModelCard } from "./card.ts";
 import { readCard } from "./card.ts";
+import { type Clip, type ClipOptions, clip } from "./clip.ts";
 import { DURATION_FACTOR } from "./constants.ts";
 import { InvalidField, ModelError, OutsideSamples } from "./errors.ts";
 import { type Onnxruntime, type Point, Session } from "./session.ts";
@@ -118,6 +119,11 @@ export class Model {
       duration,
       sigma: outputs.sigma[0]!,
     };
+  }
+
+  /** A clip; its feet stand, where the model travels and knows their contacts. */
+  clip(controls: Controls, options: ClipOptions = {}): Promise<Clip> {
+    return clip(this, controls, options);
   }
 
   /** Shortest and longest plausible duration, s. */

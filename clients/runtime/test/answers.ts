@@ -1,6 +1,7 @@
 /** Largest differences between answers of the run time and those of the service. */
 
-import { type LoadOptions, load, type Options } from "../src/index.ts";
+import { type Clip, type ClipOptions, type LoadOptions, load, type Options } from "../src/index.ts";
+import { LimbPoses } from "../src/limbs.ts";
 
 export interface PoseAnswer {
   readonly controls: Record<string, number>;
@@ -13,13 +14,26 @@ export interface PoseAnswer {
   readonly boneOffsets: readonly number[];
 }
 
+export interface ClipAnswer {
+  readonly controls: Record<string, number>;
+  readonly options: ClipOptions;
+  readonly duration: number;
+  /** Of all joints in all frames, m. */
+  readonly positions: readonly number[];
+}
+
 export interface ModelAnswers {
   readonly file: string;
+  /** CPU time of the service for a pose, and for a clip of 100 frames at `fps`. */
+  readonly seconds: { readonly pose: number; readonly clip: number; readonly fps: number };
   readonly poses: readonly PoseAnswer[];
+  readonly clips: readonly ClipAnswer[];
 }
 
 export interface Differences {
   readonly pose: number;
+  /** Of joints in the world, m. */
+  readonly clip: number;
 }
 
 export async function differences(
@@ -42,7 +56,23 @@ export async function differences(
     ] as const;
     pose = Math.max(pose, ...pairs.map(([numbers, expected]) => largest(numbers, expected)));
   }
-  return { pose };
+  let clip = 0;
+  for (const answer of answers.clips) {
+    const motion = await model.clip(answer.controls, answer.options);
+    clip = Math.max(clip, largest(positions(motion), answer.positions));
+    clip = Math.max(clip, Math.abs(motion.duration - answer.duration));
+  }
+  return { pose, clip };
+}
+
+/** Positions of all joints of a clip, m. */
+function positions({ frames, rotations, rootPosition, boneOffsets, parents }: Clip): number[] {
+  const joints = parents.map((_, joint) => joint);
+  const local = { frames, rotations, roots: rootPosition, bones: boneOffsets };
+  const poses = new LimbPoses(parents, joints, local);
+  return Array.from({ length: frames }, (_, frame) =>
+    joints.flatMap((joint) => [...poses.position(joint, frame)]),
+  ).flat();
 }
 
 function largest(numbers: ArrayLike<number>, expected: ArrayLike<number>): number {

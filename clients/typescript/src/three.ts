@@ -22,6 +22,8 @@ export interface Rig {
 /** Joints of a clip, or of the poses of a crowd. */
 type Jointed = Pick<Motion, "names" | "parents" | "boneOffsets">;
 type Posed = Pick<Poses, "rotations" | "rootPosition" | "boneOffsets">;
+type Timed = Partial<Pick<Motion, "trust">> & { readonly times: ArrayLike<number> };
+type Played = Jointed & Posed & Pick<Motion, "frames" | "rate"> & Timed;
 
 /** The skeleton of a model at rest, or with the bones that a clip has; every rotation is none. */
 export function skeletonOf(found: ModelCard | Jointed): Rig {
@@ -42,7 +44,7 @@ export function skeletonOf(found: ModelCard | Jointed): Rig {
  * A clip for an AnimationMixer whose root is, or holds, the bones of `skeletonOf` or any whose
  * names agree. Bones take the clip's lengths. A clip asked for with `loop` repeats without a seam.
  */
-export function animationClip(motion: Motion, name: string = motion.trust.model): AnimationClip {
+export function animationClip(motion: Played, name = motion.trust?.model ?? "clip"): AnimationClip {
   const duration = (motion.frames - 1) / motion.rate;
   const tracks = nodeNames(motion.names).flatMap((node, joint) => tracksOf(motion, node, joint));
   return new AnimationClip(name, duration, tracks);
@@ -80,23 +82,20 @@ function atRest({ skeleton }: ModelCard): Jointed {
   return { ...skeleton, boneOffsets: Float32Array.from(skeleton.offsets.flat()) };
 }
 
-function tracksOf(motion: Motion, node: string, joint: number): KeyframeTrack[] {
-  const turning = new QuaternionKeyframeTrack(
-    `${node}.quaternion`,
-    motion.times,
-    turns(motion, joint),
-  );
+function tracksOf(motion: Played, node: string, joint: number): KeyframeTrack[] {
+  const local = turns(motion, joint);
+  const turning = new QuaternionKeyframeTrack(`${node}.quaternion`, motion.times, local);
   return [turning, moving(motion, `${node}.position`, joint)];
 }
 
 /** The root moves; other joints have one place for all times. */
-function moving(motion: Motion, track: string, joint: number): VectorKeyframeTrack {
+function moving(motion: Played, track: string, joint: number): VectorKeyframeTrack {
   if (joint === 0) return new VectorKeyframeTrack(track, motion.times, motion.rootPosition);
   return new VectorKeyframeTrack(track, [0], motion.boneOffsets.subarray(3 * joint, 3 * joint + 3));
 }
 
 /** Rotations of one joint over time, in the order x y z w. */
-function turns(motion: Motion, joint: number): Float32Array {
+function turns(motion: Played, joint: number): Float32Array {
   const found = new Float32Array(4 * motion.frames);
   for (let frame = 0; frame < motion.frames; frame++) {
     const [w, x, y, z] = quaternion(motion, motion.names.length * frame + joint);

@@ -1,0 +1,321 @@
+/** Clips: frames at a rate, feet that stand, and loops that close. */
+
+import type { ModelCard } from "./card.ts";
+import {
+  AFTER_END,
+  FEWEST_STEPS,
+  FPS_RANGE,
+  FRAME_ROUNDING,
+  MOST_STEPS,
+  PLAN_RATE,
+  WARP_STEPS,
+} from "./constants.ts";
+import { InvalidField } from "./errors.ts";
+import { placeFeet } from "./feet-placement.ts";
+import { type FeetPlan, planFeet } from "./feet-plan.ts";
+import { findLegs, LimbPoses, quaternionAt } from "./limbs.ts";
+import { type Controls, type Model, type Options, type Poses, range } from "./model.ts";
+import type { Point } from "./session.ts";
+import type { Grid } from "./stances.ts";
+import {
+  arcFactor,
+  type Complex,
+  clamp,
+  direction,
+  multiply,
+  times as product,
+  type Quaternion,
+  roundEven,
+  turn,
+} from "./vectors.ts";
+
+export interface ClipOptions extends Options {
+  /** Frames a second; 30 by default. */
+  readonly fps?: number;
+  /** Time of the first frame, and the latest of the last one, s. */
+  readonly start?: number;
+  readonly end?: number;
+  /** One whole cycle, whose last frame equals its first but for the travel. */
+  readonly loop?: boolean;
+  readonly root?: "travelling" | "in_place";
+  /** By default feet stand, where the model travels and knows their contacts. */
+  readonly feet?: "stand" | "as_predicted";
+}
+
+/** A stance of a foot: its joint, when it is flat, s, and its place, m. */
+export interface Stance {
+  readonly joint: number;
+  readonly begin: number;
+  readonly end: number;
+  readonly position: readonly [number, number, number];
+}
+
+export interface Clip extends Poses {
+  readonly frames: number;
+  readonly rate: number;
+  /** Of the whole motion; empty for feet as predicted. */
+  readonly stances: readonly Stance[];
+}
+
+/** The cycle of a motion, or its straight line: way along the arc, turn, and start of the root. */
+interface Stride {
+  readonly way: Complex;
+  readonly turned: number;
+  readonly start: Complex;
+}
+
+export async function clip(model: Model, controls: Controls, options: ClipOptions): Promise<Clip> {
+  const { card, session } = model;
+  const point = model.point(controls, options);
+  const rate = range("fps", options.fps ?? 30, ...FPS_RANGE, "frames a second");
+  if (options.loop && !card.cyclic)
+    throw new InvalidField("loop", "true, but this model's last pose does not lead into its first");
+  const stands = wantsStandingFeet(card, options);
+  const whole = model.checkDuration((await session.run(point, [], "duration")).duration[0]!);
+  const { times, duration } = await frameTimes(model, point, whole, rate, options);
+  const inPlace = options.root === "in_place" && card.root === "travelling";
+  const cyclic = card.cyclic;
+  const steps = clamp(roundEven(whole * PLAN_RATE), FEWEST_STEPS, MOST_STEPS);
+  const count = stands ? steps + Number(!cyclic) : 0;
+  const planTimes = Array.from({ length: count }, (_, step) => step * (whole / steps));
+  const outputs = await session.run(
+    point,
+    [...times, ...planTimes, 0, AFTER_END],
+    ...(["rotations", "root_position", "bone_offsets", "duration", "sigma", "travel"] as const),
+    ...(stands ? (["contacts"] as const) : []),
+    ...(card.curves.length ? (["curves"] as const) : []),
+  );
+  const joints = card.skeleton.names.length;
+  const frames = times.length;
+  const rotations = Float64Array.from(outputs.rotations.subarray(0, 4 * joints * frames));
+  const roots = Float64Array.from(outputs.root_position.subarray(0, 3 * frames));
+  const stride = strideOf(card, outputs, frames + count);
+  let stances: Stance[] = [];
+  if (stands) {
+    const bones = outputs.bone_offsets;
+    const grid = gridOf(stride, count, (count - Number(!cyclic)) / whole, cyclic);
+    const legs = findLegs(card, bones);
+    const tips = legs.map(({ leg }) => leg.tip);
+    const { parents } = card.skeleton;
+    const planPoses = {
+      frames: count,
+      rotations: outputs.rotations.subarray(4 * joints * frames),
+      roots: outputs.root_position.subarray(3 * frames),
+      bones,
+    };
+    const plan = planFeet(
+      new LimbPoses(parents, tips, planPoses),
+      legs.map(({ contact, leg }) => ({
+        limb: leg,
+        contact: card.contacts[contact]!,
+        likely: planTimes.map(
+          (_, step) => outputs.contacts![(frames + step) * card.contacts.length + contact]!,
+        ),
+      })),
+      grid,
+    );
+    const poses = new LimbPoses(parents, tips, { frames, rotations, roots, bones });
+    placeFeet(plan, poses, times, rotations, roots);
+    stances = stancesOf(plan);
+  }
+  if (inPlace) removeTravel(stride, times, whole, rotations, roots);
+  const closing = options.loop
+    ? closingPose(inPlace || card.root !== "travelling" ? null : stride, rotations, roots, joints)
+    : { rotations: [], roots: [] };
+  const curves = outputs.curves?.subarray(0, card.curves.length * frames) ?? [];
+  return {
+    names: card.skeleton.names,
+    parents: card.skeleton.parents,
+    frames: frames + Number(!!options.loop),
+    rate,
+    times: options.loop ? [...times, duration] : times,
+    rotations: Float32Array.from([...rotations, ...closing.rotations]),
+    rootPosition: Float32Array.from([...roots, ...closing.roots]),
+    boneOffsets: outputs.bone_offsets,
+    curves: Float32Array.from([
+      ...curves,
+      ...(options.loop ? curves.slice(0, card.curves.length) : []),
+    ]),
+    duration,
+    sigma: outputs.sigma[0]!,
+    stances,
+  };
+}
+
+function wantsStandingFeet(card: ModelCard, { feet }: ClipOptions): boolean {
+  const able = card.root === "travelling" && card.feet.length > 0 && card.contacts.length > 0;
+  if (feet === "stand" && !able)
+    throw new InvalidField("feet", "'stand', but this model knows no contacts of feet that travel");
+  return feet === undefined ? able : feet === "stand";
+}
+
+function strideOf(
+  card: ModelCard,
+  outputs: Record<"root_position" | "travel", Float32Array>,
+  begin: number,
+): Stride {
+  const [first, last] = [begin, begin + 1].map(
+    (index): Complex => [outputs.root_position[3 * index + 2]!, outputs.root_position[3 * index]!],
+  ) as [Complex, Complex];
+  if (!card.cyclic)
+    return { way: [last[0] - first[0], last[1] - first[1]], turned: 0, start: first };
+  const [left, ahead, turned] = outputs.travel.subarray(3 * (begin + 1)) as unknown as [
+    number,
+    number,
+    number,
+  ];
+  const [re, im] = arcFactor(turned);
+  const size = re ** 2 + im ** 2;
+  const way = product([ahead, left], [re / size, -im / size]);
+  // A cycle without its travel ends at its start.
+  return { way, turned, start: [last[0] - ahead, last[1] - left] };
+}
+
+function gridOf(
+  { way, turned, start }: Stride,
+  count: number,
+  rate: number,
+  cyclic: boolean,
+): Grid {
+  if (!cyclic) return { count, rate, cyclic, way: [0, 0], factor: [1, 0] };
+  const gap = product(way, arcFactor(turned));
+  const factor = direction(turned);
+  const moved = product(factor, start);
+  return {
+    count,
+    rate,
+    cyclic,
+    way: [start[0] + gap[0] - moved[0], start[1] + gap[1] - moved[1]],
+    factor,
+  };
+}
+
+function stancesOf({ feet, grid }: FeetPlan): Stance[] {
+  return feet.flatMap(({ limb, stances, anchors, flats }) =>
+    stances.map(({ end }, index) => ({
+      joint: limb.tip,
+      begin: Math.min(flats[index]!, end - 1) / grid.rate,
+      end: (end - 1) / grid.rate,
+      position: anchors[index]!,
+    })),
+  );
+}
+
+/** Times of the frames in the motion, s, and the duration as it is played. */
+async function frameTimes(
+  model: Model,
+  point: Point,
+  whole: number,
+  rate: number,
+  { start, end, loop }: ClipOptions,
+): Promise<{ times: number[]; duration: number }> {
+  const { card } = model;
+  if (loop) {
+    if (start || end !== undefined)
+      throw new InvalidField("loop", "true with start or end, expected none: a loop is a cycle");
+    const steps = Math.max(1, roundEven(whole * rate));
+    const times = Array.from({ length: steps }, (_, step) => (step * whole) / steps);
+    return { times, duration: whole };
+  }
+  const first = range("start", start ?? 0, 0, whole, "s");
+  const moments: number[] = [];
+  if (!card.cyclic && card.event) {
+    const { share } = card.event;
+    if (share > 0 && share < 1)
+      moments.push(await timeOfFrame(model, point, whole, share * (card.frames - 1)));
+    if ((whole - first) * rate > 0.5) moments.push(whole);
+  }
+  const knots = playback(rate, first, whole, moments);
+  const [lastKnot] = knots.at(-1)!;
+  const duration = moments.length ? first + lastKnot / rate : whole;
+  let last = end === undefined ? whole : range("end", end, first, Math.max(whole, duration), "s");
+  if (last * (1 + 2 ** -23) >= Math.min(whole, duration)) last = duration;
+  const count = Math.floor((last - first) * rate + FRAME_ROUNDING) + 1;
+  const times = Array.from({ length: count }, (_, frame) => {
+    const found = knots.findIndex(([knot]) => knot >= frame);
+    const after = clamp(found < 0 ? knots.length : found, 1, knots.length - 1);
+    const [[before, shift], [knot, next]] = [knots[after - 1]!, knots[after]!];
+    const share = clamp((frame - before) / (knot - before), 0, 1);
+    const gentle = share * share * (3 - 2 * share);
+    const later = frame === knot ? next : shift + gentle * (next - shift);
+    return Math.min(first + frame / rate + later, whole);
+  });
+  return { times, duration };
+}
+
+/** Frames from the start at which moments are played, and by how much later these are, s. */
+function playback(
+  rate: number,
+  start: number,
+  duration: number,
+  moments: readonly number[],
+): (readonly [number, number])[] {
+  const [begin, end] = [-start * rate, (duration - start) * rate];
+  const shifts = new Map<number, number>();
+  for (const moment of moments.toReversed()) {
+    const frame = roundEven((moment - start) * rate);
+    if (frame >= begin - FRAME_ROUNDING) shifts.set(frame, moment - start - frame / rate);
+  }
+  if (![...shifts.keys()].some((knot) => Math.abs(knot - begin) < FRAME_ROUNDING))
+    shifts.set(begin, 0);
+  // The end plays at its own time, unless it is a moment or one before it has the last frame.
+  const latest = Math.max(...shifts.keys());
+  if (shifts.size === 1 || (!moments.includes(duration) && latest < end - FRAME_ROUNDING))
+    shifts.set(end, 0);
+  return [...shifts].sort(([a], [b]) => a - b);
+}
+
+/** The time, s, of a canonical frame of a motion. */
+async function timeOfFrame(model: Model, point: Point, whole: number, frame: number) {
+  const times = Array.from({ length: WARP_STEPS }, (_, step) => (step * whole) / (WARP_STEPS - 1));
+  const { frame: frames } = await model.session.run(point, times, "frame");
+  const after = clamp(
+    frames.findIndex((value) => value > frame),
+    1,
+    WARP_STEPS - 1,
+  );
+  const [low, high] = [frames[after - 1]!, frames[after]!];
+  return times[after - 1]! + ((frame - low) / (high - low)) * (times[after]! - times[after - 1]!);
+}
+
+/** Put poses into the frame that travels along the way, placed at the start of the clip. */
+function removeTravel(
+  { way, turned, start }: Stride,
+  times: readonly number[],
+  whole: number,
+  rotations: Float64Array,
+  roots: Float64Array,
+): void {
+  const joints = rotations.length / (4 * times.length);
+  for (const [frame, time] of times.entries()) {
+    const phase = time / whole;
+    const gone = product([phase * way[0], phase * way[1]], arcFactor(phase * turned));
+    const root: Complex = [
+      roots[3 * frame + 2]! - start[0] - gone[0],
+      roots[3 * frame]! - start[1] - gone[1],
+    ];
+    const [z, x] = product(root, direction(-phase * turned));
+    roots[3 * frame] = start[1] + x;
+    roots[3 * frame + 2] = start[0] + z;
+    const heading = turn([0, 1, 0], -phase * turned);
+    rotations.set(multiply(heading, quaternionAt(rotations, frame * joints)), 4 * frame * joints);
+  }
+}
+
+/** The first pose, moved by the travel of the cycle if any. */
+function closingPose(
+  stride: Stride | null,
+  rotations: Float64Array,
+  roots: Float64Array,
+  joints: number,
+): { rotations: number[]; roots: number[] } {
+  const first = [...rotations.subarray(0, 4 * joints)];
+  const root = [...roots.subarray(0, 3)];
+  if (!stride) return { rotations: first, roots: root };
+  const heading: Quaternion = multiply(turn([0, 1, 0], stride.turned), quaternionAt(first, 0));
+  const [z, x] = product(stride.way, arcFactor(stride.turned));
+  return {
+    rotations: [...heading, ...first.slice(4)],
+    roots: [root[0]! + x, root[1]!, root[2]! + z],
+  };
+}
