@@ -9,13 +9,19 @@ import pytest
 import posefield
 from posefield.common.errors import FileError, InvalidField
 from posefield.locomotion import floor_plane
+from posefield.locomotion.paths import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
-from posefield.tracks import track_crowd, track_files
+from posefield.tracks import route_tracks, track_crowd, track_files
 from posefield.tracks.track import MAX_PEOPLE
 from posefield.tracks.track_files import TrackReading
 
 DEGREES = TrackReading("degrees")
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return posefield.load("cmu_walk").synthesizer
 
 
 def write(tmp_path, name, text):
@@ -152,7 +158,7 @@ def test_too_many_people_are_refused(tmp_path):
         track_files.read_tracks(write(tmp_path, "many.csv", HEAD + people))
 
 
-def test_people_start_stand_and_turn_along_their_tracks(tmp_path):
+def test_people_start_stand_and_turn_along_their_tracks(walk, tmp_path):
     """The pelvis keeps to the track; standing feet stand; nobody is below the floor."""
     corner = [(t, 1.2 * t, 0.0) for t in range(5)] + [(t, 4.8, 0.0) for t in range(5, 8)]
     corner += [(t, 4.8, 1.2 * (t - 7)) for t in range(8, 12)]
@@ -160,8 +166,7 @@ def test_people_start_stand_and_turn_along_their_tracks(tmp_path):
     late = "".join(f"{t},b,0,{3 + 0.8 * t}\n" for t in range(4, 9))
     file = write(tmp_path, "street.csv", HEAD + rows + late)
     tracks = track_files.read_tracks(file).tracks
-    model = posefield.load("cmu_walk").synthesizer
-    crowd = track_crowd.build_crowd(model, model.gait, CrowdOrder(2), tracks)
+    crowd = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks)
     motions = {}
     first = 0
     for batch in crowd.batches:
@@ -187,3 +192,43 @@ def test_people_start_stand_and_turn_along_their_tracks(tmp_path):
         assert motions[index][..., 1].min() > 0.0
     # Control: the other person is far away.
     assert np.abs(floor_plane.project(motions[1][frames, 0]) - tracks[0].points[:5]).max() > 1.0
+
+
+CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]
+
+
+def test_a_route_leads_round_its_corner_and_ends_standing(walk):
+    route = Route(np.array(CORNER), 1.1)
+    (track,) = route_tracks.tracks_of_routes(walk.gait, [route], 12.0)
+    for x, z in CORNER:
+        assert np.abs(track.points - complex(z, x)).min() < 0.02
+    assert track.times[-1] == 12.0
+    assert (track.points[-120:] == track.points[-1]).all()
+    speeds = track.speeds
+    assert speeds[:30] == pytest.approx(1.1, abs=0.02)
+    # Slower in the curve, then as fast again.
+    assert speeds[100:240].min() < 1.05 < speeds[240:320].max()
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "speed", "message"),
+    [
+        ([[0, 0], [0, 5]], 0.3, "paths/1/speed: 0.3 m/s, expected 0.487 to 1.79 m/s"),
+        ([[0, 0]], 1.0, "paths/1/waypoints: numbers (1, 2), expected two or more pairs"),
+        ([[0, 0], [0, 1], [0, 1]], 1.0, "paths/1/waypoints/2: less than 0.1 m from the one before"),
+    ],
+)
+def test_a_route_that_cannot_be_walked_is_refused_by_number(walk, waypoints, speed, message):
+    routes = [Route(np.array(CORNER), 1.1), Route(np.array(waypoints, dtype=float), speed)]
+    with pytest.raises(InvalidField) as caught:
+        route_tracks.tracks_of_routes(walk.gait, routes, 5.0)
+    assert message in str(caught.value)
+
+
+def test_people_that_overlap_are_told(walk):
+    meet = [Route(np.array([[0.0, z], [0.0, -z]]), 1.0) for z in (-3.0, 3.0)]
+    tracks = route_tracks.tracks_of_routes(walk.gait, meet, 5.0)
+    facts = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks).facts
+    assert facts["overlaps"]["pairs"] == 1
+    apart = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks[:1]).facts
+    assert apart["overlaps"]["pairs"] == 0

@@ -23,7 +23,8 @@ from posefield.question.results import ClipAnswer
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.tracks import track_files
+from posefield.tracks import route_tracks, track_files
+from posefield.tracks.track import TrackSet
 from posefield.tracks.track_files import HeadingUnit, TrackReading
 
 
@@ -151,6 +152,12 @@ def crowd(
         tracks = track_files.read_tracks(trajectories, reading, skip_bad)
         count = len(tracks.tracks)
     question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
-    order = walking_crowd.from_question(question, crowd_files.routes(paths) if paths else ())
-    facts = crowd_files.write_crowd(open_model(model), order, question, output, tracks)
+    opened = open_model(model)
+    if paths:
+        routes = crowd_files.routes(paths)
+        question = structs.replace(question, count=len(routes))
+        followed = route_tracks.tracks_of_routes(opened.gait, routes, question.seconds)
+        tracks = TrackSet(followed, {})
+    order = walking_crowd.from_question(question)
+    facts = crowd_files.write_crowd(opened, order, question, output, tracks)
     typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

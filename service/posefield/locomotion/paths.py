@@ -5,7 +5,6 @@ on the seed and the character's index, not on the size of the crowd. Characters 
 their distances.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -18,7 +17,6 @@ from posefield.common.units import (
     Floats,
     Indices,
     PerCharacter,
-    PerPoint,
 )
 from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion import collision_avoidance, floor_plane, stride
@@ -88,8 +86,6 @@ class Paths:
         return before, gone / POINT_SPACING - before
 
 
-# Points of a curve per STEP of the straight lines between its waypoints.
-POINTS_PER_STEP = 10
 # Largest length, m, which takes hours to walk, and most waypoints, whose spline takes seconds.
 MAX_LENGTH, MAX_WAYPOINTS = 10_000.0, 1_000
 
@@ -124,30 +120,8 @@ def _parse_route(field: str, entry: Any) -> Route:
         raise InvalidField(field, "expected pairs of numbers and a number") from fault
 
 
-def paths_through(gait: Gait, routes: Sequence[Route]) -> Paths:
-    """Return the paths of routes: natural cubic splines through all waypoints.
-
-    Curvature is continuous, and the speed is constant. Raises InvalidField, which names the route
-    and the place, for a turn that is sharper than sampled at this speed, for a speed outside the
-    sampled range, and for unusable waypoints.
-    """
-    for index, route in enumerate(routes):
-        _check_route(gait, index, route)
-    curves = [_headings(route.waypoints) for route in routes]
-    count = max(len(headings) for headings, _ in curves) + 1
-    # Padding beyond the end of a path is not walked.
-    rows = [np.pad(headings, (0, count - len(headings)), "edge") for headings, _ in curves]
-    paths = Paths(
-        np.array([complex(*route.waypoints[0, ::-1]) for route in routes]),
-        np.stack(rows),
-        np.tile([[route.speed] for route in routes], count).astype(np.float64),
-        np.array([length for _, length in curves]),
-    )
-    _check_turning(gait, paths)
-    return paths
-
-
-def _check_route(gait: Gait, index: int, route: Route) -> None:
+def check_route(gait: Gait, index: int, route: Route) -> None:
+    """Raise InvalidField, with its number, for a route that no walker of the gait can follow."""
     points, (low, high) = route.waypoints, gait.region.speeds
     field = f"paths/{index}/waypoints"
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
@@ -173,32 +147,6 @@ def _check_route(gait: Gait, index: int, route: Route) -> None:
         raise InvalidField(
             f"paths/{index}/waypoints/{at + 1}",
             f"less than {POINT_SPACING:g} m from the one before, expected a way to it",
-        )
-
-
-def _headings(waypoints: Annotated[Floats, "waypoints 2"]) -> tuple[PerPoint, float]:
-    """Return headings (K,), rad, at every STEP of a spline, and its length, m.
-
-    waypoints: (P, 2), m, on the spline.
-    """
-    natural = (None, None)
-    gone, headings = floor_plane.headings(waypoints, POINT_SPACING, POINTS_PER_STEP, natural)
-    along = np.arange(int(gone[-1] / POINT_SPACING) + 1) * POINT_SPACING
-    return np.interp(along, gone, headings), float(gone[-1])
-
-
-def _check_turning(gait: Gait, paths: Paths) -> None:
-    turning = paths.speeds * paths.curvatures
-    walked = POINT_SPACING * np.arange(turning.shape[1]) <= paths.lengths[:, None]
-    sharp = walked & ~gait.region.contains(paths.speeds, turning)
-    for index in np.flatnonzero(sharp.any(axis=1))[:1]:
-        at = int(np.argmax(np.where(sharp[index], np.abs(turning[index]), -1.0)))
-        point, speed = paths.places[index, at], paths.speeds[index, at]
-        low, high = gait.region.turning(np.array(speed))
-        raise InvalidField(
-            f"paths/{index}",
-            f"at x {point.imag:.2f} m, z {point.real:.2f} m it turns by {turning[index, at]:.3f} "
-            f"rad/s, expected {low:.3f} to {high:.3f} rad/s at {speed:g} m/s; positive is left",
         )
 
 

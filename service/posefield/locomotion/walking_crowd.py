@@ -1,7 +1,7 @@
 """Crowds of walking characters: validation, plans, and motions computed on demand."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated, Any
@@ -19,12 +19,10 @@ from posefield.locomotion import (
     paths,
     stride,
 )
-from posefield.locomotion import paths as given
 from posefield.locomotion.collision_avoidance import RADIUS
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
-from posefield.locomotion.paths import Route
 from posefield.locomotion.stride import RelativePoses
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import contact_detection, curves, quat, skeleton
@@ -66,22 +64,6 @@ def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) 
     frames = frame_count(count, seconds, rate, seed)
     characters = paths.draw_characters(gait, count, seed)
     ways = paths.draw_paths(gait, characters, seconds)
-    return locomotion_plan.plan_along_paths(
-        gait, ways, characters.who, characters.phases, frames, rate
-    )
-
-
-def plan_routes(
-    gait: Gait, routes: Sequence[Route], seconds: float, rate: float, seed: int
-) -> LocomotionPlan:
-    """Return a plan of characters that follow routes; performers and phases depend on the seed.
-
-    Raises InvalidField as `plan_random` and `given.paths_through` do, and for a route that is too
-    short.
-    """
-    frames = frame_count(len(routes), seconds, rate, seed)
-    characters = paths.draw_characters(gait, len(routes), seed)
-    ways = given.paths_through(gait, routes)
     return locomotion_plan.plan_along_paths(
         gait, ways, characters.who, characters.phases, frames, rate
     )
@@ -285,7 +267,7 @@ MOST_OVERLAPS = 20
 class CrowdOrder:
     """Parameters of a walking crowd.
 
-    count: characters, each on its own path; with routes, their number. routes: given routes.
+    count: characters, each on its own path.
     motions: number of distinct motions that the characters share, None for one each. seconds:
     duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
     if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
@@ -296,7 +278,6 @@ class CrowdOrder:
     """
 
     count: int
-    routes: Sequence[Route] = ()
     motions: int | None = None
     seconds: float = 10.0
     fps: float = DEFAULT_FPS
@@ -317,8 +298,6 @@ class CrowdOrder:
             raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
         if self.motions is not None and not 1 <= self.motions <= self.count:
             raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
-        if self.motions is not None and self.routes:
-            raise InvalidField("motions", f"{self.motions}, expected none: every route has its own")
         if self.motions is not None and self.camera is not None:
             raise InvalidField(
                 "motions", "shared by characters near and far, expected a level and no camera"
@@ -327,8 +306,8 @@ class CrowdOrder:
             raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
 
 
-def from_question(question: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrder:
-    """Return the order of a question; its characters follow the routes if there are any."""
+def from_question(question: WalkQuestion) -> CrowdOrder:
+    """Return the order of a question."""
     camera = None
     if question.camera is not None:
         fov = DEFAULT_FOV if question.fov is None else question.fov
@@ -336,7 +315,6 @@ def from_question(question: WalkQuestion, routes: Sequence[Route] = ()) -> Crowd
         camera = Camera(np.array(question.camera), fov, height)
     return CrowdOrder(
         count=question.count,
-        routes=routes,
         motions=question.motions,
         seconds=question.seconds,
         fps=question.fps,
@@ -362,11 +340,8 @@ def build_crowd(
     """
     gait = gait.with_labels(order.labels)
     span = order.seconds, order.fps, order.seed
-    if order.routes:
-        plan = plan_routes(gait, order.routes, *span)
-    else:
-        plan = plan_random(gait, order.motions or order.count, *span)
-    levels = _build_schedule(model, plan, order)
+    plan = plan_random(gait, order.motions or order.count, *span)
+    levels = build_schedule(model, plan, order)
     crowd, places = crowd_of_plan(gait.session, plan, levels, make), plan.places
     if order.motions is not None:
         # The characters reuse the motions in turn.
@@ -377,7 +352,7 @@ def build_crowd(
         return crowd
     if order.motions is not None:
         places = _placed(crowd.placement, plan.relative_to_start().places[crowd.motion])
-    return replace(crowd, facts={**crowd.facts, **_overlap_facts(places, plan.rate)})
+    return replace(crowd, facts={**crowd.facts, **overlap_facts(places, plan.rate)})
 
 
 def _placed(
@@ -388,7 +363,7 @@ def _placed(
     return starts + relative * floor_plane.unit_vectors(placement.headings)[:, None]
 
 
-def _overlap_facts(
+def overlap_facts(
     places: Annotated[FloorVectors, "characters frames"], rate: float
 ) -> dict[str, Any]:
     """Return the facts of the pairs of characters that overlap, with a warning of any."""
@@ -408,7 +383,8 @@ def _overlap_facts(
     }
 
 
-def _build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:
+def build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:
+    """Return the levels of detail of a plan: those of the order's camera, or one."""
     level, coarsest = order.level or 0, len(model.session.card.levels) - 1
     if not 0 <= level <= coarsest:
         raise InvalidField("level", f"{level}, expected 0 to {coarsest}")

@@ -291,13 +291,13 @@ def _route(
         return walk_paths.turning(start or FloorMotion(), gone, turns), gone, []
     path, notes = _path(gait, request, start, curve[1])
     bent = np.abs(path.curvatures).max() > 0.1
-    slower = (path.distances, _curve_speeds(gait, path)) if bent else None
+    slower = (path.distances, curve_speeds(gait, path)) if bent else None
     scale, length = request.speed_over, path.length
     gone = walk_request.distances_over_length(curve, scale, length, ramps, slower)
     return path, gone, notes
 
 
-def _curve_speeds(gait: Gait, path: FloorPath) -> PerPoint:
+def curve_speeds(gait: Gait, path: FloorPath) -> PerPoint:
     """Return the largest speeds (K,), m/s, at which the curves of a path are walked."""
     speeds = np.linspace(*gait.region.speeds, CURVE_SPEEDS)
     right, left = _turning_limits(gait, speeds)

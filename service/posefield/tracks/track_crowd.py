@@ -10,7 +10,7 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
-from posefield.locomotion import floor_plane, locomotion_plan, walking_crowd
+from posefield.locomotion import collision_avoidance, floor_plane, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH, CrowdOrder
@@ -90,7 +90,8 @@ class TrackCrowd:
         )
         starts = np.array([path.points[0] for path in paths]) / scales
         relative = replace(plan, places=plan.places - starts[:, None])
-        levels = locomotion_plan.constant_schedule(self.order.level or 0, plan.phases.shape)
+        world = replace(plan, places=plan.places * scales[:, None])
+        levels = walking_crowd.build_schedule(self.model, world, self.order)
         motions = make(self.gait.session, relative, np.arange(len(people)), levels)
         size = scales.astype(np.float32)[:, None, None]
         return plan, replace(
@@ -203,6 +204,7 @@ def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
     card = crowd.gait.session.card
     combinations = crowd.gait.labels.draw(np.array([person.number for person in crowd.people]))
     errors = [person.path.errors for person in crowd.people]
+    overlaps = _overlaps(crowd)
     return {
         "model": f"{card.name}@{crowd.gait.session.digest}",
         **crowd.gait.labels.facts(combinations),
@@ -216,8 +218,25 @@ def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
         "outside_share": 0.0,
         "level_shares": [1.0],
         "skipped": crowd.skipped,
-        "warnings": [line for person in crowd.people for line in limits(crowd, person)],
+        **overlaps,
+        "warnings": [
+            *(line for person in crowd.people for line in limits(crowd, person)),
+            *overlaps.get("warnings", ()),
+        ],
     }
+
+
+def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:
+    """Return the facts of people who overlap; none for more than can be searched."""
+    count, rate = len(crowd.people), crowd.order.fps
+    if not collision_avoidance.is_searchable(count, crowd.frames, rate):
+        return {}
+    # Who is not there is far away from all others.
+    away = 1e7 * (1.0 + np.arange(count))
+    points = np.tile(away[:, None], crowd.frames).astype(np.complex128)
+    for row, person in zip(points, crowd.people, strict=True):
+        row[person.path.first : person.path.first + len(person.path)] = person.path.points
+    return walking_crowd.overlap_facts(points, rate)
 
 
 def limits(crowd: TrackCrowd, person: Person) -> Iterator[str]:

@@ -9,7 +9,6 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.locomotion import floor_plane, gait, locomotion_plan, paths, stride, walking_crowd
-from posefield.locomotion.paths import Route
 from posefield.motion import quat, skeleton
 
 # float32 of places some metres away, and of phases after some strides.
@@ -174,7 +173,8 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
 
 
 def test_a_way_that_ends_too_soon_is_refused(own):
-    ways = paths.paths_through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
+    starts = np.zeros(1, dtype=np.complex128)
+    ways = paths.Paths(starts, np.zeros((1, 31)), np.ones((1, 31)), np.array([3.0]))
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
         locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
 

@@ -1,14 +1,12 @@
 """Tests of paths over the floor: through waypoints, or random from a seed."""
 
-import re
-
 import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.locomotion import floor_plane, gait, paths
-from posefield.locomotion.paths import POINT_SPACING, Paths, Route
+from posefield.locomotion.paths import POINT_SPACING, Paths
 
 
 @pytest.fixture(scope="module")
@@ -30,45 +28,6 @@ def test_even_turns_are_a_circle_between_places_too():
     assert np.abs(np.abs(places - 2.0j) - 2.0).max() < 1e-12
     assert tangents[0, -1] == pytest.approx(7.5)
     assert ways.curvatures == pytest.approx(0.5)
-
-
-BEND = np.array([[1.0, -2.0], [1.0, 3.0], [2.0, 8.0], [5.0, 12.0], [9.0, 14.0]])
-
-
-def test_a_route_leads_through_its_waypoints_without_a_kink(own):
-    ways = paths.paths_through(own, [Route(BEND, 0.9)])
-    gone = np.linspace(0.0, ways.lengths[0], 100_000)[None]
-    places, tangents = ways.at(gone)
-    for left, ahead in BEND:
-        assert np.abs(places - complex(ahead, left)).min() < 1e-3
-    assert np.abs(np.diff(tangents)).max() < 1e-3
-    # A bend changes by little from step to step: nothing snaps when it is walked.
-    assert np.abs(np.diff(ways.curvatures)).max() < 0.02
-    # Negative control: the straight lines between them are another way.
-    assert np.abs(places - complex(5.5, 1.5)).min() > 0.05
-
-
-CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]
-
-
-@pytest.mark.parametrize(
-    ("waypoints", "speed", "said"),
-    [
-        (
-            CORNER,
-            1.0,
-            r"paths/1: at x 0\.0\d m, z 3\.0\d m it turns by 1\.\d+ rad/s, expected -0\.",
-        ),
-        ([[0, 0], [0, 5]], 0.3, "paths/1/speed: 0.3 m/s, expected 0.7 to 1.5 m/s"),
-        ([[0, 0]], 1.0, r"paths/1/waypoints: numbers \(1, 2\), expected two or more pairs"),
-        ([[0, 0], [0, 1], [0, 1]], 1.0, "paths/1/waypoints/2: less than 0.1 m from the one before"),
-    ],
-)
-def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypoints, speed, said):
-    fine = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
-    with pytest.raises(InvalidField) as refusal:
-        paths.paths_through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
-    assert re.match(said, str(refusal.value)), str(refusal.value)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from posefield.feet import two_bone
 from posefield.inference import session
 from posefield.inference.level_selection import Camera
 from posefield.kriging import kriging_model
-from posefield.locomotion import floor_plane, gait, locomotion_plan, paths, walking_crowd
+from posefield.locomotion import floor_plane, gait, locomotion_plan, walking_crowd
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
 from posefield.registry import model_registry
@@ -180,25 +180,11 @@ def test_variances_of_deviations_are_those_of_kriging(model, twins):
     assert found.var() != pytest.approx(1.5 * float(sigma) ** 2, rel=0.1)
 
 
-def arc(x, bend):
-    """Waypoints of a turn to the left by 1.9 rad, after two metres ahead."""
-    turns = np.linspace(0.0, 1.9, 9)
-    places = np.column_stack([x + bend * (1.0 - np.cos(turns)), 2.0 + bend * np.sin(turns)])
-    return places.tolist()
-
-
-ROUTES = [
-    {"waypoints": [[x, 0], *arc(x, bend)], "speed": v}
-    for x, bend, v in ((0, 14.0, 1.2), (20, 16.0, 1.0), (40, 18.0, 1.3), (60, 20.0, 1.4))
-]
-
-
 NEAR = Camera(np.array([-8.0, 1.7, 0.0]), 1.0472, 1080.0)
 
 
 CROWDS = {
     "wandering": {"count": 30, "seconds": 8.0},
-    "on routes": {"count": len(ROUTES), "routes": paths.parse_routes(ROUTES), "seconds": 15.0},
     "while levels change": {"count": 40, "seconds": 8.0, "camera": NEAR, "pixels": 3.0},
     "at the coarsest level": {"count": 30, "seconds": 4.0, "level": 3},
 }

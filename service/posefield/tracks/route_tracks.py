@@ -1,0 +1,37 @@
+"""Tracks of routes: through waypoints at one speed, slower in curves, and standing at the end."""
+
+from collections.abc import Sequence
+from math import ceil
+
+import numpy as np
+
+from posefield.locomotion import paths
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.paths import Route
+from posefield.performance import walk_paths, walk_plan, walk_request
+from posefield.performance.passage import RATE
+from posefield.performance.walk_request import SpeedRamps
+from posefield.tracks.track import Track
+
+ACCELERATION = 0.8
+"""Acceleration with which a walker arrives, m/s²."""
+
+
+def tracks_of_routes(gait: Gait, routes: Sequence[Route], seconds: float) -> tuple[Track, ...]:
+    """Return the tracks of routes over some seconds: who arrives earlier stands there.
+
+    Raises InvalidField, which names the route and the place, for a speed outside the sampled range
+    and for unusable waypoints.
+    """
+    count = ceil(seconds * RATE) + 1
+    tracks = []
+    for index, route in enumerate(routes):
+        paths.check_route(gait, index, route)
+        path = walk_paths.through(route.waypoints, None, None)
+        curve = np.zeros(1), np.array([route.speed])
+        slower = path.distances, walk_plan.curve_speeds(gait, path)
+        ramps = SpeedRamps(None, 0.0, ACCELERATION)
+        gone = walk_request.distances_over_length(curve, "distance", path.length, ramps, slower)
+        gone = np.pad(gone, (0, max(count - len(gone), 0)), "edge")[:count]
+        tracks.append(Track(str(index), np.arange(count) / RATE, path.at(gone)[0]))
+    return tuple(tracks)
