@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from posefield import cli
 from posefield.cli import crowd_files
-from posefield.common.errors import FileError, FormError, InvalidField, MotionError
+from posefield.common.errors import FileError, FormError, InvalidField, MotionError, UnknownFormat
 
 
 def run(*words):
@@ -106,7 +106,7 @@ def test_routes_are_followed(walk_path, tmp_path):
 @pytest.mark.parametrize(
     ("words", "kind", "said"),
     [
-        (("-o", "crowd.fbx"), InvalidField, "output: 'crowd.fbx' ends in none of usd, usda, usdc"),
+        (("-o", "crowd.fbx"), UnknownFormat, "output: 'crowd.fbx' ends in none of usd, usda, usdc"),
         (("-o", "c.usd", "--camera", "1,2"), FormError, "camera: '1,2', expected x,y,z"),
         (("-o", "c.usd", "--seconds", "1e308"), InvalidField, "poses, expected"),
         (("-o", "c.npz", "--paths", "none.json"), FileError, "none.json: cannot be read"),
