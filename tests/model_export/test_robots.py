@@ -25,7 +25,8 @@ from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
 from posefield.robots.robot_motion import RobotMotion
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.robots import doctor, robot_file
+from posefield_train.report import robot_feasibility
+from posefield_train.robots import doctor, robot_dynamics, robot_file
 
 # A biped whose left leg branches before its right, with a hinge beside its body's origin, a body
 # with two hinges, and a neck behind both legs: its orders depth first and breadth first differ.
@@ -506,6 +507,84 @@ def test_limits_that_a_command_breaks_are_told_or_refused(limited, robot):
     assert limited.clip(pace=0.25, limits="refuse").trust.limits == ()
     with pytest.raises(InvalidField, match="left_knee turns to"):
         limited.clip(pace=0.85, limits="refuse")
+
+
+def test_feasibility_tells_the_commands_that_break_a_limit(limited, family, robot, command):
+    dynamics = robot_dynamics.Dynamics(family / "biped.xml")
+    dynamics.robot = limited.synthesizer.session.card.robot
+    rows = robot_feasibility.measure(limited, dynamics, 5).rows
+    assert ["limit_rad" in row["broken"] for row in rows] == [False, False, True, True, True]
+    assert {row["where"] for row in rows[2:]} == {"left_knee"}
+    page = family / "feasibility.html"
+    words = ["feasibility", family / "biped.onnx", "--robot", family / "biped.xml", "-o", page]
+    assert command(*words, "--per-control", "3")[0] == 0
+    figures = json.loads(page.with_suffix(".json").read_bytes())
+    assert [row["limit_rad"] for row in figures["commands"]] == [0.0, 0.0, 0.0]
+    assert max(row["seam_rad"] for row in figures["commands"]) < 1e-9
+    assert page.read_text().count("<img") == len(robot_feasibility.QUANTITIES)
+
+
+HOPPER = """<mujoco><compiler angle="radian"/><worldbody><body name="trunk" pos="0 0 0.54">
+<freejoint/><geom type="box" size="0.1 0.05 0.05" pos="0.04 0 0.1" mass="3"/>
+<body name="shin"><joint name="hip" axis="0 1 0"/>
+<geom type="box" size="0.02 0.02 0.2" pos="0 0 -0.25" mass="1"/>
+<body name="foot" pos="0 0 -0.5"><joint name="ankle" axis="0 1 0"/>
+<geom type="box" size="0.15 0.05 0.02" pos="0 0 -0.02" mass="0.5"/></body></body></body></worldbody>
+<actuator><motor joint="hip" ctrlrange="-2 2" ctrllimited="true" gear="5"/></actuator></mujoco>"""
+GRAVITY = 9.81
+
+
+@pytest.fixture(scope="module")
+def hopper(tmp_path_factory):
+    path = tmp_path_factory.mktemp("hopper") / "hopper.xml"
+    path.write_text(HOPPER)
+    return robot_dynamics.Dynamics(path)
+
+
+def hops(accelerated=0.0, angle=0.3, frames=5, rate=50.0):
+    """The hopper upright on its level foot, with a constant acceleration ahead, m/s²."""
+    times = np.arange(frames) / rate
+    height = 0.04 + 0.5 * np.cos(angle)
+    ahead = 0.5 * accelerated * times**2
+    path = np.stack([ahead, 0 * times, np.full(frames, height)], axis=-1)
+    angles = np.tile([angle, -angle], (frames, 1))
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (frames, 1))
+    return RobotMotion("", "qpos.csv", path, upright, angles, rate, ("hip", "ankle"))
+
+
+def test_torques_of_a_standing_robot_carry_what_lies_above_each_hinge(hopper):
+    motion = hops()
+    loads = hopper.loads(motion, np.ones((5, 1), bool))
+    # Moments of weight about the axis y: trunk about the hip, trunk and shin about the ankle.
+    hip, ankle = (
+        motion.base_path[2],
+        motion.base_path[2] - 0.5 * np.array([np.sin(0.3), 0, np.cos(0.3)]),
+    )
+    shin = 0.5 * (hip + ankle)
+    of_trunk = 3 * GRAVITY * 0.04
+    of_leg = 3 * GRAVITY * (hip[0] + 0.04 - ankle[0]) + GRAVITY * (shin[0] - ankle[0])
+    np.testing.assert_allclose(loads.torques[2], [of_trunk, of_leg], rtol=2e-3)
+    np.testing.assert_allclose(loads.shares[2, 0], of_trunk / 10.0, rtol=2e-3)
+    assert loads.lacking.max() < 1e-3
+    # In the air nothing is carried: the whole weight lacks, and the shin hangs from the hip.
+    flying = hopper.loads(motion, np.zeros((5, 1), bool))
+    assert flying.lacking == pytest.approx(1.0)
+    assert np.isnan(flying.zero_moment).all()
+
+
+@pytest.mark.parametrize("accelerated", [0.0, 1.5, -4.0])
+def test_the_zero_moment_point_lies_below_the_mass_less_its_acceleration(accelerated, hopper):
+    motion = hops(accelerated)
+    loads = hopper.loads(motion, np.ones((5, 1), bool))
+    path = motion.base_path[2]
+    ankle = path - 0.5 * np.array([np.sin(0.3), 0, np.cos(0.3)])
+    trunk, foot = path + np.array([0.04, 0, 0.1]), ankle - np.array([0, 0, 0.02])
+    parts = ((3.0, trunk), (1.0, 0.5 * (path + ankle)), (0.5, foot))
+    mass = sum(weight * middle for weight, middle in parts) / 4.5
+    point = mass[0] - mass[2] * accelerated / GRAVITY
+    expected = max(abs(point - ankle[0]) - 0.15, -0.05)
+    assert loads.zero_moment[2] == pytest.approx(expected, abs=2e-3)
+    assert (loads.lacking[2] < 0.01) == (expected < 0)
 
 
 def test_commands_are_swept_into_a_folder_of_reference_motions(family, robot, tmp_path, command):

@@ -10,6 +10,7 @@ from posefield_train.cli import (
     command_discover,
     command_doctor,
     command_evaluate,
+    command_feasibility,
     command_probe,
     command_sample,
     command_train,
@@ -22,6 +23,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "discover": (command_discover.discover, command_discover.EXAMPLES),
     "review": (command_discover.review, command_discover.REVIEW_EXAMPLES),
     "doctor": (command_doctor.doctor, command_doctor.EXAMPLES),
+    "feasibility": (command_feasibility.feasibility, command_feasibility.EXAMPLES),
     "sample": (
         command_sample.sample,
         ["sample reaching -o reaching", "sample reaching --truth -c turn=20 -o truth.bvh"],

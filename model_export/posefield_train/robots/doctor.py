@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.units import Booleans, Floats
+from posefield.common.units import Booleans, Floats, Frames
 from posefield.motion.contact_detection import ContactThresholds, detect_contacts
 from posefield.robots.robot import Robot, velocities
 from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
@@ -202,13 +202,18 @@ def _of_foot(
         frame, count = int(np.argmin(heights)), int((heights < -SUNK).sum())
         findings.append(Finding("sunk", name, frame, -100 * float(heights.min()), "cm", count))
     if contacts.any():
-        speeds = np.linalg.norm(velocities(points, motion.rate)[..., :2], axis=-1).min(axis=1)
+        speeds = sliding_speeds(points, motion.rate)
         mean = float(speeds[contacts].mean())
         if mean > SKATING:
             frame = int(np.argmax(np.where(contacts, speeds, 0.0)))
             count = int(contacts.sum())
             findings.append(Finding("skating", name, frame, 100 * mean, "cm/s", count))
     return findings
+
+
+def sliding_speeds(points: Annotated[Floats, "frames points 3"], rate: float) -> Frames:
+    """Return the speed (F,), m/s, over the floor of the slowest of a sole's points."""
+    return np.asarray(np.linalg.norm(velocities(points, rate)[..., :2], axis=-1).min(axis=1))
 
 
 def outliers(motions: Sequence[RobotMotion]) -> dict[int, Finding]:

@@ -27,7 +27,7 @@ def read(path: Path) -> Robot:
     A base that the file welds to the world floats. Raises MotionFileError for a file that MuJoCo
     refuses, such as one whose meshes are missing, and for joints that are no hinges.
     """
-    model = _model(path)
+    model = model_of(path)
     joints = [_Joint(model, index) for index in range(model.njnt)]
     free = [joint for joint in joints if joint.kind == "free"]
     others = [joint for joint in joints if joint.kind in ("ball", "slide")]
@@ -57,7 +57,8 @@ def read(path: Path) -> Robot:
     return _with_feet(robot, [_surface(model, body) for body in bodies])
 
 
-def _model(path: Path) -> "mujoco.MjModel":
+def model_of(path: Path) -> "mujoco.MjModel":
+    """Return the model of a file, whose base floats; raises as `read` does."""
     try:
         import mujoco
     except ImportError:

@@ -106,9 +106,11 @@ class StandingSoles:
         self._positions = [
             constant(np.array([points[row].position for row in leg.rows])) for leg in self._legs
         ]
-        self._displace, self._smooth, self._when = (
-            constant(np.stack(matrices)) for matrices in zip(*runs, strict=True)
-        )
+        # Without sole points there are only limits.
+        if runs:
+            self._displace, self._smooth, self._when = (
+                constant(np.stack(matrices)) for matrices in zip(*runs, strict=True)
+            )
         self._shares = constant(np.arange(steps) / steps)
         self._low, self._high = (constant(robot.ranges[:, side]) for side in range(2))
         self._turns = [constant(turn) for turn in quat.to_matrix(robot.turns)]
