@@ -124,6 +124,13 @@ test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, st
 test-all: test test-system ## both rings and the older Blender
 	$(BIN)/python tests/interop/run.py --others
 
+# 400 MB with their viewers, so that no dependency group of the project has them.
+.PHONY: simulators
+simulators: | $(ENV) ## record anew what SUMO and JuPedSim say, animate it, and draw the guide's pictures
+	$(BIN)/uv run --isolated --no-project --with eclipse-sumo==1.28.0 --with jupedsim==1.4.2 python tests/record_simulators.py
+	$(BIN)/python -m pytest -q tests/test_simulators.py
+	$(BIN)/python docs/draw_simulators.py
+
 .PHONY: fuzz
 fuzz: $(PAGE) $(DOCS) ## send requests drawn from the contract and mutate motion files for half an hour; SECONDS, SEED
 	POSEFIELD_FUZZ_SECONDS=$(or $(SECONDS),900) POSEFIELD_FUZZ_SEED=$(or $(SEED),$(shell date +%s)) \
