@@ -76,7 +76,7 @@ def join_peaks(before: Clip, after: Clip, cyclic: bool) -> tuple[float, float]:
     """
     bones = before.translations[0].copy()
     bones[0] = 0.0
-    body = footsteps.choose_limbs(before.skeleton.parents, bones, (), ()).character
+    body = footsteps.choose_limbs(before.skeleton.parents, bones, (), ())[0]
     first, second = passage_of(before), passage_of(after)
     leave = len(first) - 1 if cyclic else len(first) // 2 + REACH // 2
     enter = REACH // 2 if cyclic else len(second) // 2

@@ -115,7 +115,7 @@ def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
     )[::step]
     bones = clip.translations[0].copy()
     bones[0] = 0.0
-    chosen = footsteps.choose_limbs(clip.skeleton.parents, bones, joints, ()).character
+    chosen = footsteps.choose_limbs(clip.skeleton.parents, bones, joints, ())[0]
     intervals = []
     for foot, joint in enumerate(joints):
         row = frame_groups.one_row(len(contacts), RATE)
@@ -183,8 +183,8 @@ def _placed(take: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[floa
     slides = []
     for leg, steps in zip(take.character.legs, plan.steps, strict=True):
         for stance in steps.stances:
-            if stance.begin < near.stop and stance.end > near.start:
-                path = points[stance.begin : stance.end, leg.tip]
+            if stance.start < near.stop and stance.stop > near.start:
+                path = points[stance.start : stance.stop, leg.tip]
                 slides.append(float(np.linalg.norm(path - path[0], axis=-1).max()))
     return placed, tuple(slides), float((plan.lowered - plan.grounded)[near].mean())
 

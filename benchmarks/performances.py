@@ -100,8 +100,8 @@ def stood(performance: Made) -> tuple[list[float], Frames]:
         near = (times >= time - NEAR[0]) & (times <= time + NEAR[1])
         for foot, steps in enumerate(plan.steps):
             for stance in steps.stances:
-                if near[stance.begin : stance.end].any():
-                    path = paths[stance.begin : stance.end, foot][:, [0, 2]]
+                if near[stance.start : stance.stop].any():
+                    path = paths[stance.start : stance.stop, foot][:, [0, 2]]
                     slides.append(100.0 * float(np.linalg.norm(path - path[0], axis=-1).max()))
     return slides, 100.0 * np.abs(plan.lowered - plan.grounded)
 

@@ -21,7 +21,7 @@ from evaluation.stride_quality import StrideQuality
 from rows import Row, compact, origin
 
 from posefield.common.units import Floats
-from posefield.feet import footsteps, heel_roll, two_bone
+from posefield.feet import ball_path, body_plans, footsteps
 from posefield.feet.limbs import Limb
 from posefield.locomotion import gait
 from posefield.locomotion.paths import Route
@@ -65,7 +65,7 @@ def legs_of(model: Synthesizer) -> tuple[Limb, ...]:
     """Return the legs of a model."""
     body = model.session.card
     skeleton = body.skeleton
-    return footsteps.choose_limbs(skeleton.parents, skeleton.offsets, body.feet, ()).character.legs
+    return footsteps.choose_limbs(skeleton.parents, skeleton.offsets, body.feet, ())[0].legs
 
 
 def clip(model: Synthesizer, speed: float, feet: FeetMode) -> Clip:
@@ -115,16 +115,16 @@ MOTIONS: dict[str, Callable[[Synthesizer, float, FeetMode], Clip]] = {
 def balls_down() -> Iterator[None]:
     """Plan stances as before: balls on the floor at heel strike, and no lifted heels."""
     flat = mock.patch.object(
-        heel_roll,
+        ball_path,
         "flat_pitches",
         lambda vectors, contacts, rows: np.full(len(rows.counts), np.pi / 2),
     )
-    still = mock.patch.object(heel_roll, "trimmed", lambda stances, feet: stances)
+    still = mock.patch.object(ball_path, "trimmed", lambda stances, feet: stances)
     with (
         flat,
         still,
-        mock.patch.multiple(heel_roll, MOST_LIFT=0.0),
-        mock.patch.multiple(two_bone, MOST=0.05),
+        mock.patch.multiple(ball_path, MOST_LIFT=0.0),
+        mock.patch.multiple(body_plans, MOST=0.05),
     ):
         yield
 

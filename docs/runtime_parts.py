@@ -3,7 +3,7 @@
 from typing import Any
 
 from posefield.constraints import constraint_solver
-from posefield.feet import ball_path, body_plans, heel_roll, smooth_change, stance_rows, two_bone
+from posefield.feet import ball_path, body_plans, limbs, smooth_change, stance_rows
 from posefield.inference import session
 from posefield.locomotion import stride
 from posefield.motion import contact_detection, hinges
@@ -32,9 +32,9 @@ CONSTANTS: dict[str, tuple[Any, str]] = {
     "PROBABILITY_DECIMALS": (stance_rows, "DECIMALS"),
     "REACH_ROUNDS": (body_plans, "ROUNDS"),
     "STILL_SPEED": (contact_detection.DEFAULT, "grown_speed"),
-    "FLAT_PERCENTILE": (heel_roll, "FLAT"),
-    "HEEL": (heel_roll, "HEEL"),
-    "MOST_HEEL_LIFT": (heel_roll, "MOST_LIFT"),
+    "FLAT_PERCENTILE": (ball_path, "FLAT"),
+    "HEEL": (ball_path, "HEEL"),
+    "MOST_HEEL_LIFT": (ball_path, "MOST_LIFT"),
     "PATH_SPREAD": (smooth_change, "SPREAD"),
     "LIFT_SHARE": (ball_path, "LIFT_SHARE"),
     "FULL_STEP": (ball_path, "FULL_STEP"),
@@ -42,17 +42,17 @@ CONSTANTS: dict[str, tuple[Any, str]] = {
     "LIFT_EXPONENT": (ball_path, "LIFT_EXPONENT"),
     "LEAST_LIFT": (ball_path, "LEAST_LIFT"),
     "LIFT_ACCELERATION": (ball_path, "LIFT_ACCELERATION"),
-    "REACH": (two_bone, "REACH"),
-    "SOFTNESS": (two_bone, "SOFTNESS"),
-    "STRAIGHT": (two_bone, "STRAIGHT"),
-    "PRESS": (two_bone, "PRESS"),
-    "LEAST_BEND": (two_bone, "LEAST_BEND"),
-    "OVERSTRETCHED": (two_bone, "OVERSTRETCHED"),
-    "FOLDED": (two_bone, "FOLDED"),
-    "LEAST_ACROSS": (two_bone, "LEAST_ACROSS"),
-    "PELVIS_SPREAD": (two_bone, "SPREAD"),
-    "PELVIS_SMOOTHING": (two_bone, "SMOOTHING"),
-    "MOST_LOWERED": (two_bone, "MOST"),
+    "REACH": (limbs, "REACH"),
+    "SOFTNESS": (limbs, "SOFTNESS"),
+    "STRAIGHT": (limbs, "STRAIGHT"),
+    "PRESS": (limbs, "PRESS"),
+    "LEAST_BEND": (limbs, "LEAST_BEND"),
+    "OVERSTRETCHED": (limbs, "OVERSTRETCHED"),
+    "FOLDED": (limbs, "FOLDED"),
+    "LEAST_ACROSS": (limbs, "LEAST_ACROSS"),
+    "PELVIS_SPREAD": (body_plans, "SPREAD"),
+    "PELVIS_SMOOTHING": (body_plans, "SMOOTHING"),
+    "MOST_LOWERED": (body_plans, "MOST"),
     "HINGE_FREE": (hinges, "FREE"),
     "HINGE_MOST": (hinges, "MOST"),
 }

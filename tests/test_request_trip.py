@@ -32,11 +32,11 @@ REQUESTS = {
     "performance": ("POST", "/v1/performances.usdc", b"", json.dumps(SCRIPT).encode()),
 }
 CEILINGS = {
-    "plain clip": (29, 163, 13),
-    "standing feet": (55, 407, 43),
-    "pose": (21, 61, 5),
-    "crowd": (47, 410, 45),
-    "performance": (60, 477, 57),
+    "plain clip": (29, 161, 13),
+    "standing feet": (50, 340, 31),
+    "pose": (21, 60, 5),
+    "crowd": (45, 367, 37),
+    "performance": (58, 433, 49),
 }
 """Most modules, functions and classes of each request."""
 
@@ -89,7 +89,7 @@ async def ask(application, method, path, query, body):
 
 
 async def trips():
-    """Yield the name, status and trip of each request, asked the fourth time."""
+    """Yield the name, status and trip of each request, asked the fourth or fifth time."""
     application = app.create_app(
         model_registry.load([Path(ROOT, "shipped/cmu_walk.onnx"), sys.argv[1]]), Settings()
     )
@@ -104,12 +104,16 @@ async def trips():
     for name, request in REQUESTS.items():
         for _ in range(3):
             await ask(application, *request)
-        trip = Trip()
-        sys.setprofile(hook)
-        status = await ask(application, *request)
-        sys.setprofile(None)
-        yield name, status, trip
-        trip = None
+        measured = []
+        # The timer of deadlines, ten times a second, may fall into one of them.
+        for _ in range(2):
+            trip = Trip()
+            sys.setprofile(hook)
+            status = await ask(application, *request)
+            sys.setprofile(None)
+            measured.append(trip)
+            trip = None
+        yield name, status, min(measured, key=lambda trip: trip.counts)
 
 
 async def main():

@@ -8,7 +8,7 @@ import numpy as np
 
 from evaluation.methods import ADAPTATION_COUNTS, ASKED_OPEN, NO_PERFORMER
 from posefield.common.units import Floats, Indices
-from posefield.kriging.kriging_model import half_ranges
+from posefield.kriging.support import half_ranges
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.evaluate import predictions, summary
 from posefield_train.evaluate.motion_errors import ComparedMotion

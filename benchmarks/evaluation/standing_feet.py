@@ -85,7 +85,7 @@ def measured_joints(card: ModelCard) -> MeasuredJoints | None:
     Feet stand in motions that travel, at the ends of legs.
     """
     skeleton = card.skeleton
-    legs = footsteps.choose_limbs(skeleton.parents, skeleton.offsets, card.feet, ()).character.legs
+    legs = footsteps.choose_limbs(skeleton.parents, skeleton.offsets, card.feet, ())[0].legs
     if not legs or card.root != "travelling":
         return None
     return MeasuredJoints(tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefield.common.units import UP
-from posefield.kriging.kriging_model import half_ranges
+from posefield.kriging.support import half_ranges
 from posefield.motion import clip, quat
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import dtw, time_alignment

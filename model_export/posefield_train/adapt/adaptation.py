@@ -12,7 +12,8 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import Hyper, half_ranges
+from posefield.kriging.kriging_model import Hyper
+from posefield.kriging.support import half_ranges
 from posefield.model_file.model_card import PERFORMER
 from posefield.motion.contact_detection import FootContact
 from posefield_train.adapt import canonical_clips

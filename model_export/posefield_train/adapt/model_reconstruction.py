@@ -15,7 +15,7 @@ import numpy as np
 from posefield.common.errors import ModelError
 from posefield.common.units import Floats, Indices
 from posefield.inference import reduced_motion
-from posefield.kriging import kriging_model
+from posefield.kriging import kriging_model, support
 from posefield.kriging.kriging_model import Hyper
 from posefield.model_file import checked_file, onnx_file
 from posefield.model_file.model_card import ModelCard
@@ -131,7 +131,7 @@ def _bank(file: _ModelFile) -> KrigingBank:
     """Return the coefficient models over the samples in the order of the card."""
     card = file.card
     low, high = card.sampled_ranges
-    points = kriging_model.half_ranges(np.array(card.examples), low, high)
+    points = support.half_ranges(np.array(card.examples), low, high)
     points = np.hstack([points, card.clip_labels])
     order = _order(file, points)
     other_models = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}

@@ -11,7 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from posefield.common.units import Floats, Frames
 from posefield.kriging import support
-from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
+from posefield.kriging.kriging_model import Hyper, LabelKernel
+from posefield.kriging.support import half_ranges
 from posefield.model_file.model_card import (
     ACCELERATION_RATE,
     USUAL_PERCENTILE,

@@ -27,7 +27,8 @@ from posefield.common.units import (
     Values,
 )
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import Hyper, half_ranges
+from posefield.kriging.kriging_model import Hyper
+from posefield.kriging.support import half_ranges
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.onnx_graph import REGISTER, GraphBuilder

@@ -10,7 +10,8 @@ import numpy as np
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices, SampleControls, Samples, SampleValues
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
+from posefield.kriging.kriging_model import Hyper, LabelKernel
+from posefield.kriging.support import half_ranges
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import PERFORMER

@@ -99,12 +99,12 @@ class JointChain:
         turns = self.rotations @ quat.to_matrix(self.chart.quaternions(vectors))
         slopes = None
         if len(self.hinges):
-            places = list(self.hinges.joints)
-            bent = quat.mul(self.hinge_means, self.chart.quaternions(vectors[:, places]))
+            joints = list(self.hinges.joints)
+            bent = quat.mul(self.hinge_means, self.chart.quaternions(vectors[:, joints]))
             angles = self.hinges.turn_angles(bent)
             limited = self.hinges.limit(angles, centres[:, list(self.hinge_rows)])
             if limited.beyond.any():
-                turns[:, places] = quat.to_matrix(self.hinges.limited_turns(bent, limited))
+                turns[:, joints] = quat.to_matrix(self.hinges.limited_turns(bent, limited))
                 slopes = self.hinges.slopes(limited)
         if travel[:, 2].any():
             turns[:, 0] = quat.to_matrix(quat.from_axis_angle(UP, travel[:, 2])) @ turns[:, 0]
@@ -172,8 +172,8 @@ class MotionVariables:
                 self.reduced.directions[:, numbers],
                 CHARTS[self.reduced.chart],
                 (among := self.hinges.of_chain(links)),
-                self.reduced.rotations[[links[place] for place in among.joints]],
-                tuple(self.hinges.joints.index(links[place]) for place in among.joints),
+                self.reduced.rotations[[links[row] for row in among.joints]],
+                tuple(self.hinges.joints.index(links[row]) for row in among.joints),
             )
         return self._chains[joint]
 

@@ -8,9 +8,14 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Floats, Gradients, ReducedMotions, Values, Variables
-from posefield.constraints.constrained_motion import CYCLE_VARIABLES, MotionVariables
+from posefield.constraints.constrained_motion import (
+    CYCLE_VARIABLES,
+    ConstrainedMotion,
+    MotionVariables,
+)
+from posefield.model_file.model_card import ModelCard
 from posefield.motion import measures
-from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
+from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure, MeasuredMotion
 
 ValuesAndGradients = tuple[Values, Gradients]
 """Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
@@ -247,6 +252,24 @@ def from_controls(controls: Sequence[tuple[str, Measure, float]], frames: int) -
             )
         )
     return aims
+
+
+def measured(card: ModelCard, motion: ConstrainedMotion) -> dict[str, float]:
+    """Return the values of the card's measured controls on a motion."""
+    scene, values, moving = motion.scene, dict[str, float](), []
+    for control in card.controls:
+        if control.measure and control.measure.is_body_measure:
+            still = np.zeros((1, len(scene.parents), 3))
+            body = MeasuredMotion(still, 0.0, np.zeros(3), scene.parents, scene.bones)
+            values[control.name] = measures.evaluate(control.measure, body)
+        elif control.measure:
+            moving.append((control.name, control.measure, 0.0))
+    for aim in from_controls(moving, scene.reduced.frames):
+        numbers, _ = aim.evaluate_many([scene], motion.numbers[None])
+        values |= dict(zip(aim.names, map(float, numbers[0]), strict=True))
+    return {
+        control.name: values[control.name] for control in card.controls if control.name in values
+    }
 
 
 def _moment_frame(

@@ -28,8 +28,7 @@ from posefield.inference.reduced_motion import ReducedTensor, ResidualCovariance
 from posefield.inference.session import PredictionState, Session
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import hinges, measures
-from posefield.motion.measures import MeasuredMotion
+from posefield.motion import hinges
 from posefield.question.results import ConstraintResult
 
 MAX_STEPS, MAX_HALVINGS = 25, 6
@@ -90,26 +89,6 @@ class LevelCorrector:
         return float(
             reachability.assess(self.spread, [(motion, aims)], numbers, *looked).distance[0]
         )
-
-    def measured(self, motion: ConstrainedMotion) -> dict[str, float]:
-        """Return the values of the card's measured controls on a motion."""
-        scene = motion.scene
-        still = np.zeros((1, len(scene.parents), 3))
-        body = MeasuredMotion(still, 0.0, np.zeros(3), scene.parents, scene.bones)
-        values, moving = dict[str, float](), []
-        for control in self.card.controls:
-            if control.measure and control.measure.is_body_measure:
-                values[control.name] = measures.evaluate(control.measure, body)
-            elif control.measure:
-                moving.append((control.name, control.measure, 0.0))
-        for aim in constraint.from_controls(moving, self.reduced.frames):
-            numbers, _ = aim.evaluate(scene, motion.numbers)
-            values |= dict(zip(aim.names, map(float, numbers), strict=True))
-        return {
-            control.name: values[control.name]
-            for control in self.card.controls
-            if control.name in values
-        }
 
 
 def build_corrector(session: Session, level: int) -> LevelCorrector:

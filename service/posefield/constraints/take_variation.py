@@ -20,7 +20,7 @@ from posefield.constraints.constrained_motion import CYCLE_VARIABLES, Constraine
 from posefield.constraints.gauss_newton import LevelCorrector
 from posefield.inference import reduced_motion
 from posefield.inference.session import Session
-from posefield.kriging import kriging_model, random_field
+from posefield.kriging import random_field, support
 from posefield.kriging.random_field import ConditionalField, Seeds
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
@@ -151,7 +151,7 @@ class TakeVariation:
         them. labels (N, p) and seeds (N,): one of each path; zero for seeds of zero.
         """
         limited = np.asarray(self._session.bounds.limit(controls), np.float64)
-        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        points = support.half_ranges(limited, *self._session.card.sampled_ranges)
         names = np.broadcast_to(labels[:, None], (*points.shape[:2], labels.shape[1]))
         points = np.concatenate([points, names], axis=-1)
         values = np.zeros((*points.shape[:2], self._count))
@@ -181,7 +181,7 @@ class TakeVariation:
         finest level, and of a cycle's duration and travel. Zero for seeds (B,) of zero.
         """
         limited = np.asarray(self._session.bounds.limit(controls), np.float64)
-        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        points = support.half_ranges(limited, *self._session.card.sampled_ranges)
         rows = np.hstack([points, labels])
         values = np.zeros((len(rows), self._count))
         varied = np.flatnonzero(seeds).tolist()

@@ -11,7 +11,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import Floats
-from posefield.constraints import take_variation
+from posefield.constraints import constraint, take_variation
 from posefield.constraints.constrained_motion import (
     CYCLE_VARIABLES,
     ConstrainedMotion,
@@ -65,7 +65,7 @@ class ConstraintSet:
     take: TakeSettings | None = None
 
     def __bool__(self) -> bool:
-        return self.corrects or self.take is not None
+        return bool(self.controls or self.targets or self.take)
 
     @property
     def corrects(self) -> bool:
@@ -100,7 +100,8 @@ def from_question(
         replace(_joint_target(card, i, target), slack=slack)
         for i, target in enumerate(question.targets)
     )
-    _check_duplicates(question.targets, targets)
+    if targets:
+        _check_duplicates(question.targets, targets)
     targeted = {goal.moment for goal in targets if goal.time is None}
     has_names = question.exact not in ("auto", "none")
     controls = []
@@ -118,7 +119,9 @@ def from_question(
             continue
         goal = session.limit_control(control, validated.controls[control.name])
         controls.append((control.name, measure, goal))
-    return ConstraintSet(tuple(controls), targets, take_variation.settings(card, question))
+    varies = question.take or question.detail
+    take = take_variation.settings(card, question) if varies else None
+    return ConstraintSet(tuple(controls), targets, take)
 
 
 def _exact_controls(
@@ -126,10 +129,11 @@ def _exact_controls(
 ) -> Sequence[Control]:
     """Return the controls whose measured values the answer must match."""
     received = [c for c in card.controls if c.name not in validated.inferred]
+    movable = [c.name for c in card.controls if c.measure and not c.measure.is_body_measure]
     if question.exact == "none":
         return ()
     if question.exact == "auto":
-        return [control for control in received if _is_measured(control)]
+        return [control for control in received if control.name in movable]
     for name in question.exact:
         control = card.control(name)
         if control is None:
@@ -137,19 +141,15 @@ def _exact_controls(
             hint = did_you_mean(name, names)
             expected = f"expected controls of this model: {', '.join(names)}"
             raise InvalidField("exact", f"{name!r}{hint}, {expected}")
-        if not _is_measured(control):
-            movable = ", ".join(c.name for c in card.controls if _is_measured(c))
+        if name not in movable:
             raise InvalidField(
                 "exact",
-                f"{name!r} is not measured on a motion, expected some of: {movable or 'none'}",
+                f"{name!r} is not measured on a motion, "
+                f"expected some of: {', '.join(movable) or 'none'}",
             )
         if name in validated.inferred:
             raise InvalidField("exact", f"{name!r} was not given, expected a control that was")
     return [control for control in received if control.name in question.exact]
-
-
-def _is_measured(control: Control) -> bool:
-    return control.measure is not None and not control.measure.is_body_measure
 
 
 def _joint_target(card: ModelCard, index: int, target: Target) -> JointTarget:
@@ -235,7 +235,7 @@ def bring_back(
                     assert control is not None
                     numbers = _without_overshoot(motion.scene, numbers, aim, control)
     bounded = replace(motion, numbers=numbers)
-    measured = corrector.measured(bounded)
+    measured = constraint.measured(corrector.card, bounded)
     controls, targets = split_results(motion.results, len(goals.targets))
     results = [_result(met, requested, measured) for met in controls]
     return replace(bounded, results=(*results, *targets))

@@ -4,7 +4,7 @@ Motions with the same limbs are placed at once; each has the same bytes as if it
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -12,9 +12,10 @@ import numpy as np
 from posefield.common import cancellation, frame_groups
 from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import UP, Floats, Frames, RootPath, Rotations
-from posefield.feet import heel_roll, limbs, stance_rows, two_bone
-from posefield.feet.footsteps import FeetPlan, Floors, evaluate_by_kind
+from posefield.feet import ball_path, footsteps, limbs
+from posefield.feet.footsteps import FeetPlan, evaluate_by_kind
 from posefield.feet.limbs import Limb, LimbPoses, Turns
+from posefield.feet.stance_rows import NO_CYCLE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton
@@ -65,14 +66,18 @@ def place_grids(
     rotations: (N, J, 4), motion after motion; those of the limbs are written there. Returns the
     shifts of the roots (N, 3), m, and the paths of the feet (N, K, 3), m, predicted and placed.
     """
-    placing = _Placing.on_grids(plans)
+    poses = limbs.join([plan.poses for plan in plans])
+    assert poses.groups is not None
+    placing = _Placing.at(plans, poses, poses.groups, poses.groups.frame.astype(float))
     before, after = np.empty((2, len(placing.at_frames), len(plans[0].character.legs), 3))
     for foot, limb_end in enumerate(placing.limb_ends()):
         cancellation.check()
         if rotations is not None:
-            placing.turns(limb_end).apply(limb_end.limb, rotations)
+            placing.write_turns(limb_end, rotations)
         if foot < before.shape[1]:
-            before[:, foot], after[:, foot] = placing.foot_path(limb_end)
+            leg, end, _, arm, _ = limb_end
+            before[:, foot] = poses.position(leg.tip)
+            after[:, foot] = poses.position(leg.upper) + placing.shift + end + arm
     return placing.shift, before, after
 
 
@@ -86,7 +91,7 @@ def largest_drifts(
     drifts = []
     for plan, feet in zip(plans, paths, strict=True):
         offsets = [
-            feet[flat : stance.end, foot] - anchor
+            feet[flat : stance.stop, foot] - anchor
             for foot, steps in enumerate(plan.steps)
             for stance, anchor, flat in zip(
                 steps.stances, steps.anchors, steps.flats.tolist(), strict=True
@@ -112,15 +117,17 @@ def _place_alike(
     groups = frame_groups.of_lengths(times)
     rotations, roots = (np.concatenate(arrays) for arrays in poses_of_motions)
     bones = np.stack([plan.character.bones for plan in plans])
-    poses = limbs.evaluate_motions(body.parents, bones, body.limbs, rotations, roots, groups)
+    poses = limbs.evaluate_motions(
+        body.parents, bones, body.legs + body.kept, rotations, roots, groups
+    )
     at_frames = np.concatenate([at * plan.rate for plan, at in zip(plans, times, strict=True)])
-    placing = _Placing.at(plans, poses, at_frames)
+    placing = _Placing.at(plans, poses, groups, at_frames)
     above = {
         upper for joint in joints or () for upper in skeleton.joint_chain(body.parents, joint)[:-1]
     }
     for limb_end in placing.limb_ends():
-        if joints is None or limb_end.limb.upper in above:
-            placing.turns(limb_end).apply(limb_end.limb, rotations)
+        if joints is None or limb_end[0].upper in above:
+            placing.write_turns(limb_end, rotations)
     return list(zip(groups.split(rotations), groups.split(roots + placing.shift), strict=True))
 
 
@@ -130,142 +137,143 @@ def _paths_alike(plans: Sequence[FeetPlan]) -> list[tuple[FootPaths, FootPaths]]
     return list(zip(groups.split(before), groups.split(after), strict=True))
 
 
-@dataclass(frozen=True)
-class _LimbEnd:
-    """End of a limb that is placed in N frames.
+_LimbEnd = tuple[Limb, Points, Turns | None, Points, Annotated[Floats, "frames"] | None]
+"""A limb in N frames, and its placed end.
 
-    end: from the upper joint to it (N, 3), m. foot: turns of the foot (N, 4) against the poses;
-    None for none. arm: from the end to the joint that stands (N, 3), m, of a turned foot.
-    lowest_toe: least height of the end of the toes above that joint (N,), m; None without toes.
-    """
-
-    limb: Limb
-    end: Points
-    foot: Turns | None
-    arm: Points
-    lowest_toe: Annotated[Floats, "frames"] | None = None
+Vectors from its upper joint to the end (N, 3), m; turns of the foot (N, 4) against the poses, or
+None; the arm from the end to the joint that stands (N, 3), m, of a turned foot; and the least
+height of the end of the toes above that joint (N,), m, None without toes.
+"""
 
 
 @dataclass(frozen=True)
 class _Placing:
     """Poses of motions with the same limbs, and where their plans are evaluated.
 
-    poses: of the limbs, at N frames. at_frames: fractional frames (N,) of the grids of the plans.
-    grids: of the plans. ways, factors: (M,), of their cycles. shift: of the roots (N, 3), m.
+    poses: of the limbs, at N frames of the groups. at_frames: fractional frames (N,) of the grids
+    of the plans. planes, tilts: of the floors of the frames, as of `footsteps.floor_planes`. shift:
+    of the roots (N, 3), m.
     """
 
     plans: Sequence[FeetPlan]
     poses: LimbPoses
+    groups: FrameGroups
     at_frames: Frames
     grids: FrameRows
-    ways: Annotated[FloorVectors, "motions"]
-    factors: Annotated[FloorVectors, "motions"]
-    floors: Floors
+    planes: Annotated[Floats, "frames 3"]
+    tilts: Turns | None
     shift: Points
 
     @classmethod
-    def at(cls, plans: Sequence[FeetPlan], poses: LimbPoses, at_frames: Frames) -> "_Placing":
+    def at(
+        cls, plans: Sequence[FeetPlan], poses: LimbPoses, groups: FrameGroups, at_frames: Frames
+    ) -> "_Placing":
         """Return the placing at fractional frames (N,) of the grids."""
-        assert poses.groups is not None
         grids = FrameRows(
             frame_groups.of_lengths([plan.lowered for plan in plans]),
             np.array([plan.rate for plan in plans]),
             np.array([plan.cycle is not None for plan in plans]),
         )
-        ways, factors = stance_rows.cycle_motions([plan.cycle for plan in plans])
-        floors = Floors([plan.floor for plan in plans], poses.groups)
+        floors = footsteps.floor_planes([plan.floor for plan in plans], groups)
         lowered = np.concatenate([plan.lowered for plan in plans])
-        down = _interpolate(grids, lowered, poses.groups, at_frames)
-        shift = -down[:, None] * UP
-        return cls(plans, poses, at_frames, grids, ways, factors, floors, shift)
-
-    @classmethod
-    def on_grids(cls, plans: Sequence[FeetPlan]) -> "_Placing":
-        """Return the placing in all frames of the grids, whose poses the plans know."""
-        poses = limbs.join([plan.poses for plan in plans])
-        assert poses.groups is not None
-        return cls.at(plans, poses, poses.groups.frame.astype(float))
-
-    @property
-    def groups(self) -> FrameGroups:
-        """Return the groups of the poses."""
-        return self.floors.groups
+        down = _interpolate(grids, lowered, groups, at_frames)
+        return cls(plans, poses, groups, at_frames, grids, *floors, -down[:, None] * UP)
 
     def limb_ends(self) -> Iterator[_LimbEnd]:
-        """Yield the end of each limb, the legs first."""
-        body = self.plans[0].character
-        for foot, leg in enumerate(body.legs):
-            change = np.concatenate([plan.changes[foot] for plan in self.plans])
-            path = self.poses.position(leg.tip) + self._interpolated_change(change)
-            ball = self._anchored(foot, path)
-            leg_end = self._leg_end(leg, ball)
+        """Yield the end of each limb, the legs first.
+
+        A foot is tilted as the floor is, and lifts its heel where the leg would be stretched.
+        """
+        body, poses, groups, tilts = self.plans[0].character, self.poses, self.groups, self.tilts
+        ways, factors = np.array([plan.cycle or NO_CYCLE for plan in self.plans], complex).T
+        sloped = self.planes[:, 1:].any(axis=1)
+        for index, leg in enumerate(body.legs):
+            change = np.concatenate([plan.changes[index] for plan in self.plans])
+            turned = floor_plane.project(change)
+            over = _interpolate(self.grids, turned, groups, self.at_frames, factors)
+            up = _interpolate(self.grids, change @ UP, groups, self.at_frames)
+            path = poses.position(leg.tip) + floor_plane.at_height(over, up)
+            ball = self._anchored(index, path, ways, factors)
+            arm, foot = poses.position(leg.tip) - poses.position(leg.lower), tilts
+            if tilts is not None:
+                arm = footsteps.tilted(self.planes, tilts, arm)
+            offset = poses.position(leg.upper) + self.shift - ball
+            chord = limbs.leg_chord(poses, leg, np.linalg.norm(offset + arm, axis=-1))
+            if leg.tip != leg.lower:
+                foot = ball_path.heel_turns(offset, arm, chord)
+                arm = quat.rotate(foot, arm)
+                if tilts is not None:
+                    # A level motion has the same bytes beside a sloped one.
+                    foot[sloped] = quat.mul(foot[sloped], tilts[sloped])
+            end = -(offset + arm)
+            end *= (chord / np.maximum(np.linalg.norm(end, axis=-1), 1e-9))[:, None]
+            lowest = None
             if leg.toe is not None:
-                toes = np.array([plan.toe_heights[foot] for plan in self.plans])[self.groups.group]
-                lowest = toes + self.floors.heights(ball) - ball @ UP
-                leg_end = replace(leg_end, lowest_toe=lowest)
-            yield leg_end
+                toes = np.array([plan.toe_heights[index] for plan in self.plans])[groups.group]
+                lowest = toes + footsteps.floor_heights(self.planes, ball) - ball @ UP
+            yield leg, end, foot, arm, lowest
         for index, limb in enumerate(body.kept):
             # Where it is not led, the end moves with the root.
             share = np.concatenate([plan.led.limbs[index] for plan in self.plans])
-            led = _interpolate(self.grids, share, self.groups, self.at_frames)
+            led = _interpolate(self.grids, share, groups, self.at_frames)
             free = 1.0 - np.clip(led, 0.0, 1.0)
-            target = self.poses.position(limb.lower) + free[:, None] * self.shift
-            end = two_bone.reach(self.poses, limb, self.shift, target)
-            yield _LimbEnd(limb, end, None, np.zeros_like(end))
+            target = poses.position(limb.lower) + free[:, None] * self.shift
+            end = limbs.reach(poses, limb, self.shift, target)
+            yield limb, end, None, np.zeros_like(end), None
 
-    def _leg_end(self, leg: Limb, ball: Points) -> _LimbEnd:
-        """Return the end of a leg whose ball is placed (N, 3), m.
-
-        The foot is tilted as the floor is, and lifts its heel where the leg would be stretched.
-        """
-        poses, floors = self.poses, self.floors
-        arm = floors.tilted(poses.position(leg.tip) - poses.position(leg.lower))
-        foot = floors.tilts if floors.sloped.any() else None
-        offset = poses.position(leg.upper) + self.shift - ball
-        chord = two_bone.leg_chord(poses, leg, np.linalg.norm(offset + arm, axis=-1))
-        if leg.tip != leg.lower:
-            lift = heel_roll.heel_turns(offset, arm, chord)
-            arm = quat.rotate(lift, arm)
-            # A level motion has the same bytes beside a sloped one.
-            foot, sloped = lift, floors.sloped
-            foot[sloped] = quat.mul(lift[sloped], floors.tilts[sloped])
-        end = -(offset + arm)
-        end *= (chord / np.maximum(np.linalg.norm(end, axis=-1), 1e-9))[:, None]
-        return _LimbEnd(leg, end, foot, arm)
-
-    def turns(self, limb_end: _LimbEnd) -> two_bone.LimbTurns:
-        """Return the rotations (N, 4) of a limb's joints."""
-        limb, foot = limb_end.limb, limb_end.foot
-        turns = two_bone.solve(self.poses, limb, limb_end.end)
+    def write_turns(
+        self, limb_end: _LimbEnd, rotations: Annotated[np.ndarray, "frames joints 4"]
+    ) -> None:
+        """Write the rotations of a limb's joints, and of bent toes, into poses (N, J, 4)."""
+        limb, end, foot, _, lowest_toe = limb_end
+        upper, middle, lower = limbs.solve(self.poses, limb, end)
         if foot is not None:
             orientations = self.poses.orientation(limb.lower)
             local = quat.mul(quat.conj(orientations), quat.mul(foot, orientations))
-            changed = self.floors.sloped | (limb.tip != limb.lower)
-            turns.lower[changed] = quat.mul(turns.lower, local)[changed]
-            if limb.toe is not None and limb_end.lowest_toe is not None:
+            changed = self.planes[:, 1:].any(axis=1) | (limb.tip != limb.lower)
+            lower[changed] = quat.mul(lower, local)[changed]
+            if limb.toe is not None and lowest_toe is not None:
                 tip = quat.mul(foot, self.poses.orientation(limb.tip))
-                toe = quat.rotate(tip, np.broadcast_to(limb.toe, limb_end.end.shape))
-                bent = quat.mul(heel_roll.toe_bends(toe, limb_end.lowest_toe), tip)
+                toe = quat.rotate(tip, np.broadcast_to(limb.toe, end.shape))
+                bent = quat.mul(ball_path.toe_bends(toe, lowest_toe), tip)
                 ankle = quat.mul(foot, orientations)
-                turns = replace(turns, tip=quat.mul(quat.conj(ankle), bent))
-        return turns
+                rotations[:, limb.tip] = quat.mul(quat.conj(ankle), bent)
+        rotations[:, limb.upper], rotations[:, limb.middle] = upper, middle
+        rotations[:, limb.lower] = lower
 
-    def foot_path(self, leg_end: _LimbEnd) -> tuple[Points, Points]:
-        """Return the paths (N, 3), m, of the joint that stands, predicted and placed."""
-        leg = leg_end.limb
-        placed = self.poses.position(leg.upper) + self.shift + leg_end.end + leg_end.arm
-        return self.poses.position(leg.tip), placed
+    def _anchored(
+        self,
+        foot: int,
+        path: Points,
+        ways: Annotated[FloorVectors, "motions"],
+        factors: Annotated[FloorVectors, "motions"],
+    ) -> Points:
+        """Return the paths (N, 3), m, over the floor exactly at their anchors on flat feet.
 
-    def _interpolated_change(self, change: Annotated[Floats, "grid 3"]) -> Points:
-        """Return the changes (N, 3), m, of paths with changes on the grids."""
-        turned = floor_plane.project(change)
-        over = _interpolate(self.grids, turned, self.groups, self.at_frames, self.factors)
-        up = _interpolate(self.grids, change @ UP, self.groups, self.at_frames)
-        return floor_plane.at_height(over, up)
-
-    def _anchored(self, foot: int, path: Points) -> Points:
-        """Return the paths (N, 3), m, over the floor exactly at their anchors on flat feet."""
-        motions, first, last, anchors = self._stances(foot)
+        ways, factors: (M,), of the cycles of motions, whose stances are there a cycle earlier and
+        later, too, each copy after its original.
+        """
+        intervals = [
+            (motion, flat, stance.stop - 1)
+            for motion, plan in enumerate(self.plans)
+            for stance, flat in zip(
+                plan.steps[foot].stances, plan.steps[foot].flats.tolist(), strict=True
+            )
+        ]
+        motions, first, last = np.array(intervals, np.int64).reshape(-1, 3).T
+        anchors = np.concatenate([plan.steps[foot].anchors for plan in self.plans])
+        cyclic, counts = self.grids.cyclic[motions], self.grids.groups.counts[motions]
+        floor, heights = floor_plane.project(anchors), anchors @ UP
+        displacement, factor = ways[motions], factors[motions]
+        earlier = floor_plane.at_height(np.conj(factor) * (floor - displacement), heights)
+        later = floor_plane.at_height(displacement + factor * floor, heights)
+        over, from_start = cyclic & (last >= counts), cyclic & (first == 0)
+        motions = np.concatenate([motions, motions[over], motions[from_start]])
+        anchors = np.concatenate([anchors, earlier[over], later[from_start]])
+        first, last = (
+            np.concatenate([first, (first - counts)[over], counts[from_start]]),
+            np.concatenate([last, (last - counts)[over], (last + counts)[from_start]]),
+        )
         anchored, groups = path.copy(), self.groups
         # Memory and time grow with the frames and the stances, not with their product.
         for motion, at in enumerate(groups.split(self.at_frames)):
@@ -278,33 +286,6 @@ class _Placing:
             rows = groups.starts[motion] + order[begin[standing.group] + standing.frame]
             anchored[rows, ::2] = anchors[stances[standing.group], ::2]
         return anchored
-
-    def _stances(self, foot: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, Points]:
-        """Return the stances of a foot in all motions: motion, first and last frame, and anchor.
-
-        Those of cycles are there a cycle earlier and later, too, each copy after its original.
-        """
-        intervals = [
-            (motion, flat, stance.end - 1)
-            for motion, plan in enumerate(self.plans)
-            for stance, flat in zip(
-                plan.steps[foot].stances, plan.steps[foot].flats.tolist(), strict=True
-            )
-        ]
-        motions, first, last = np.array(intervals, np.int64).reshape(-1, 3).T
-        anchors = np.concatenate([plan.steps[foot].anchors for plan in self.plans])
-        cyclic, counts = self.grids.cyclic[motions], self.grids.counts[motions]
-        floor, heights = floor_plane.project(anchors), anchors @ UP
-        ways, factors = self.ways[motions], self.factors[motions]
-        earlier = floor_plane.at_height(np.conj(factors) * (floor - ways), heights)
-        later = floor_plane.at_height(ways + factors * floor, heights)
-        over, from_start = cyclic & (last >= counts), cyclic & (first == 0)
-        return (
-            np.concatenate([motions, motions[over], motions[from_start]]),
-            np.concatenate([first, (first - counts)[over], counts[from_start]]),
-            np.concatenate([last, (last - counts)[over], (last + counts)[from_start]]),
-            np.concatenate([anchors, earlier[over], later[from_start]]),
-        )
 
 
 def _interpolate(

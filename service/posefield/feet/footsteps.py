@@ -23,9 +23,9 @@ from posefield.common.units import (
     RootPath,
     Rotations,
 )
-from posefield.feet import limbs, two_bone
-from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle, Interval
+from posefield.feet import limbs
+from posefield.feet.limbs import Limb, LimbPoses, Points, Turns, Values
+from posefield.feet.stance_rows import LIFTED, UNEVEN, Cycle
 from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.hinges import Hinge
@@ -53,36 +53,29 @@ def evaluate_by_kind(
     return [results[index] for index in range(len(values))]
 
 
-@dataclass(frozen=True)
-class Floors:
-    """Floors of several motions, whose frames (N,) lie one after another."""
+def floor_planes(
+    floors: Sequence[Floor], groups: FrameGroups
+) -> tuple[Annotated[Floats, "frames 3"], Turns | None]:
+    """Return the floors of the frames of motions: heights and slopes (N, 3), and tilts (N, 4).
 
-    floors: Sequence[Floor]
-    groups: FrameGroups
+    Tilts are rotations from the vertical to the floor's normal; None if all floors are level.
+    """
+    planes = np.array([[floor.height, floor.slope_x, floor.slope_z] for floor in floors])
+    sloped = bool(planes[:, 1:].any())
+    tilts = np.array([floor.tilt for floor in floors])[groups.group] if sloped else None
+    return planes[groups.group], tilts
 
-    @property
-    def sloped(self) -> Annotated[Booleans, "frames"]:
-        """Return whether the floor of each frame (N,) has a slope."""
-        return np.array([not floor.is_level for floor in self.floors])[self.groups.group]
 
-    @property
-    def tilts(self) -> Annotated[Floats, "frames 4"]:
-        """Return the rotation from the vertical to the floor's normal at each frame (N, 4)."""
-        return np.array([floor.tilt for floor in self.floors])[self.groups.group]
+def floor_heights(planes: Annotated[Floats, "frames 3"], points: Points) -> Values:
+    """Return the heights (N,), m, of floors below or above points (N, 3), m."""
+    heights: Values = planes[:, 0] + planes[:, 1] * points[:, 0] + planes[:, 2] * points[:, 2]
+    return heights
 
-    def heights(self, points: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames"]:
-        """Return the heights (N,), m, of the floors below or above points (N, 3), m."""
-        if all(floor == LEVEL_FLOOR for floor in self.floors):
-            return np.zeros(len(points))
-        groups = zip(self.floors, self.groups.split(points), strict=True)
-        return np.concatenate([floor.heights(positions) for floor, positions in groups])
 
-    def tilted(self, vectors: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames 3"]:
-        """Return vectors (N, 3) turned as the floors are tilted; level floors turn none."""
-        if all(floor.is_level for floor in self.floors):
-            return vectors
-        turned = quat.rotate(self.tilts, vectors)
-        return np.where(self.sloped[:, None], turned, vectors)
+def tilted(planes: Annotated[Floats, "frames 3"], tilts: Turns, vectors: Points) -> Points:
+    """Return vectors (N, 3) turned as the floors are tilted; level floors turn none."""
+    sloped = (planes[:, 1:] != 0.0).any(axis=1)
+    return np.where(np.asarray(sloped)[:, None], quat.rotate(tilts, vectors), vectors)
 
 
 @dataclass(frozen=True)
@@ -98,16 +91,16 @@ class Led:
     limbs: Annotated[Floats, "limbs frames"]
     root: Annotated[Booleans, "frames"]
 
-    def room(self, poses: LimbPoses, limbs: Sequence[Limb]) -> tuple[Frames, Frames]:
+    def room(self, poses: LimbPoses, chains: Sequence[Limb]) -> tuple[Frames, Frames]:
         """Return how far the pelvis may be raised, and lowered (F,), m, for what is led.
 
-        limbs: the legs, then the kept limbs. Infinite where nothing is led.
+        chains: the legs, then the kept limbs. Infinite where nothing is led.
         """
         exact = np.concatenate([self.feet, self.limbs == 1.0])
         up, down = (np.where(self.root, 0.0, np.inf) for _ in range(2))
-        for limb, frames in zip(limbs, exact, strict=True):
+        for limb, frames in zip(chains, exact, strict=True):
             if frames.any():
-                higher, lower = two_bone.room(poses, limb)
+                higher, lower = limbs.room(poses, limb)
                 up = np.minimum(up, np.where(frames, higher, np.inf))
                 down = np.minimum(down, np.where(frames, lower, np.inf))
         return up, down
@@ -184,11 +177,6 @@ class Character:
     raised: bool = False
     hinges: tuple[Hinge, ...] = ()
 
-    @property
-    def limbs(self) -> tuple[Limb, ...]:
-        """Return the legs, and the limbs that are kept."""
-        return self.legs + self.kept
-
 
 @dataclass(frozen=True)
 class Footsteps:
@@ -199,7 +187,7 @@ class Footsteps:
     ball there; the stance's end where it is not.
     """
 
-    stances: tuple[Interval, ...]
+    stances: tuple[range, ...]
     anchors: Annotated[Floats, "stances 3"]
     flats: Annotated[Indices, "stances"]
 
@@ -257,30 +245,6 @@ class PlanRequest:
     floor: Floor = LEVEL_FLOOR
     led: Led | None = None
 
-    @property
-    def leads(self) -> Led:
-        """Return what keeps its predicted path."""
-        body = self.character
-        return self.led or always(len(body.legs), len(body.kept), len(self.roots))
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Return what motions that are planned at once have in common."""
-        body = self.character
-        return body.parents, body.legs, body.kept, self.likely is None
-
-
-@dataclass(frozen=True)
-class LimbChoice:
-    """Limbs of a character. feet: places of the planted feet among the feet that were given.
-
-    left: the other feet, each with the reason for which it is as predicted.
-    """
-
-    character: Character
-    feet: tuple[int, ...]
-    left: tuple[tuple[int, str], ...]
-
 
 def choose_limbs(
     parents: tuple[int, ...],
@@ -289,8 +253,11 @@ def choose_limbs(
     exact_joints: Iterable[int],
     hinges: Sequence[Hinge] = (),
     tips: Mapping[int, tuple[float, float, float]] = NO_TIPS,
-) -> LimbChoice:
-    """Return the legs of feet, and the limbs that keep the paths of joints with constraints.
+) -> tuple[Character, tuple[int, ...], tuple[tuple[int, str], ...]]:
+    """Return the limbs of a character: the legs of feet, and those that keep the paths of joints.
+
+    Then the indices of the planted feet among the given ones, and the other feet, each with the
+    reason for which it is as predicted.
 
     exact_joints: joints whose positions are exact. A leg with such a joint keeps its path; a joint
     of the trunk keeps the root at its height. hinges: of the skeleton, as far as known. tips: end
@@ -327,7 +294,7 @@ def choose_limbs(
         fixed,
         hinges=tuple(hinges),
     )
-    return LimbChoice(character, tuple(legs), tuple(left))
+    return character, tuple(legs), tuple(left)
 
 
 def _arms(

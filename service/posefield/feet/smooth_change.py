@@ -14,13 +14,12 @@ unknowns are one block, of which every second one is eliminated at a time. All e
 round, of all systems, are a few products of arrays.
 """
 
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.frame_groups import FrameGroups
+from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import Booleans, Floats, Indices
 from posefield.feet.stance_rows import FootRows, Runs, places
 
@@ -59,15 +58,10 @@ def solve(
     for offset in (1, 2):
         reduced[offset][fixed] = 0.0
         reduced[offset, : max(len(fixed) - offset, 0)][fixed[offset:]] = 0.0
-    return np.where(fixed, fixed_values, _solve_free(reduced, right))
-
-
-def _solve_free(bands: Bands, right: Sides) -> Sides:
-    """Return the solutions (C, U, R) for right sides (C, U, R)."""
-    columns, count, systems = right.shape
+    _, count, systems = right.shape
     odd = count % 2
     # One more unknown makes whole blocks; it is zero.
-    wide = np.pad(bands, ((0, 0), (0, odd), (0, 0)))
+    wide = np.pad(reduced, ((0, 0), (0, odd), (0, 0)))
     wide[0, count:] = 1.0
     diagonal, above = np.zeros((2, 2, 2, (count + odd) // 2, systems))
     diagonal[0, 0], diagonal[1, 1] = wide[0, ::2], wide[0, 1::2]
@@ -75,10 +69,9 @@ def _solve_free(bands: Bands, right: Sides) -> Sides:
     above[0, 0], above[1, 1], above[1, 0] = wide[2, ::2], wide[2, 1::2], wide[1, 1::2]
     sides = np.pad(right, ((0, 0), (0, odd), (0, 0)))
     blocks = np.stack([sides[:, ::2], sides[:, 1::2]])
-    solved = _reduce(diagonal, above, blocks)
     solution = np.empty(sides.shape)
-    solution[:, ::2], solution[:, 1::2] = solved
-    return solution[:, :count].reshape(columns, count, systems)
+    solution[:, ::2], solution[:, 1::2] = _reduce(diagonal, above, blocks)
+    return np.where(fixed, fixed_values, solution[:, :count])
 
 
 def _reduce(
@@ -93,16 +86,16 @@ def _reduce(
     inverses = _inverses(diagonal[:, :, 1::2])
     inner, outer = (count - 1) // 2, count // 2
     before, after = above[:, :, : count - 1 : 2], above[:, :, 1 : count - 1 : 2]
-    down, up = _times(before, inverses), _times(_turned(after), inverses[:, :, :inner])
+    down, up = _times(before, inverses), _times(after.swapaxes(0, 1), inverses[:, :, :inner])
     even_blocks, rest = diagonal[:, :, ::2].copy(), sides[:, :, ::2].copy()
     odd = sides[:, :, 1::2]
-    even_blocks[:, :, :outer] -= _times(down, _turned(before))
+    even_blocks[:, :, :outer] -= _times(down, before.swapaxes(0, 1))
     even_blocks[:, :, 1 : inner + 1] -= _times(up, after)
     rest[:, :, :outer] -= _times(down, odd)
     rest[:, :, 1 : inner + 1] -= _times(up, odd[:, :, :inner])
     solution = np.empty_like(sides)
     solution[:, :, ::2] = even = _reduce(even_blocks, -_times(down[:, :, :inner], after), rest)
-    left = odd - _times(_turned(before), even[:, :, :outer])
+    left = odd - _times(before.swapaxes(0, 1), even[:, :, :outer])
     left[:, :, :inner] -= _times(after, even[:, :, 1 : inner + 1])
     solution[:, :, 1::2] = _times(inverses, left)
     return solution
@@ -113,11 +106,6 @@ def _times(
 ) -> Annotated[Floats, "2 columns blocks systems"]:
     """Return the products of blocks and blocks, or of blocks and right sides."""
     return a[:, 0, None] * b[None, 0] + a[:, 1, None] * b[None, 1]
-
-
-def _turned(blocks: Blocks) -> Blocks:
-    """Return the transposed blocks."""
-    return blocks.swapaxes(0, 1)
 
 
 def _inverses(blocks: Blocks) -> Blocks:
@@ -135,44 +123,6 @@ SPREAD = 0.1
 Numbers = npt.NDArray[Any]
 Paths = Annotated[Numbers, "frames"]
 BENDS = (1.0, -2.0, 1.0)
-
-
-@dataclass(frozen=True)
-class _Chains:
-    """Chains of frames of paths, of which frames of one stance share an unknown.
-
-    groups: of the chains' frames (N,). firsts: frame in which each chain begins (R,). unknowns:
-    unknown of each frame (N,). counts: numbers of unknowns (R,). closed: whether the last unknown
-    is the first one a cycle later (R,).
-    """
-
-    groups: FrameGroups
-    firsts: Annotated[Indices, "chains"]
-    unknowns: Annotated[Indices, "chain_frames"]
-    counts: Annotated[Indices, "chains"]
-    closed: Annotated[Booleans, "chains"]
-
-    @property
-    def frames(self) -> Annotated[Indices, "chain_frames"]:
-        """Return the frames (N,) of the paths."""
-        frames: Indices = self.firsts[self.groups.group] + self.groups.frame
-        return frames
-
-    @property
-    def ends(self) -> tuple[Indices, Indices]:
-        """Return the last unknown of each chain (R,), and the chains (R,), as an index."""
-        return self.counts - 1, np.arange(len(self.counts))
-
-    def sums(self, values: Annotated[Floats, "columns chain_frames"]) -> Sides:
-        """Return the sums (C, U, R) over the frames of each unknown."""
-        size, chains = int(self.counts.max()), len(self.counts)
-        bins = self.unknowns * chains + self.groups.group
-        sums = [np.bincount(bins, column, size * chains) for column in values]
-        return np.stack(sums).reshape(-1, size, chains).astype(np.float64)
-
-    def spread(self, solution: Sides) -> Annotated[Floats, "columns chain_frames"]:
-        """Return the values (C, N) of unknowns (C, U, R) at their frames."""
-        return solution[:, self.unknowns, self.groups.group]
 
 
 def smooth_change(
@@ -205,22 +155,66 @@ def smooth_change(
             feet.select(rows), path[frames], some, values, fixed_frames
         )
         return smoothed
-    chains = _chains(feet, stances)
-    system = _System.of(feet, chains, path, level=not np.iscomplexobj(path))
-    fixed_unknowns, fixed_values = _known(chains, system.goal.shape, stances, values)
+    groups, firsts, unknowns, counts = _chains(feet.rows, stances)
+    owner, closed, size, chains = groups.group, feet.rows.cyclic, int(counts.max()), len(counts)
+    frames, level = firsts[owner] + groups.frame, not np.iscomplexobj(path)
+    # Heights do not change in a cycle.
+    target = path[feet.rows.flat(owner, frames)] if level else places(feet, path, owner, frames)
+    within = groups.frame < feet.rows.counts[owner]
+    weights, stiffness = within.astype(float), (SPREAD * feet.rows.rates) ** 4
+    right = [_right(groups, weights, stiffness, numbers) for numbers in _parts(target)]
+    bins = unknowns * chains + owner
+    sums = [np.bincount(bins, column, size * chains) for column in (weights, *right)]
+    diagonal, *sides = np.stack(sums).reshape(-1, size, chains).astype(np.float64)
+    goal, ended = np.stack(sides), np.arange(size)[:, None] >= counts
+    bands = _bands(groups, unknowns, diagonal, stiffness)
+    bands[0][ended] = 1.0
+    fixed_unknowns, fixed_values = ended.copy(), np.zeros(goal.shape)
+    last, chain = counts[closed] - 1, np.flatnonzero(closed)
+    if values is not None:
+        row = stances.rows
+        begins = groups.starts[row] + (stances.begins - firsts[row]) % feet.rows.counts[row]
+        fixed_unknowns[unknowns[begins], row] = fixed_unknowns[last, chain] = True
+        for column, numbers in zip(fixed_values, _parts(values), strict=True):
+            column[unknowns[begins], row] = numbers
+            column[last, chain] = column[0, chain]
     if fixed is not None:
         # No path with fixed frames is a cycle.
-        single = chains.unknowns[through], chains.groups.group[through]
+        single = unknowns[through], owner[through]
         fixed_unknowns[single] = True
         for column, numbers in zip(fixed_values, _parts(fixed[through]), strict=True):
             column[single] = numbers
-    return system.path(fixed_unknowns, fixed_values, values is None and bool(chains.closed.any()))
+    if values is None and len(chain):
+        solution = _joined(feet, (last, chain), bands, goal, fixed_unknowns, fixed_values)
+    else:
+        solution = solve(bands, goal, fixed_unknowns, fixed_values)
+    # The frames of the paths, each within one cycle.
+    components = solution[:, unknowns, owner][:, within]
+    row, frames = owner[within], frames[within]
+    change = components[0] if level else components[0] + 1j * components[1]
+    if not level:
+        back = np.conj(feet.factors[row]) * (change - feet.ways[row])
+        change = np.where(frames >= feet.rows.counts[row], back, change)
+    paths = np.empty(len(row), change.dtype)
+    paths[feet.rows.flat(row, frames)] = change
+    return paths
 
 
-def _chains(feet: FootRows, stances: Runs) -> _Chains:
-    """Return the chains of paths, each of which has a stance, or a fixed frame."""
-    rows, count = feet.rows, len(feet.rows.counts)
-    firsts = np.zeros(count, np.int64)
+def _chains(
+    rows: FrameRows, stances: Runs
+) -> tuple[
+    FrameGroups,
+    Annotated[Indices, "chains"],
+    Annotated[Indices, "chain_frames"],
+    Annotated[Indices, "chains"],
+]:
+    """Return chains of frames of paths, of which frames of one stance share an unknown.
+
+    Each has a stance, or a fixed frame. Returns the groups of their frames (N,), the frame in which
+    each begins (R,), the unknown of each frame (N,), and the numbers of unknowns (R,). The last
+    unknown of a cycle is the first one a cycle later.
+    """
+    firsts = np.zeros(len(rows.counts), np.int64)
     # The first stance of each row comes last in this assignment.
     firsts[stances.rows[::-1]] = stances.begins[::-1]
     firsts = np.where(rows.cyclic, firsts, 0)
@@ -233,119 +227,45 @@ def _chains(feet: FootRows, stances: Runs) -> _Chains:
     fresh[(groups.starts + groups.counts - 1)[rows.cyclic]] = False
     unknowns = np.cumsum(fresh) - 1
     unknowns -= unknowns[groups.starts][groups.group]
-    counts = unknowns[groups.starts + groups.counts - 1] + 1
-    return _Chains(groups, firsts, unknowns, counts, rows.cyclic)
+    return groups, firsts, unknowns, unknowns[groups.starts + groups.counts - 1] + 1
 
 
-def _known(
-    chains: _Chains,
-    shape: tuple[int, ...],
-    stances: Runs,
-    values: Annotated[Numbers, "runs"] | None,
-) -> tuple[Annotated[Booleans, "size chains"], Sides]:
-    """Return which unknowns are known, and their values (C, U, R)."""
-    fixed_values = np.zeros(shape)
-    fixed_unknowns = np.zeros(shape[1:], bool)
-    fixed_unknowns[np.arange(shape[1])[:, None] >= chains.counts] = True
-    if values is not None:
-        row = stances.rows
-        begins = chains.groups.starts[row] + (stances.begins - chains.firsts[row]) % (
-            chains.groups.counts[row] - 2 * chains.closed[row]
-        )
-        fixed_unknowns[chains.unknowns[begins], row] = True
-        last, chain = (end[chains.closed] for end in chains.ends)
-        fixed_unknowns[last, chain] = True
-        for column, numbers in zip(fixed_values, _parts(values), strict=True):
-            column[chains.unknowns[begins], row] = numbers
-            column[last, chain] = column[0, chain]
-    return fixed_unknowns, fixed_values
+def _joined(
+    feet: FootRows,
+    last_unknowns: tuple[Indices, Indices],
+    bands: Bands,
+    goal: Sides,
+    fixed_unknowns: Annotated[Booleans, "size chains"],
+    fixed_values: Sides,
+) -> Sides:
+    """Return the solutions (2, U, R), of cycles with the first place that fits both ends.
 
-
-@dataclass(frozen=True)
-class _System:
-    """Systems of the unknowns of paths.
-
-    bands: (3, U, R). goal: (C, U, R): the columns are real and imaginary parts.
+    last_unknowns: of the cycles, and their chains. goal: (2, U, R): real and imaginary parts.
     """
-
-    feet: FootRows
-    chains: _Chains
-    bands: Bands
-    goal: Sides
-
-    @classmethod
-    def of(cls, feet: FootRows, chains: _Chains, path: Paths, level: bool) -> "_System":
-        """Return the systems of paths (N,); level: heights, which do not change in a cycle."""
-        groups, rows = chains.groups, chains.groups.group
-        if level:
-            target = path[feet.rows.flat(rows, chains.frames)]
-        else:
-            target = places(feet, path, rows, chains.frames)
-        weights = (groups.frame < feet.rows.counts[rows]).astype(float)
-        stiffness = (SPREAD * feet.rows.rates) ** 4
-        right = np.stack(
-            [_right(groups, weights, stiffness, component) for component in _parts(target)]
-        )
-        return cls(feet, chains, _bands(chains, weights, stiffness), chains.sums(right))
-
-    def path(
-        self, fixed_unknowns: Annotated[Booleans, "size chains"], fixed_values: Sides, joined: bool
-    ) -> Paths:
-        """Return the paths (N,). joined: the places of first stances of cycles are unknown."""
-        if joined:
-            solution = self._joined(fixed_unknowns, fixed_values)
-        else:
-            solution = solve(self.bands, self.goal, fixed_unknowns, fixed_values)
-        components = self.chains.spread(solution)
-        path = components[0] + 1j * components[1] if len(components) > 1 else components[0]
-        return self._in_cycle(path)
-
-    def _joined(
-        self, fixed_unknowns: Annotated[Booleans, "size chains"], fixed_values: Sides
-    ) -> Sides:
-        """Return the solutions (2, U, R), of cycles with the first place that fits both ends."""
-        chains, feet = self.chains, self.feet
-        last, chain = (end_index[chains.closed] for end_index in chains.ends)
-        fixed_unknowns = fixed_unknowns.copy()
-        fixed_unknowns[0, chain] = fixed_unknowns[last, chain] = True
-        end_values = np.zeros((4, *fixed_unknowns.shape))
-        end_values[:2] = fixed_values
-        end_values[0, last, chain], end_values[1, last, chain] = (
-            feet.ways[chain].real,
-            feet.ways[chain].imag,
-        )
-        end_values[2, 0, chain], end_values[3, last, chain] = 1.0, 1.0
-        goal = np.concatenate([self.goal, np.zeros(self.goal.shape)])
-        solution = solve(self.bands, goal, fixed_unknowns, end_values)
-        left = product(self.bands, solution) - goal
-        factor = feet.factors[chain]
-        first = left[:, 0, chain] + 0j, left[:, last, chain] + 0j
-        begin, end = (
-            (end_index[0] + 1j * end_index[1], end_index[2], end_index[3]) for end_index in first
-        )
-        plain = begin[0] + np.conj(factor) * end[0]
-        bent = begin[1] + factor * begin[2] + np.conj(factor) * (end[1] + factor * end[2])
-        shared = np.zeros(fixed_unknowns.shape[1], complex)
-        shared[chain] = -plain / bent
-        turned = shared * feet.factors
-        solution[0] += shared.real * solution[2] + turned.real * solution[3]
-        solution[1] += shared.imag * solution[2] + turned.imag * solution[3]
-        return solution[:2]
-
-    def _in_cycle(self, path: Annotated[Numbers, "chain_frames"]) -> Paths:
-        """Return the paths of chains in the frames of the paths, within one cycle."""
-        chains, feet = self.chains, self.feet
-        rows = chains.groups.group
-        within = chains.groups.frame < feet.rows.counts[rows]
-        row, frames = rows[within], chains.frames[within]
-        paths = np.empty(len(row), path.dtype)
-        values = path[within]
-        if np.iscomplexobj(values):
-            after = frames >= feet.rows.counts[row]
-            back = np.conj(feet.factors[row]) * (values - feet.ways[row])
-            values = np.where(after, back, values)
-        paths[feet.rows.flat(row, frames)] = values
-        return paths
+    last, chain = last_unknowns
+    fixed_unknowns = fixed_unknowns.copy()
+    fixed_unknowns[0, chain] = fixed_unknowns[last, chain] = True
+    end_values = np.zeros((4, *fixed_unknowns.shape))
+    end_values[:2] = fixed_values
+    end_values[0, last, chain] = feet.ways[chain].real
+    end_values[1, last, chain] = feet.ways[chain].imag
+    end_values[2, 0, chain], end_values[3, last, chain] = 1.0, 1.0
+    goal = np.concatenate([goal, np.zeros(goal.shape)])
+    solution = solve(bands, goal, fixed_unknowns, end_values)
+    left = product(bands, solution) - goal
+    factor = feet.factors[chain]
+    first = left[:, 0, chain] + 0j, left[:, last, chain] + 0j
+    begin, end = (
+        (end_index[0] + 1j * end_index[1], end_index[2], end_index[3]) for end_index in first
+    )
+    plain = begin[0] + np.conj(factor) * end[0]
+    bent = begin[1] + factor * begin[2] + np.conj(factor) * (end[1] + factor * end[2])
+    shared = np.zeros(fixed_unknowns.shape[1], complex)
+    shared[chain] = -plain / bent
+    turned = shared * feet.factors
+    solution[0] += shared.real * solution[2] + turned.real * solution[3]
+    solution[1] += shared.imag * solution[2] + turned.imag * solution[3]
+    return solution[:2]
 
 
 def _parts(values: Numbers) -> list[Floats]:
@@ -372,23 +292,22 @@ def _right(
 
 
 def _bands(
-    chains: _Chains,
-    weights: Annotated[Floats, "chain_frames"],
+    groups: FrameGroups,
+    unknowns: Annotated[Indices, "chain_frames"],
+    diagonal: Annotated[Floats, "size chains"],
     stiffness: Annotated[Floats, "chains"],
 ) -> Bands:
-    """Return the diagonals (3, U, R) of the matrices.
+    """Return the diagonals (3, U, R) of the matrices; diagonal: sums (U, R) of the weights.
 
     Unknowns are in the order of their frames, so a second difference couples neighbours alone.
     """
-    size, count = int(chains.counts.max()), len(chains.counts)
+    size, count = diagonal.shape
     bands = np.zeros((3, size, count))
-    bands[0] = chains.sums(weights[None])[0]
-    inner = (chains.groups.frame > 0) & (
-        chains.groups.frame < chains.groups.counts[chains.groups.group] - 1
-    )
+    bands[0] = diagonal
+    inner = (groups.frame > 0) & (groups.frame < groups.counts[groups.group] - 1)
     middle = np.flatnonzero(inner)
-    chain = chains.groups.group[middle]
-    columns = [chains.unknowns[middle + offset] for offset in (-1, 0, 1)]
+    chain = groups.group[middle]
+    columns = [unknowns[middle + offset] for offset in (-1, 0, 1)]
     for row in range(3):
         for column in range(row, 3):
             distance = columns[column] - columns[row]
@@ -397,5 +316,4 @@ def _bands(
             value = stiffness[chain] * share * (BENDS[row] * BENDS[column])
             bins = (distance * size + columns[row]) * count + chain
             bands += np.bincount(bins, value, 3 * size * count).reshape(3, size, count)
-    bands[0][np.arange(size)[:, None] >= chains.counts] = 1.0
     return bands

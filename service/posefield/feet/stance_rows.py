@@ -7,7 +7,7 @@ beyond the last. Stances of a row depend on no other row.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -36,40 +36,17 @@ PerRow = Annotated[Floats, "rows"]
 PerRun = Annotated[Indices, "runs"]
 
 
-@dataclass(frozen=True)
-class Cycle:
+class Cycle(NamedTuple):
     """Floor motion from the start of a cycle to its end.
 
-    way: displacement, m. turn: change of heading, rad.
+    way: displacement, m. factor: unit vector of the change of heading.
     """
 
     way: complex
-    turn: float
-
-    @property
-    def factor(self) -> complex:
-        """Return the unit vector of the turn."""
-        return complex(np.exp(1j * self.turn))
+    factor: complex
 
 
-def cycle_motions(
-    cycles: Sequence[Cycle | None],
-) -> tuple[Annotated[FloorVectors, "motions"], Annotated[FloorVectors, "motions"]]:
-    """Return displacements (M,), m, and factors of turns (M,) of cycles; 0 and 1 without one."""
-    ways = [0.0 if cycle is None else cycle.way for cycle in cycles]
-    factors = [1.0 if cycle is None else cycle.factor for cycle in cycles]
-    return np.array(ways, complex), np.array(factors, complex)
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Frames `begin` to `end`, exclusive, of a stance or a swing; `end` may lie after a cycle."""
-
-    begin: int
-    end: int
-
-    def __len__(self) -> int:
-        return self.end - self.begin
+NO_CYCLE = Cycle(0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -116,12 +93,12 @@ class Runs:
         selected = self.select(np.isin(self.rows, rows))
         return replace(selected, rows=np.searchsorted(rows, selected.rows))
 
-    def by_row(self, rows: int) -> list[tuple[Interval, ...]]:
-        """Return the runs of each of R rows."""
-        by_row: list[list[Interval]] = [[] for _ in range(rows)]
+    def by_row(self, rows: int) -> list[tuple[range, ...]]:
+        """Return the frames of the runs of each of R rows; they may lie after a cycle."""
+        by_row: list[list[range]] = [[] for _ in range(rows)]
         intervals = zip(self.begins.tolist(), self.ends.tolist(), strict=True)
         for row, (begin, end) in zip(self.rows.tolist(), intervals, strict=True):
-            by_row[row].append(Interval(begin, end))
+            by_row[row].append(range(begin, end))
         return [tuple(row_intervals) for row_intervals in by_row]
 
 
@@ -166,10 +143,6 @@ class FootRows:
         statistics = (self.height, self.swing, self.longest_swing, self.clearance)
         return FootContact(0, *(float(values[row]) for values in statistics))
 
-    def places(self, rows: PerRun, frames: PerRun) -> Annotated[FloorVectors, "runs"]:
-        """Return floor points of rows at frames, which may lie within later cycles."""
-        return places(self, self.floor, rows, frames)
-
 
 def places(
     feet: FootRows, floor: Annotated[FloorVectors, "frames"], rows: PerRun, frames: PerRun
@@ -183,10 +156,10 @@ def places(
     return points
 
 
-def from_intervals(rows: Sequence[Sequence[Interval]]) -> Runs:
+def from_intervals(rows: Sequence[Sequence[range]]) -> Runs:
     """Return the runs of rows, each with its intervals."""
     runs = [
-        (row, interval.begin, interval.end)
+        (row, interval.start, interval.stop)
         for row, intervals in enumerate(rows)
         for interval in intervals
     ]
@@ -206,25 +179,20 @@ def runs(down: Mask, rows: FrameRows) -> Runs:
     before[starts] = after[starts + counts - 1] = False
     begins, stops = np.flatnonzero(down & ~before), np.flatnonzero(down & ~after) + 1
     row = rows.groups.group[begins]
-    return _join_over_ends(Runs(row, begins - starts[row], stops - starts[row]), rows)
-
-
-def _join_over_ends(separate: Runs, rows: FrameRows) -> Runs:
-    """Return the runs, in which the last run of a cycle goes on as its first one."""
-    cyclic, counts = rows.cyclic[separate.rows], rows.counts[separate.rows]
-    first = np.flatnonzero(cyclic & (separate.begins == 0))
-    last = np.flatnonzero(cyclic & (separate.ends == counts))
+    begins, stops = begins - starts[row], stops - starts[row]
+    # The last run of a cycle goes on as its first one.
+    first = np.flatnonzero(rows.cyclic[row] & (begins == 0))
+    last = np.flatnonzero(rows.cyclic[row] & (stops == counts[row]))
     _, first_index, last_index = np.intersect1d(
-        separate.rows[first], separate.rows[last], assume_unique=True, return_indices=True
+        row[first], row[last], assume_unique=True, return_indices=True
     )
     first, last = first[first_index], last[last_index]
     different = first != last
     first, last = first[different], last[different]
-    stops = separate.ends.copy()
-    stops[last] += separate.ends[first]
-    remaining = np.ones(len(stops), bool)
+    joined_stops, remaining = stops.copy(), np.ones(len(stops), bool)
+    joined_stops[last] += stops[first]
     remaining[first] = False
-    return replace(separate, ends=stops).select(remaining)
+    return Runs(row[remaining], begins[remaining], joined_stops[remaining])
 
 
 def tidy(down: Mask, rows: FrameRows) -> Runs:
@@ -248,37 +216,32 @@ def discipline(stances: Runs, feet: FootRows) -> Runs:
     time than most captured ones: swings within a walk stay as they are. A foot that is in the air
     does not stand.
     """
-    down = stances.mask(feet.rows)
-    swinging = _swing_frames(runs(~down, feet.rows), feet)
-    grounded = feet.heights < (feet.height + LIFTED)[feet.rows.groups.group]
-    return tidy(down | (~swinging & grounded), feet.rows)
-
-
-def _swing_frames(swings: Runs, feet: FootRows) -> Mask:
-    """Return the frames (N,) of swings in which the foot swings indeed."""
+    down, group = stances.mask(feet.rows), feet.rows.groups.group
+    swings, grounded = runs(~down, feet.rows), feet.heights < (feet.height + LIFTED)[group]
     if not len(swings.rows):
-        return np.zeros(len(feet.floor), bool)
+        return tidy(down | grounded, feet.rows)
     before = np.maximum(swings.begins - 1, 0)
-    steps = feet.places(swings.rows, swings.ends) - feet.places(swings.rows, before)
-    goes = ~swings.inner(feet.rows) | (np.abs(steps) >= SHORTEST_STEP)
+    after_swings, before_swings = (
+        places(feet, feet.floor, swings.rows, frames) for frames in (swings.ends, before)
+    )
+    step = np.abs(after_swings - before_swings)
+    goes = ~swings.inner(feet.rows) | (step >= SHORTEST_STEP)
     long = swings.lengths > (feet.longest_swing * feet.rows.rates)[swings.rows]
-    begins, stops = swings.begins.copy(), swings.ends.copy()
-    for run in np.flatnonzero(goes & long & ~_walks(swings, feet)):
-        begins[run], stops[run] = _cut(feet, swings.rows[run], begins[run], stops[run])
-    return Runs(swings.rows, begins, stops).select(goes).mask(feet.rows)
-
-
-def _walks(swings: Runs, feet: FootRows) -> Annotated[Booleans, "runs"]:
     run, frames = swings.frames()
     walking = feet.walking[feet.rows.flat(swings.rows[run], frames)]
-    return FrameGroups(swings.lengths).every(walking)
+    walks = np.logical_and.reduceat(walking, FrameGroups(swings.lengths).starts)
+    begins, stops = swings.begins.copy(), swings.ends.copy()
+    for index in np.flatnonzero(goes & long & ~walks):
+        begins[index], stops[index] = _cut(feet, swings.rows[index], begins[index], stops[index])
+    swinging = Runs(swings.rows, begins, stops).select(goes).mask(feet.rows)
+    return tidy(down | (~swinging & grounded), feet.rows)
 
 
 def _cut(feet: FootRows, row: int, begin: int, end: int) -> tuple[int, int]:
     """Return the frames of a long swing, for the median duration, in which the foot goes most."""
     length = min(max(2, round(float(feet.swing[row] * feet.rows.rates[row]))), end - begin - 1)
     frames = np.arange(begin, end)
-    points = feet.places(np.full(len(frames), row), frames)
+    points = places(feet, feet.floor, np.full(len(frames), row), frames)
     gone = np.round(np.abs(points[length:] - points[:-length]), MICROMETRES)
     first = begin + int(np.argmax(gone))
     return first, first + length

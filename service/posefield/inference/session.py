@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import Annotated, Any, Protocol
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from posefield.common.units import (
     Floats,
     Frames,
     Indices,
+    PerControl,
     PointControls,
     Singles,
     Vector,
@@ -31,7 +32,7 @@ from posefield.common.units import (
 from posefield.inference import onnx_runtime
 from posefield.inference.onnx_runtime import CONTACTS, LABELS
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
-from posefield.kriging import kriging_model
+from posefield.kriging import support
 from posefield.kriging.kriging_model import KrigingWeights
 from posefield.model_file import checked_file, onnx_file
 from posefield.model_file.model_card import ROW_VALUES, Control, ModelCard, shape_rows
@@ -45,7 +46,8 @@ captured clip; paths of walking crowds need controls up to 0.2 of a range outsid
 SLACK = 1e-6
 """Share of the range that a control inside it may lie outside by rounding."""
 
-Bound = TypeVar("Bound", float, Floats)
+SinglePoints = Annotated[Singles, "points controls"]
+SingleValues = Annotated[Singles, "points"]
 
 
 @dataclass(frozen=True)
@@ -55,19 +57,20 @@ class AnswerBounds:
     low, high (d,): sampled range of each control. durations: shortest and longest captured clip, s.
     """
 
-    low: Floats
-    high: Floats
+    low: PerControl
+    high: PerControl
     durations: tuple[float, float]
 
     @cached_property
-    def _inside(self) -> tuple[Floats, Floats]:
+    def _inside(self) -> tuple[PerControl, PerControl]:
         slack = SLACK * (self.high - self.low)
         return self.low - slack, self.high + slack
 
     @cached_property
-    def limits(self) -> tuple[Floats, Floats]:
+    def limits(self) -> tuple[PerControl, PerControl]:
         """Smallest and largest value (d,) at which each control acts."""
-        return _with_margin(self.low, self.high)
+        room = MARGIN * (self.high - self.low)
+        return self.low - room, self.high + room
 
     @property
     def duration_limits(self) -> tuple[float, float]:
@@ -77,17 +80,17 @@ class AnswerBounds:
         """
         return self.durations[0] * (1.0 - MARGIN), self.durations[1] * (1.0 + MARGIN)
 
-    def is_inside(self, controls: Floats | Singles) -> bool:
+    def is_inside(self, controls: PointControls | SinglePoints) -> bool:
         """Return whether all controls (B, d) lie within the sampled ranges."""
         low, high = self._inside
         return bool(((controls >= low) & (controls <= high)).all())
 
-    def outside(self, controls: Floats | Singles) -> Booleans:
+    def outside(self, controls: PointControls | SinglePoints) -> Annotated[Booleans, "points"]:
         """Return whether a control of each row (B, d) lies outside its sampled range, (B,)."""
         low, high = self._inside
         return np.asarray(((controls < low) | (controls > high)).any(axis=1))
 
-    def limit(self, controls: Floats | Singles) -> Floats | Singles:
+    def limit(self, controls: PointControls | SinglePoints) -> PointControls | SinglePoints:
         """Return the controls (B, d) at which the answer is computed; inside the limits the same.
 
         Keeps the type of the numbers.
@@ -95,11 +98,11 @@ class AnswerBounds:
         low, high = (limit.astype(controls.dtype) for limit in self.limits)
         return np.asarray(np.clip(controls, low, high))
 
-    def nearest_sampled(self, controls: Floats | Singles) -> Floats:
+    def nearest_sampled(self, controls: PointControls | SinglePoints) -> PointControls:
         """Return the nearest controls (B, d) inside the sampled ranges."""
         return np.clip(controls.astype(np.float64), self.low, self.high)
 
-    def limit_durations(self, durations: Singles, nearest: Singles) -> Singles:
+    def limit_durations(self, durations: SingleValues, nearest: SingleValues) -> SingleValues:
         """Return durations (B,), s, limited to the margin about the captured ones.
 
         nearest (B,): durations at the nearest controls inside the sampled ranges, which may lie
@@ -112,14 +115,8 @@ class AnswerBounds:
 
 def limit_control(control: Control, value: float) -> float:
     """Return the value at which a control acts: at most the margin outside its sampled range."""
-    low, high = _with_margin(control.minimum, control.maximum)
-    return min(max(value, low), high)
-
-
-def _with_margin(low: Bound, high: Bound) -> tuple[Bound, Bound]:
-    """Return the limits that lie the margin outside sampled ranges."""
-    room = MARGIN * (high - low)
-    return low - room, high + room
+    room = MARGIN * (control.maximum - control.minimum)
+    return min(max(value, control.minimum - room), control.maximum + room)
 
 
 # Estimate of memory, by the shipped models: each level has up to six sessions, one for each set of
@@ -207,7 +204,7 @@ class Session:
 
     def run(
         self,
-        controls: PointControls | Annotated[Singles, "points controls"],
+        controls: PointControls | SinglePoints,
         times: Annotated[Floats, "points frames"] | Annotated[Singles, "points frames"] | None,
         *values: str,
         labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None = None,
@@ -327,7 +324,7 @@ class Session:
     def kriging_weights(self) -> KrigingWeights:
         """Kriging weights of the captured clips."""
         card = self.card
-        points = kriging_model.half_ranges(np.array(card.examples), *card.sampled_ranges)
+        points = support.half_ranges(np.array(card.examples), *card.sampled_ranges)
         return KrigingWeights(card.kriging, np.hstack([points, card.clip_labels]))
 
     @property

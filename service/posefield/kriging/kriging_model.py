@@ -158,13 +158,6 @@ class KrigingWeights:
         return np.sqrt(squared_distances(self.hyper, points, self.samples))
 
 
-def half_ranges(
-    controls: Annotated[Floats, "*points controls"], low: PerControl, high: PerControl
-) -> Annotated[Floats, "*points controls"]:
-    """Return controls (..., d) scaled so that the range from low to high (d,) is -1 to 1."""
-    return (2.0 * controls - low - high) / (high - low)
-
-
 def squared_distances(
     hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
 ) -> Annotated[Floats, "a b"]:

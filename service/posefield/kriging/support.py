@@ -32,7 +32,6 @@ from posefield.common.units import (
     Singles,
     Values,
 )
-from posefield.kriging.kriging_model import half_ranges
 
 RANGE_MARGIN = 0.1
 """Share of a control's range by which a supported query may lie beyond it."""
@@ -47,6 +46,13 @@ SMALL_SHARE = 0.02
 """Share of the nugget below which a direction of the covariances is bounded, not computed."""
 # Rows whose intermediate arrays fit the cache of a core.
 BATCH = 512
+
+
+def half_ranges(
+    controls: Annotated[Floats, "*points controls"], low: PerControl, high: PerControl
+) -> Annotated[Floats, "*points controls"]:
+    """Return controls (..., d) scaled so that the range from low to high (d,) is -1 to 1."""
+    return (2.0 * controls - low - high) / (high - low)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from posefield.common.units import (
     Rotations,
     Vector,
 )
-from posefield.feet import limbs, two_bone
+from posefield.feet import limbs
 from posefield.feet.limbs import Limb
 from posefield.feet.stance_rows import STANDING
 from posefield.kriging import random_field
@@ -128,7 +128,7 @@ class HeldBody:
                 "look_at", f"{distance:.3g} m from the head, expected at least {NEAREST:g} m"
             )
         within = self._within(turns, away / distance)
-        turn = quat.log(two_bone.shortest_turn(quat.rotate(turns[head], forward), within))
+        turn = quat.log(limbs.shortest_turn(quat.rotate(turns[head], forward), within))
         sine_and_cosine = np.linalg.norm(quat.cross(within, away)), within @ away
         return Gaze(gaze.shares, turn, float(np.arctan2(*sine_and_cosine)))
 
@@ -379,13 +379,14 @@ def _keep(
     poses = limbs.evaluate_joints(body.parents, body.bones, [limb.tip], rotations, roots)
     offset = last.position(limb.lower) - poses.position(limb.upper)
     distance = np.linalg.norm(offset, axis=-1)
-    beyond = np.maximum(distance - two_bone.firm_reach(last, limb), 0.0)
+    beyond = np.maximum(distance - limbs.firm_reach(last, limb), 0.0)
     shift = (beyond / distance)[:, None] * offset
-    turns = two_bone.solve(poses, limb, offset - shift)
+    upper, middle, lower = limbs.solve(poses, limb, offset - shift)
     # The hand keeps its orientation while the body above it sways.
     turn_back = quat.mul(quat.conj(poses.orientation(limb.lower)), last.orientation(limb.lower))
     turned = rotations.copy()
-    replace(turns, lower=quat.mul(turns.lower, turn_back)).apply(limb, turned)
+    turned[:, limb.upper], turned[:, limb.middle] = upper, middle
+    turned[:, limb.lower] = quat.mul(lower, turn_back)
     return turned, roots + shift
 
 

@@ -12,10 +12,9 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Frames, Indices, RootPath, Vector
-from posefield.feet import limbs, two_bone
+from posefield.feet import limbs
 from posefield.feet.footsteps import Character, Led
-from posefield.feet.limbs import Limb, LimbPoses, Turns
-from posefield.feet.two_bone import LimbTurns
+from posefield.feet.limbs import Limb, LimbPoses, LimbTurns, Turns
 from posefield.motion import quat, skeleton
 from posefield.motion.quat import smoothstep
 from posefield.performance.passage import RATE, Passage
@@ -28,6 +27,11 @@ reach, m: a stretched limb leaves the pelvis no room to be lowered for the feet.
 GENTLE = 8.0
 """Acceleration of a limb's end on its way to and from a target, m/s²; the longest time limits it
 less."""
+
+HeldTurns = tuple[
+    Annotated[Floats, "held 4"], Annotated[Floats, "held 4"], Annotated[Floats, "held 4"]
+]
+"""Rotations (H, 4) of the joints of a limb in the frames in which its target holds."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +145,9 @@ def _moved(
     share = _share(np.array(rows, float), target, before, after)
     poses = _poses(character, passage, limb, rows)
     rotations = passage.rotations.copy()
-    _eased(poses, limb, target_turns, share, target.begin - rows.start).apply(
-        limb, rotations[rows.start : rows.stop]
+    turned = rotations[rows.start : rows.stop]
+    turned[:, limb.upper], turned[:, limb.middle], turned[:, limb.lower] = _eased(
+        poses, limb, target_turns, share, target.begin - rows.start
     )
     return replace(passage, rotations=rotations)
 
@@ -158,7 +163,7 @@ def _poses(character: Character, passage: Passage, limb: Limb, rows: range) -> L
     )
 
 
-def _hold(poses: LimbPoses, limb: Limb, target: WorldTarget) -> tuple[float, LimbTurns]:
+def _hold(poses: LimbPoses, limb: Limb, target: WorldTarget) -> tuple[float, HeldTurns]:
     """Return the turns of a limb, while a target holds, with its tip there or nearest to it.
 
     First is the way along which its end goes there, m, as an arc.
@@ -168,13 +173,13 @@ def _hold(poses: LimbPoses, limb: Limb, target: WorldTarget) -> tuple[float, Lim
     goal = target_end + _shortfall(poses, limb, upper, target_end)
     end = goal - upper
     distance = np.linalg.norm(end, axis=-1)
-    length = np.maximum(distance, 1.001 * two_bone.distances(poses, limb)[0] + 1e-6)
+    length = np.maximum(distance, 1.001 * limbs.distances(poses, limb)[0] + 1e-6)
     end = end * (length / np.maximum(distance, 1e-9))[:, None]
     before = (lower - upper)[:1]
     sine, cosine = np.linalg.norm(quat.cross(before, end[:1])), np.sum(before * end[:1])
     arc = float(np.arctan2(sine, cosine) * np.linalg.norm(end[0]))
     stretch = float(np.linalg.norm(end[0]) - np.linalg.norm(before))
-    return float(np.hypot(arc, stretch)), two_bone.solve(poses, limb, end)
+    return float(np.hypot(arc, stretch)), limbs.solve(poses, limb, end)
 
 
 def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, target_end: RootPath) -> Vector:
@@ -182,15 +187,15 @@ def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, target_end: RootPa
 
     It is the same in all frames, so that what is held stays still while the body sways.
     """
-    firm = two_bone.firm_reach(poses, limb)
+    firm = limbs.firm_reach(poses, limb)
     if (np.linalg.norm(target_end - upper, axis=-1) <= firm + 1e-9).all():
         return np.zeros(3)
     centre = upper.mean(axis=0)
     spread = float(np.linalg.norm(upper - centre, axis=-1).max())
     away = target_end.mean(axis=0) - centre
     distance = max(float(np.linalg.norm(away)), 1e-9)
-    length = float(two_bone.distances(poses, limb)[1][0])
-    reached = float(two_bone.soften(np.array([distance + spread]), firm[:1], length)[0]) - spread
+    length = float(limbs.distances(poses, limb)[1][0])
+    reached = float(limbs.soften(np.array([distance + spread]), firm[:1], length)[0]) - spread
     beyond = np.clip((distance + spread - firm[:1]) / FAR, 0.0, 1.0)
     reached -= EASE * float(smoothstep(beyond)[0])
     shortfall: Vector = away * (reached / distance - 1.0)
@@ -198,14 +203,14 @@ def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, target_end: RootPa
 
 
 def _eased(
-    poses: LimbPoses, limb: Limb, target_turns: LimbTurns, share: Frames, first: int
+    poses: LimbPoses, limb: Limb, target_turns: HeldTurns, share: Frames, first: int
 ) -> LimbTurns:
     """Return the turns of a limb's joints on the way to a target, while it holds, and after it.
 
     share: of the turns that the target needs (F,). first: frame from which on it holds. The
     orientation of the limb's end is kept.
     """
-    count = len(target_turns.upper)
+    count = len(target_turns[0])
     near = np.clip(np.arange(len(share)) - first, 0, count - 1)
     above = poses.parent_orientation(limb.upper)
     predicted = [
@@ -214,10 +219,10 @@ def _eased(
     ]
     upper, middle = (
         _turned(before, after, share, near, first)
-        for before, after in zip(predicted, (target_turns.upper, target_turns.middle), strict=True)
+        for before, after in zip(predicted, target_turns[:2], strict=True)
     )
     turned = quat.mul(above, quat.mul(upper, middle))
-    return LimbTurns(upper, middle, quat.mul(quat.conj(turned), poses.orientation(limb.lower)))
+    return upper, middle, quat.mul(quat.conj(turned), poses.orientation(limb.lower))
 
 
 def _turned(

@@ -9,7 +9,7 @@ import numpy as np
 from posefield.common.errors import MotionError
 from posefield.common.units import UP, Bones, Floats, RootPath, Rotations
 from posefield.common.value_cache import ValueCache
-from posefield.feet import limbs, two_bone
+from posefield.feet import limbs
 from posefield.locomotion import floor_plane
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
@@ -275,7 +275,7 @@ def _turn(
     value decomposition of Markley 1988).
     """
     if len(source) == 1:
-        return two_bone.shortest_turn(target[0], source[0])
+        return limbs.shortest_turn(target[0], source[0])
     left, _, right = np.linalg.svd(source.T @ target + NO_TURN * np.eye(3))
     sign = np.sign(np.linalg.det(left) * np.linalg.det(right))
     return quat.from_matrix(left @ np.diag([1.0, 1.0, sign]) @ right)

@@ -325,7 +325,7 @@ def _script_character(
     bones = _bones(model, MotionQuestion(controls=controls, performer=performer, labels=labels))
     foot_contacts = [contact for contact in card.contacts if contact.joint in card.feet]
     limits = shared_hinges(card, [other.session.card for other in others if other is not None])
-    choice = footsteps.choose_limbs(
+    body, planted, _ = footsteps.choose_limbs(
         card.skeleton.parents,
         bones,
         [contact.joint for contact in foot_contacts],
@@ -333,11 +333,11 @@ def _script_character(
         limits,
         card.skeleton.tips,
     )
-    contacts = tuple(foot_contacts[index] for index in choice.feet)
+    contacts = tuple(foot_contacts[index] for index in planted)
     feet = tuple(contact.joint for contact in contacts)
     facing = math.radians(card.making.facing or 0.0)
     return ScriptCharacter(
-        model.identity, card.skeleton, card.roles, facing, bones, choice.character, feet, contacts
+        model.identity, card.skeleton, card.roles, facing, bones, body, feet, contacts
     )
 
 

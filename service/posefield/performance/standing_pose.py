@@ -30,7 +30,7 @@ from posefield.common.units import (
     Vector,
 )
 from posefield.common.value_cache import ValueCache
-from posefield.feet import limbs, two_bone
+from posefield.feet import limbs
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
@@ -443,10 +443,10 @@ def _stand(
         heights.append(float((ankle - hip) @ UP) + up)
     poses = cycle.evaluate(rotations[None], (root + min(heights) * UP)[None])
     for leg, ankle, standing in zip(cycle.legs, ankles, stood, strict=True):
-        turns = two_bone.solve(poses, leg, ankle - poses.position(leg.upper))
+        upper, middle, lower = limbs.solve(poses, leg, ankle - poses.position(leg.upper))
         turned = quat.mul(quat.conj(poses.orientation(leg.lower)), standing.foot)
-        rotations[leg.upper], rotations[leg.middle] = turns.upper[0], turns.middle[0]
-        rotations[leg.lower] = quat.mul(turns.lower, turned)[0]
+        rotations[leg.upper], rotations[leg.middle] = upper[0], middle[0]
+        rotations[leg.lower] = quat.mul(lower, turned)[0]
     levels = np.array([standing.level for standing in stood])
     pose = rotations, min(heights), root_place
     feet = balls, levels, stances - balls

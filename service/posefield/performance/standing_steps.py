@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Frames, RootPath, Rotations
-from posefield.feet import limbs, two_bone
+from posefield.feet import limbs
 from posefield.feet.limbs import LimbPoses
 from posefield.feet.stance_rows import STANDING
 from posefield.locomotion import floor_plane
@@ -154,9 +154,9 @@ def _close(
         share = course.swing if index == course.swinging else course.pose
         ball = quat.lerp(balls[:, index], np.broadcast_to(stood[index], roots.shape), share)
         ankle = ball - (poses.position(leg.tip) - poses.position(leg.lower))
-        end = two_bone.reach(poses, leg, np.zeros_like(ankle), ankle)
-        turns = two_bone.solve(poses, leg, end)
-        turns.apply(leg, rotations)
+        end = limbs.reach(poses, leg, np.zeros_like(ankle), ankle)
+        turns = limbs.solve(poses, leg, end)
+        rotations[:, leg.upper], rotations[:, leg.middle], rotations[:, leg.lower] = turns
     contacts = np.ones_like(walked.contacts)
     contacts[course.lift : course.land, course.swinging] = 0.0
     return replace(walked, rotations=rotations, roots=roots, contacts=contacts)

@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import UP, Booleans, Floats, Rotations, Vector
-from posefield.feet.two_bone import shortest_turn
+from posefield.feet.limbs import shortest_turn
 from posefield.motion import quat
 from posefield.motion.skeleton import joint_chain
 from posefield.retarget.role_map import SIDES, Body, Chain, PosedBody

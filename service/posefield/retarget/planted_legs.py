@@ -14,9 +14,9 @@ import numpy as np
 
 from posefield.common import frame_groups
 from posefield.common.units import UP, Booleans, Floats, Frames, Indices, RootPath, Rotations
-from posefield.feet import stance_rows, two_bone
+from posefield.feet import body_plans, limbs, stance_rows
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import UNEVEN, Interval
+from posefield.feet.stance_rows import UNEVEN
 from posefield.motion import quat
 from posefield.question.results import StanceResult
 from posefield.retarget.role_map import SIDES, Body, PosedBody
@@ -37,7 +37,7 @@ class SourceFeet:
 
     roles: tuple[str, str]
     paths: Annotated[Floats, "frames feet 3"]
-    stances: tuple[tuple[Interval, ...], ...]
+    stances: tuple[tuple[range, ...], ...]
     heights: Annotated[Floats, "feet"]
 
     @property
@@ -46,7 +46,7 @@ class SourceFeet:
         standing = np.zeros(self.paths.shape[:2], bool)
         for foot, stances in enumerate(self.stances):
             for stance in stances:
-                standing[stance.begin : stance.end, foot] = True
+                standing[stance.start : stance.stop, foot] = True
         return standing
 
     @property
@@ -58,10 +58,10 @@ class SourceFeet:
         floors = np.empty(self.paths.shape[:2])
         for foot, intervals in enumerate(self.stances):
             heights = self.paths[:, foot] @ UP
-            level = [float(np.median(heights[s.begin : s.end])) for s in intervals]
+            level = [float(np.median(heights[s.start : s.stop])) for s in intervals]
             level = level or [float(self.heights[foot])]
-            edges = [0, *(s.end for s in intervals[:-1]), len(heights)]
-            begins = [s.begin for s in intervals] or [0]
+            edges = [0, *(s.stop for s in intervals[:-1]), len(heights)]
+            begins = [s.start for s in intervals] or [0]
             for index, (first, last) in enumerate(pairwise(edges)):
                 floors[first:last, foot] = level[index]
                 swing = slice(first, begins[index])
@@ -103,15 +103,13 @@ def feet_of(
     return SourceFeet((left, right), paths, tuple(runs.by_row(2)), np.array(heights))
 
 
-def _stances(
-    results: Sequence[StanceResult], name: str, rate: float, frames: int
-) -> list[Interval]:
+def _stances(results: Sequence[StanceResult], name: str, rate: float, frames: int) -> list[range]:
     """Return the frames of the stances of a joint."""
     intervals = []
     for stance in results:
         begin, end = round(stance.begin * rate), min(round(stance.end * rate) + 1, frames)
         if stance.joint == name and begin < end:
-            intervals.append(Interval(begin, end))
+            intervals.append(range(begin, end))
     return intervals
 
 
@@ -144,7 +142,7 @@ def plan_paths(
     return planned
 
 
-def _correction(offsets: RootPath, intervals: Sequence[Interval], rate: float) -> RootPath:
+def _correction(offsets: RootPath, intervals: Sequence[range], rate: float) -> RootPath:
     """Return the change (F, 3) of a distance with which it is constant in each stance.
 
     Between stances it is a cubic with the values and slopes at their ends, before the first and
@@ -155,15 +153,15 @@ def _correction(offsets: RootPath, intervals: Sequence[Interval], rate: float) -
         return change
     slopes = np.gradient(offsets, axis=0) if len(offsets) > 1 else np.zeros(offsets.shape)
     for interval in intervals:
-        inside = slice(interval.begin, interval.end)
+        inside = slice(interval.start, interval.stop)
         change[inside] = offsets[inside].mean(axis=0) - offsets[inside]
     for before, after in pairwise(intervals):
-        last, first = before.end - 1, after.begin
+        last, first = before.stop - 1, after.start
         shares = np.arange(1, first - last)[:, None] / (first - last)
         boundary = (change[last], change[first])
         ways = (-(first - last) * slopes[last], -(first - last) * slopes[first])
         change[last + 1 : first] = _cubic(boundary, ways, shares)
-    begin, end = intervals[0].begin, intervals[-1].end
+    begin, end = intervals[0].start, intervals[-1].stop
     change[:begin] = _settled(change[begin], slopes[begin], np.arange(begin, 0, -1), rate)
     steps = np.arange(1, len(offsets) - end + 1)
     change[end:] = _settled(change[end - 1], -slopes[end - 1], steps, rate)
@@ -237,11 +235,11 @@ def plant(
         for foot, (leg, poses) in enumerate(legs)
     ]
     needs = [
-        two_bone.need(poses, leg, target, np.zeros(len(target)), two_bone.firm_reach(poses, leg))
+        body_plans.need(poses, leg, target, np.zeros(len(target)), limbs.firm_reach(poses, leg))
         for (leg, poses), target in zip(legs, targets, strict=True)
     ]
     largest = np.full(len(paths), DEEPEST * rig.body.leg_length)
-    lowered = two_bone.lower(needs, largest, frame_groups.one_row(len(largest), rate))
+    lowered = body_plans.lower(needs, largest, frame_groups.one_row(len(largest), rate))
     rotations = rig.rotations.copy()
     shift = -lowered[:, None] * UP
     for (leg, poses), target in zip(legs, targets, strict=True):
@@ -264,8 +262,8 @@ def turn_limb(
     if not changed.any():
         return
     before = rotations.copy()
-    turns = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
-    turns.apply(limb, rotations)
+    turns = limbs.solve(poses, limb, limbs.reach(poses, limb, shift, target))
+    rotations[:, limb.upper], rotations[:, limb.middle], rotations[:, limb.lower] = turns
     rotations[~changed] = before[~changed]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import UP, Booleans, Floats, Frames, RootPath, Vector
-from posefield.feet.two_bone import shortest_turn
+from posefield.feet.limbs import shortest_turn
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip

@@ -125,22 +125,23 @@ class ClipDraft:
                 played = playback(steps / duration, 0.0, duration, inner)
                 self.times = played.times(float(self.times[-1]))
         else:
-            played = playback(rate, self._start(duration), duration, moments)
+            start = min(max(check_number("start", self.question.start), 0.0), duration)
             if moments:
+                played = playback(rate, start, duration, moments)
                 self.duration = played.duration
             # Clients read the duration of the motion from poses, as it is played from clips, and
             # may round it to single precision.
             last = time_window(self.question, max(duration, self.duration))[1]
             if last * (1.0 + motion_question.FLOAT32_EPSILON) >= min(duration, self.duration):
                 last = self.duration
-            self.times = np.minimum(played.times(last), duration)
+            if moments:
+                times = played.times(last)
+            else:
+                times = start + np.arange(math.floor((last - start) * rate + ROUNDING) + 1) / rate
+            self.times = np.minimum(times, duration)
             frames = len(self.times)
         if frames > self.frame_limit:
             raise InvalidField("fps", f"{frames} frames, expected at most {self.frame_limit}")
-
-    def _start(self, duration: float) -> float:
-        """Return the time of the first frame, s, limited to the motion's."""
-        return min(max(check_number("start", self.question.start), 0.0), duration)
 
     def _moments(self, model: Synthesizer, duration: float) -> list[float]:
         """Return the times, s, that are those of frames, and set those of targets.
@@ -159,7 +160,7 @@ class ClipDraft:
             frame = np.array([event.share * (card.frames - 1)])
             moments += model.solver.times(self.validated, motion, frame).tolist()
         # Less than half a frame before the end, the first pose is the only one.
-        if (duration - self._start(duration)) * self.rate > 0.5:
+        if (duration - max(self.question.start, 0.0)) * self.rate > 0.5:
             moments.append(duration)
         return moments
 

@@ -13,7 +13,7 @@ from msgspec import structs
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField, QueryError
-from posefield.constraints import constrained_motion
+from posefield.constraints import constrained_motion, constraint
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.targets import NO_CONSTRAINTS
 from posefield.locomotion import floor_plane, stride
@@ -151,9 +151,7 @@ def _set_prediction(model: Synthesizer, draft: ClipDraft, row: OutputRow) -> Non
     trust = model.trust(draft.question, question, float(length), float(sigma))
     if model.measures:
         motion = model.solver.solve(question, NO_CONSTRAINTS)
-        trust = structs.replace(
-            trust, measured=model.solver.corrector(question.level).measured(motion)
-        )
+        trust = structs.replace(trust, measured=constraint.measured(model.session.card, motion))
     draft.answer = PoseAnswer(draft.times, rotations, root, offsets, trust, *curves)
     _set_strides(model, draft, trust.duration)
     if draft.stands:

@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from msgspec import structs
 
 from posefield.common.units import UP, Floats
-from posefield.constraints.targets import ConstraintSet
+from posefield.constraints.targets import NO_CONSTRAINTS
 from posefield.feet import body_plans, foot_placement, footsteps, limbs
-from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest
+from posefield.feet.footsteps import FeetPlan, PlanRequest
 from posefield.feet.stance_rows import Cycle
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
@@ -40,8 +40,8 @@ def cycle_of(strides: Strides) -> Cycle:
     """Return the floor motion from the start of a cycle to its end."""
     turn = float(strides.turns[0])
     gap = floor_plane.arc_displacement(strides.travels, strides.turns)[0]
-    start = strides.starts[0]
-    return Cycle(complex(start + gap - np.exp(1j * turn) * start), turn)
+    start, factor = strides.starts[0], complex(np.exp(1j * turn))
+    return Cycle(complex(start + gap - np.exp(1j * turn) * start), factor)
 
 
 def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
@@ -54,20 +54,41 @@ def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
     feet = [contact.joint for contact in contacts] if contacts else list(card.feet)
     placed, requests = [], []
     for draft in drafts:
-        limbs_of_draft = footsteps.choose_limbs(
+        answer, constraints = draft.answer, draft.constraints or NO_CONSTRAINTS
+        measured = [measure for _, measure, _ in constraints.controls]
+        moments = [target.moment for target in constraints.targets]
+        exact_joints = {joint for measure in measured + moments for joint in measure.joints}
+        character, planted, left_out = footsteps.choose_limbs(
             card.skeleton.parents,
-            draft.answer.bone_offsets,
+            answer.bone_offsets,
             feet,
-            _held_joints(draft),
+            exact_joints,
             card.hinges,
             card.skeleton.tips,
         )
-        if limbs_of_draft.feet:
+        if planted:
+            # A trunk may follow the floor where no constraint is on a height.
+            raised = not moments and not any(
+                measure.quantity == "height" or measure.at in ("highest", "lowest")
+                for measure in measured
+            )
+            chosen = [contacts[index] for index in planted] if contacts else []
+            rate = (len(draft.plan_times) - (draft.cycle is None)) / answer.trust.duration
             placed.append(draft)
-            requests.append(_plan_request(model, draft, limbs_of_draft, contacts))
-        left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in limbs_of_draft.left)
+            requests.append(
+                PlanRequest(
+                    replace(character, raised=raised),
+                    *draft.plan_poses,
+                    rate,
+                    chosen,
+                    _probabilities(model, draft, chosen) if chosen else None,
+                    draft.cycle,
+                    floor=draft.question.ground,
+                )
+            )
+        left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in left_out)
         unplaced = FeetResult((), 0, 0.0, 0.0, 0.0, 0.0, 0.0, left, _sloped(draft.question.ground))
-        _set_trust(draft, feet=unplaced)
+        draft.answer = replace(answer, trust=structs.replace(answer.trust, feet=unplaced))
     if not placed:
         return
     plans = body_plans.plan_motions(requests)
@@ -79,31 +100,14 @@ def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
     )
     results = describe(plans, card.skeleton.names)
     for draft, plan, (rotations, roots), result in zip(placed, plans, frames, results, strict=True):
-        left = draft.answer.trust.feet.left if draft.answer.trust.feet else ()
-        _set_trust(
-            draft,
+        trust = draft.answer.trust
+        left = trust.feet.left if trust.feet else ()
+        facts = structs.replace(
+            trust,
             feet=structs.replace(result, left=left + result.left),
             measured=_measured(card, draft, plan),
         )
-        draft.answer = replace(draft.answer, rotations=rotations, root_position=roots)
-
-
-def _set_trust(draft: ClipDraft, **facts: Any) -> None:
-    draft.answer = replace(draft.answer, trust=structs.replace(draft.answer.trust, **facts))
-
-
-def _plan_request(
-    model: Synthesizer, draft: ClipDraft, choice: LimbChoice, contacts: Sequence[FootContact]
-) -> PlanRequest:
-    """Return the request for the plan of a motion. contacts: of the model's feet."""
-    times, duration = draft.plan_times, draft.answer.trust.duration
-    rate = (len(times) - (draft.cycle is None)) / duration
-    chosen = [contacts[index] for index in choice.feet] if contacts else []
-    likely = _probabilities(model, draft, chosen) if contacts else None
-    character = replace(choice.character, raised=_may_rise(draft.constraints))
-    return PlanRequest(
-        character, *draft.plan_poses, rate, chosen, likely, draft.cycle, floor=draft.question.ground
-    )
+        draft.answer = replace(draft.answer, rotations=rotations, root_position=roots, trust=facts)
 
 
 def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult]:
@@ -141,8 +145,8 @@ def _stances(plan: FeetPlan, names: Sequence[str]) -> tuple[StanceResult, ...]:
     return tuple(
         StanceResult(
             names[leg.tip],
-            round_micrometres(min(flat, stance.end - 1) / plan.rate),
-            round_micrometres((stance.end - 1) / plan.rate),
+            round_micrometres(min(flat, stance.stop - 1) / plan.rate),
+            round_micrometres((stance.stop - 1) / plan.rate),
             tuple(map(round_micrometres, anchor)),
         )
         for leg, steps in zip(plan.character.legs, plan.steps, strict=True)
@@ -160,7 +164,7 @@ def _swings(plan: FeetPlan) -> int:
         if plan.cycle is not None:
             swings += max(len(steps.stances), 1) * (standing < count)
         else:
-            at_ends = [(stance.begin == 0) + (stance.end == count) for stance in steps.stances]
+            at_ends = [(stance.start == 0) + (stance.stop == count) for stance in steps.stances]
             swings += len(steps.stances) + 1 - sum(at_ends)
     return swings
 
@@ -168,26 +172,6 @@ def _swings(plan: FeetPlan) -> int:
 def _sloped(floor: Floor) -> Floor | None:
     """Return the floor of an answer; None for the level on which motions are captured."""
     return None if floor == LEVEL_FLOOR else floor
-
-
-def _held_joints(draft: ClipDraft) -> set[int]:
-    """Return the joints whose positions constrain a motion."""
-    if draft.constraints is None:
-        return set()
-    measures_of_controls = [measure for _, measure, _ in draft.constraints.controls]
-    moments = [target.moment for target in draft.constraints.targets]
-    return {joint for measure in measures_of_controls + moments for joint in measure.joints}
-
-
-def _may_rise(constraints: ConstraintSet | None) -> bool:
-    """Return whether no constraint is on a height, so that a trunk may follow the floor."""
-    return constraints is None or not (
-        constraints.targets
-        or any(
-            measure.quantity == "height" or measure.at in ("highest", "lowest")
-            for _, measure, _ in constraints.controls
-        )
-    )
 
 
 def _probabilities(

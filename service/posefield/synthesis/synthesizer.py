@@ -9,7 +9,7 @@ from msgspec import structs
 
 from posefield.common.errors import OutOfReach, OutsideSamples
 from posefield.common.units import MICROMETRES
-from posefield.constraints import take_variation, targets
+from posefield.constraints import constraint, take_variation, targets
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
@@ -134,9 +134,11 @@ class Synthesizer(NamedModel):
     ) -> Trust:
         """Return the trust of an answer with this duration, s, and sigma, m."""
         performer, deviations = validated.performer, validated.deviations
-        warnings = question_validation.merge_warnings(
-            validated.warnings, deviations, question.extrapolate
-        )
+        warnings = validated.warnings
+        if deviations:
+            warnings = question_validation.merge_warnings(
+                warnings, deviations, question.extrapolate
+            )
         if question.detail and not self.session.card.making.detail:
             warnings = (*warnings, NO_DETAIL)
         has_performer = performer is not None or PERFORMER in validated.named_labels
@@ -165,13 +167,14 @@ class Synthesizer(NamedModel):
         self, question: MotionQuestion, validated: ValidatedQuestion, motion: ConstrainedMotion
     ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
-        measured = self.solver.corrector(validated.level).measured(motion)
+        measured = constraint.measured(self.session.card, motion)
         controls, reached = split_results(motion.results, len(question.targets))
         deviations = self._deviations(validated, measured, controls)
         validated = replace(validated, deviations=deviations)
         trust = self.trust(question, validated, motion.duration, motion.state.asked_sigma)
-        misses = () if question.extrapolate == "ok" else miss_warnings(reached)
-        warnings = (*trust.warnings, *misses)
+        warnings = trust.warnings
+        if reached and question.extrapolate != "ok":
+            warnings = (*warnings, *miss_warnings(reached))
         return structs.replace(trust, warnings=warnings, measured=measured, targets=motion.results)
 
     def _deviations(

@@ -276,7 +276,7 @@ def _support_report(validator: QuestionValidator, question: ValidatedQuestion) -
 
 def _point(card: ModelCard, question: ValidatedQuestion) -> Floats:
     """Return the point (1, d + p) of the kriging model."""
-    point = kriging_model.half_ranges(question.point, *card.sampled_ranges)
+    point = support.half_ranges(question.point, *card.sampled_ranges)
     return np.hstack([point, question.labels])
 
 

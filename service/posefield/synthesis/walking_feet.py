@@ -10,7 +10,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.constraints import take_variation
 from posefield.feet import body_plans, foot_placement, footsteps
-from posefield.feet.footsteps import FeetPlan, LimbChoice, PlanRequest
+from posefield.feet.footsteps import Character, FeetPlan, PlanRequest
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.session import Session
 from posefield.kriging import random_field
@@ -251,7 +251,7 @@ def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
     if order.feet not in (None, "stand"):
         return False
     knows_contacts, slow = bool(card.feet and foot_contacts(card)), order.fps < MIN_RATE
-    legs = knows_contacts and bool(choose_legs(card).feet)
+    legs = knows_contacts and bool(choose_legs(card)[1])
     if order.feet is None:
         return legs and not slow
     if not knows_contacts:
@@ -270,13 +270,13 @@ def foot_contacts(card: ModelCard) -> tuple[FootContact, ...]:
     return tuple(contact for contact in card.contacts if contact.joint in card.feet)
 
 
-def choose_legs(card: ModelCard) -> LimbChoice:
-    """Return the legs of the feet whose contacts are known; those of the skeleton at rest."""
+def choose_legs(card: ModelCard) -> tuple[Character, tuple[int, ...]]:
+    """Return the character at rest, and the indices of the feet with known contacts and legs."""
     skeleton = card.skeleton
     feet = [contact.joint for contact in foot_contacts(card)]
     return footsteps.choose_limbs(
         skeleton.parents, skeleton.offsets, feet, (), card.hinges, skeleton.tips
-    )
+    )[:2]
 
 
 def standing_motions(
@@ -318,8 +318,8 @@ def _plan_feet(
     motions: Motions,
 ) -> list[FeetPlan]:
     card = session.card
-    choice = choose_legs(card)
-    contacts = [foot_contacts(card)[index] for index in choice.feet]
+    character, feet = choose_legs(card)
+    contacts = [foot_contacts(card)[index] for index in feet]
     columns = [card.contacts.index(contact) for contact in contacts]
     likely = contact_probabilities(session, plan, walkers, schedule)[..., columns]
     doubles = (motions.bone_offsets, motions.rotations, motions.root_position)
@@ -327,7 +327,7 @@ def _plan_feet(
     return body_plans.plan_motions(
         [
             PlanRequest(
-                replace(choice.character, bones=bones[walker]),
+                replace(character, bones=bones[walker]),
                 rotations[walker],
                 roots[walker],
                 plan.rate,

@@ -77,7 +77,7 @@ class ControlImputer:
         self._examples, self._labels = np.array(card.examples), card.clip_labels
         self._label_columns = kriging_model.label_columns(0, card.label_counts)
         self._low, self._high = card.sampled_ranges
-        self._scaled = kriging_model.half_ranges(self._examples, self._low, self._high)
+        self._scaled = support.half_ranges(self._examples, self._low, self._high)
 
     def impute(self, controls: Mapping[str, float], labels: Floats) -> dict[str, float]:
         """Return all controls in the card's order, those not given as in a typical captured clip.
@@ -85,9 +85,12 @@ class ControlImputer:
         That is the medoid, in the open controls, of the clips near the given ones. labels (1, p):
         weights of names, whose own clips come first; all zero in label sets that are left open.
         """
-        open_ = self._open(controls)
+        open_ = np.array([control.name not in controls for control in self._controls])
         row = support.typical_row(self._scaled[:, open_], self._costs(controls, labels))
-        return self._complete(controls, self._examples[row])
+        return {
+            control.name: controls.get(control.name, float(value))
+            for control, value in zip(self._controls, self._examples[row], strict=True)
+        }
 
     def near_measures(
         self, controls: Mapping[str, float], labels: Floats, measures: Floats, targets: Floats
@@ -96,7 +99,8 @@ class ControlImputer:
 
         measures (n, m): quantities of the captured clips. targets (m,): their target values.
         """
-        open_, deviation = self._open(controls), measures.std(axis=0)
+        deviation = measures.std(axis=0)
+        open_ = np.array([control.name not in controls for control in self._controls])
         deviation[deviation == 0.0] = 1.0
         away = (measures - targets) / (NEAR * deviation)
         costs = self._costs(controls, labels) + np.sum(np.square(away), axis=1)
@@ -121,9 +125,6 @@ class ControlImputer:
             support.neighbourhood(self._scaled[:, open_]),
         )
 
-    def _open(self, controls: Mapping[str, float]) -> Booleans:
-        return np.array([control.name not in controls for control in self._controls])
-
     def _costs(self, controls: Mapping[str, float], labels: Floats) -> Floats:
         """Return the squared distances (n,) of the clips from the given controls, in `NEAR`.
 
@@ -136,20 +137,13 @@ class ControlImputer:
                 for i in indices
             ]
         )
-        scaled = kriging_model.half_ranges(acting, self._low[indices], self._high[indices])
+        scaled = support.half_ranges(acting, self._low[indices], self._high[indices])
         costs = np.sum(np.square((self._scaled[:, indices] - scaled) / NEAR), axis=1)
         weights = np.ravel(labels)
         for columns in self._label_columns:
             if weights[columns].any():
                 costs = costs + OTHER_LABEL * (1.0 - self._labels[:, columns] @ weights[columns])
         return np.asarray(costs, np.float64)
-
-    def _complete(self, controls: Mapping[str, float], row: Floats) -> dict[str, float]:
-        """Return all controls: the given ones, the others from a row (d,)."""
-        return {
-            control.name: controls.get(control.name, float(value))
-            for control, value in zip(self._controls, row, strict=True)
-        }
 
 
 @dataclass(frozen=True)
@@ -188,7 +182,7 @@ class LocalImputer:
                 row[i] = min(control.values, key=lambda value: abs(value - row[i]))
         low, high = self.ranges
         start, end = (
-            kriging_model.half_ranges(point[self.open], low, high) for point in (self.clip, row)
+            support.half_ranges(point[self.open], low, high) for point in (self.clip, row)
         )
         inside = self.surroundings.pull_in(start, end)
         row[self.open] = 0.5 * (inside * (high - low) + low + high)

@@ -219,11 +219,26 @@ class QuestionValidator:
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
         plain = self._is_within_ranges(controls)
-        complete = controls if plain else self._complete_controls(controls, labels)
+        complete = controls
+        if not plain:
+            complete = {
+                control.name: check_control(control, controls[control.name])
+                for control in self._card.controls
+                if control.name in controls
+            }
+            if len(complete) < len(self._names):
+                complete = self.imputer.impute(complete, labels)
         # Equal questions have equal bytes: controls in the card's order, and 0 for -0.
         values = {name: float(complete[name]) + 0.0 for name, _, _ in self._ranges}
         point = list(values.values())
-        outside = () if plain else range_warnings(self._card.controls, point)
+        outside = tuple(
+            f"{name} = {value:g} {control.unit} lies outside what was sampled, "
+            f"{control.minimum:g} to {control.maximum:g} {control.unit}"
+            for control, (name, low, high), value in zip(
+                self._card.controls, self._ranges, point, strict=True
+            )
+            if not low <= value <= high
+        )
         supported = self.support.is_supported(point)
         warnings = (
             ()
@@ -256,17 +271,6 @@ class QuestionValidator:
                 return False
         return True
 
-    def _complete_controls(
-        self, controls: Mapping[str, float], labels: Floats
-    ) -> Mapping[str, float]:
-        """Return all controls: the given ones checked, the others as conditional means."""
-        checked = {
-            control.name: check_control(control, controls[control.name])
-            for control in self._card.controls
-            if control.name in controls
-        }
-        return checked if len(checked) == len(self._names) else self.imputer.impute(checked, labels)
-
     @cached_property
     def imputer(self) -> ControlImputer:
         """Conditional means for controls that are not given."""
@@ -297,15 +301,6 @@ def check_control(control: Control, number: float) -> float:
     return value
 
 
-def range_warnings(controls: Sequence[Control], point: Sequence[float]) -> tuple[str, ...]:
-    """Return a warning for each control whose value is outside its sampled range.
-
-    point: values (d,) in the order of the controls.
-    """
-    texts = (_range_warning(control, value) for control, value in zip(controls, point, strict=True))
-    return tuple(filter(None, texts))
-
-
 def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tuple[Deviation, ...]:
     """Return a deviation for each control that acts at another value than the given one.
 
@@ -324,9 +319,9 @@ def merge_warnings(
 ) -> tuple[str, ...]:
     """Return the warnings of a question with those of deviations, one for each control.
 
-    A deviation tells the sampled range, too, so it replaces the warning of `range_warnings`.
+    A deviation tells the sampled range, too, so it replaces the warning for it.
     """
-    if extrapolate == "ok" or not deviations:
+    if extrapolate == "ok":
         return tuple(warnings)
     sentences = {f"{change.control} =": change.sentence for change in deviations}
     # A range warning begins with the control's name, an equals sign and the value.
@@ -350,14 +345,4 @@ def gap_warning(subject: str, variance: float, limit: float) -> str:
     return (
         f"{subject} in a gap of what was sampled: nothing like it was captured "
         f"(variance {variance:.2g}, expected at most {limit:.2g})"
-    )
-
-
-def _range_warning(control: Control, value: float) -> str | None:
-    low, high = sampled_range(control)
-    if low <= value <= high:
-        return None
-    return (
-        f"{control.name} = {value:g} {control.unit} lies outside what was sampled, "
-        f"{control.minimum:g} to {control.maximum:g} {control.unit}"
     )

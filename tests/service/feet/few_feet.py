@@ -9,7 +9,7 @@ from posefield.common.frame_groups import FrameRows, of_lengths
 from posefield.common.units import UP
 from posefield.feet import ball_path, body_plans, smooth_change, stance_rows
 from posefield.feet.footsteps import PlanRequest
-from posefield.feet.stance_rows import Cycle, FootRows, Interval
+from posefield.feet.stance_rows import NO_CYCLE, Cycle, FootRows
 from posefield.locomotion import floor_plane
 from posefield.motion import contact_detection
 
@@ -39,7 +39,7 @@ class PlannedPath(NamedTuple):
     """Path of one foot (F, 3), m, its stances, and where it stands."""
 
     positions: np.ndarray
-    stances: tuple[Interval, ...]
+    stances: tuple[range, ...]
     anchors: np.ndarray
 
 
@@ -62,7 +62,7 @@ def foot_rows(paths, foot, arms=None, flat=0.0):
         np.array([own.rate for own in paths], float),
         np.array([own.cycle is not None for own in paths]),
     )
-    cycles = [own.cycle or Cycle(0.0, 0.0) for own in paths]
+    cycles = [own.cycle or NO_CYCLE for own in paths]
     places = np.concatenate([own.positions for own in paths])
     walking = [np.zeros(len(own), bool) if own.walking is None else own.walking for own in paths]
     every = (foot.height, foot.swing, foot.longest_swing, foot.clearance)
@@ -90,7 +90,7 @@ def plan_path(path, found, foot, goal=None, feet=None):
     goal = np.full(path.positions.shape, np.nan) if goal is None else goal
     runs = stance_rows.from_intervals([found])
     positions = ball_path.plan_paths(feet or foot_rows([path], foot), runs, goal)
-    anchors = positions[[own.begin for own in found]].reshape(-1, 3)
+    anchors = positions[[own.start for own in found]].reshape(-1, 3)
     return PlannedPath(positions, tuple(found), anchors)
 
 
@@ -104,5 +104,5 @@ def change_smoothly(path, held, rate, foot, cycle=None):
 def runs_alone(down, cyclic):
     """Return the intervals of true frames of one row, in order."""
     runs = contact_detection.runs(down, cyclic)
-    intervals = [Interval(int(run[0]), int(run[0]) + len(run)) for run in runs]
-    return sorted(intervals, key=lambda interval: interval.begin)
+    intervals = [range(int(run[0]), int(run[0]) + len(run)) for run in runs]
+    return sorted(intervals, key=lambda interval: interval.start)

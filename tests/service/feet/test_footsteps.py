@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from few_feet import Motion, frame_rows, plan_feet
 
-from posefield.feet import foot_placement, footsteps, heel_roll, limbs, stance_rows, two_bone
+from posefield.feet import ball_path, body_plans, foot_placement, footsteps, limbs, stance_rows
 from posefield.feet.footsteps import Led
-from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.contact_detection import FootContact
 from posefield.question.motion_question import Floor
@@ -32,7 +31,7 @@ FEET = (3, 6, 9, 12)
 
 
 def body(feet=FEET, held=()):
-    return footsteps.choose_limbs(PARENTS, BONES, feet, held).character
+    return footsteps.choose_limbs(PARENTS, BONES, feet, held)[0]
 
 
 def sliding(height=0.78, speed=0.3):
@@ -75,7 +74,7 @@ def test_four_feet_stand_and_step():
     for foot, steps in enumerate(plan.steps):
         assert len(steps.stances) == 2
         for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
-            apart = feet[stance.begin : stance.end, foot] - anchor
+            apart = feet[stance.start : stance.stop, foot] - anchor
             assert np.abs(apart).max() < 1e-9
     ((before, after),) = foot_placement.foot_paths([plan])
     assert np.abs(after - feet).max() < 1e-9
@@ -126,7 +125,7 @@ def test_feet_stand_and_swing_on_a_given_floor(floor):
     for foot, steps in enumerate(plan.steps):
         assert steps.stances == usual.steps[foot].stances
         for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
-            assert np.abs(feet[stance.begin : stance.end, foot] - anchor).max() < 1e-9
+            assert np.abs(feet[stance.start : stance.stop, foot] - anchor).max() < 1e-9
     if floor.is_level:
         assert plan.lowered - usual.lowered == pytest.approx(-floor.height)
     else:
@@ -142,7 +141,7 @@ def test_feet_are_tilted_as_the_floor_is():
     rotations = np.zeros((FRAMES, 18, 4))
     rotations[..., 0], rotations[:, :14] = 1.0, motion.rotations
     whole = Motion(rotations, motion.roots, RATE)
-    character = footsteps.choose_limbs(parents, bones, balls, ()).character
+    character = footsteps.choose_limbs(parents, bones, balls, ())[0]
     assert [leg.lower for leg in character.legs] == list(FEET)
     height = skeleton.positions(parents, rotations, skeleton.translations(bones, motion.roots))
     known = [FootContact(ball, float(height[0, ball, 1]), 0.3, 0.5, 0.05) for ball in balls]
@@ -154,7 +153,7 @@ def test_feet_are_tilted_as_the_floor_is():
         arm, tilted = after[:, ball] - after[:, leg], floor.tilted(height[0, ball] - height[0, leg])
         # Stretched legs lift their heels.
         lifted = np.arccos(np.clip(arm @ tilted / (tilted @ tilted), -1.0, 1.0))
-        assert np.median(lifted) < 0.1 and lifted.max() < heel_roll.MOST_LIFT
+        assert np.median(lifted) < 0.1 and lifted.max() < ball_path.MOST_LIFT
     ((_, paths),) = foot_placement.foot_paths([plan])
     assert np.abs(paths - after[:, list(balls)]).max() < 1e-9
 
@@ -173,7 +172,7 @@ def test_a_floor_out_of_reach_of_a_fixed_body_is_told():
 def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more():
     motion = sliding(speed=1.2)
     plan = plan_feet(body(), motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4)))
-    assert 0.0 < (plan.lowered - plan.grounded).max() <= two_bone.MOST + 1e-12
+    assert 0.0 < (plan.lowered - plan.grounded).max() <= body_plans.MOST + 1e-12
     assert all(len(stance) < FRAMES for steps in plan.steps for stance in steps.stances)
 
 
@@ -181,10 +180,10 @@ def test_the_cover_is_smooth_and_nowhere_below(rng):
     needed = np.maximum(rng.normal(size=200), 0.0)
     for cyclic in (False, True):
         rows = frame_rows([needed[:150], needed[150:]], RATE, cyclic)
-        found = two_bone.cover(needed, rows)
+        found = body_plans.cover(needed, rows)
         assert (found >= needed - 1e-12).all()
         # Of each motion alone, the frames of the other are no neighbours.
-        alone = two_bone.cover(needed[:150], frame_rows([needed[:150]], RATE, cyclic))
+        alone = body_plans.cover(needed[:150], frame_rows([needed[:150]], RATE, cyclic))
         assert (found[:150] == alone).all()
     assert limbs.find_limb(PARENTS, BONES, 3) is not None
 
@@ -219,10 +218,10 @@ def test_a_led_foot_is_where_the_motion_has_it_and_stands_before_and_after():
     assert np.linalg.norm(feet[KICK, 0] - wanted[KICK, 0]) < 1e-9
     # Half a captured swing before the kick and after it the foot does not stand.
     stances = plan.steps[0].stances
-    assert [own.end <= KICK - 9 or own.begin > KICK + 9 for own in stances] == [True, True]
+    assert [own.stop <= KICK - 9 or own.start > KICK + 9 for own in stances] == [True, True]
     assert plan.steps[0].anchors[:, 1] == pytest.approx(0.04, abs=0.02)
     for stance, anchor in zip(stances, plan.steps[0].anchors, strict=True):
-        apart = feet[stance.begin : stance.end, 0] - anchor
+        apart = feet[stance.start : stance.stop, 0] - anchor
         assert np.abs(apart[:, ::2]).max() < 1e-9 and np.abs(apart[:, 1]).max() < stance_rows.SUNK
     assert feet[:, 0, 1].min() > plan.steps[0].anchors[0, 1] - stance_rows.SUNK
     # A foot that is not led is elsewhere, and one that is never planned slides.
@@ -235,8 +234,8 @@ def test_a_foot_that_is_led_on_the_floor_stands_there():
     motion = sliding()
     plan = planned(motion, led_at([10]))
     wanted = feet_of(motion)[10, 0]
-    (stance,) = (own for own in plan.steps[0].stances if own.begin <= 10 < own.end)
-    assert stance == Interval(0, 20)
+    (stance,) = (own for own in plan.steps[0].stances if own.start <= 10 < own.stop)
+    assert stance == range(20)
     assert plan.steps[0].anchors[0] == pytest.approx(wanted, abs=1e-9)
     assert planned(motion).steps[0].anchors[0] != pytest.approx(wanted, abs=1e-3)
 
@@ -244,7 +243,7 @@ def test_a_foot_that_is_led_on_the_floor_stands_there():
 def test_the_pelvis_is_lowered_no_more_than_a_led_limb_reaches():
     motion = kicking()
     plan = planned(motion, led_at([KICK]))
-    _, below = plan.led.room(plan.poses, plan.character.limbs)
+    _, below = plan.led.room(plan.poses, plan.character.legs + plan.character.kept)
     assert np.isinf(below).sum() == FRAMES - 1
     assert plan.lowered[KICK] <= below[KICK] + 1e-12
     root = footsteps.always(4, 0, FRAMES)

@@ -5,9 +5,9 @@ import pytest
 from few_feet import FootPath, foot_rows, plan_path
 
 from posefield.common.units import UP
-from posefield.feet import heel_roll, limbs, stance_rows, two_bone
+from posefield.feet import ball_path, limbs, stance_rows
 from posefield.feet.limbs import Limb
-from posefield.feet.stance_rows import Cycle, Interval
+from posefield.feet.stance_rows import Cycle
 from posefield.locomotion import floor_plane
 from posefield.motion import quat
 from posefield.motion.contact_detection import FootContact
@@ -15,7 +15,7 @@ from posefield.motion.contact_detection import FootContact
 RATE, FRAMES = 60.0, 60
 FOOT = FootContact(0, 0.04, 0.3, 0.5, 0.05)
 LENGTH, FLAT = 0.13, -0.3
-ANKLE, HEEL = FOOT.height - LENGTH * np.sin(FLAT), heel_roll.HEEL * LENGTH * np.cos(FLAT)
+ANKLE, HEEL = FOOT.height - LENGTH * np.sin(FLAT), ball_path.HEEL * LENGTH * np.cos(FLAT)
 
 
 def rolling(heading=0.4, drift=0.0):
@@ -35,11 +35,11 @@ def rolling(heading=0.4, drift=0.0):
     return ball, arms, floor_plane.at_height(back.real * ahead, back.imag)
 
 
-@pytest.mark.parametrize("cycle", [None, Cycle(1.0 + 0.2j, 0.3)])
+@pytest.mark.parametrize("cycle", [None, Cycle(1.0 + 0.2j, np.exp(0.3j))])
 def test_the_heel_keeps_its_place_and_then_the_ball(cycle):
     ball, arms, back = rolling(drift=0.05)
     feet = foot_rows([FootPath(ball, RATE, cycle)], FOOT, arms, FLAT)
-    stance = Interval(0, 50)
+    stance = range(50)
     path = plan_path(FootPath(ball, RATE, cycle), [stance], FOOT, feet=feet).positions
     heel = (path - arms + back)[:12]
     assert np.abs(heel - heel[0]).max() < 2e-3 and np.abs(heel @ UP).max() < 1e-3
@@ -52,18 +52,18 @@ def test_the_heel_keeps_its_place_and_then_the_ball(cycle):
 def test_a_foot_is_flat_at_the_pitch_that_it_keeps():
     ball, arms, _ = rolling()
     feet = foot_rows([FootPath(ball, RATE)], FOOT, arms)
-    contacts = stance_rows.from_intervals([[Interval(0, 50)]])
-    assert heel_roll.flat_pitches(arms, contacts, feet.rows) == pytest.approx(FLAT, abs=0.02)
+    contacts = stance_rows.from_intervals([[range(50)]])
+    assert ball_path.flat_pitches(arms, contacts, feet.rows) == pytest.approx(FLAT, abs=0.02)
 
 
 def test_frames_in_which_the_foot_moves_are_no_stance():
     ball, arms, _ = rolling()
     ball[45:, 2] += 0.01 * np.arange(15.0) ** 1.5
     feet = foot_rows([FootPath(ball, RATE)], FOOT, arms, FLAT)
-    ends = heel_roll.trimmed(stance_rows.from_intervals([[Interval(3, 56)]]), feet)
+    ends = ball_path.trimmed(stance_rows.from_intervals([[range(3, 56)]]), feet)
     assert ends.begins.tolist() == [3] and 45 <= ends.ends[0] <= 48
     # A motion that ends in a stance goes on in it.
-    last = heel_roll.trimmed(stance_rows.from_intervals([[Interval(3, FRAMES)]]), feet)
+    last = ball_path.trimmed(stance_rows.from_intervals([[range(3, FRAMES)]]), feet)
     assert last.ends.tolist() == [FRAMES]
 
 
@@ -87,12 +87,12 @@ def test_a_leg_is_never_longer_than_straight_and_stays_where_it_is():
     poses = legs(bends)
     source = np.linalg.norm(poses.position(3) - poses.position(1), axis=-1)
     more = np.tile(np.linspace(-0.1, 0.1, 41), 3)
-    chord = two_bone.leg_chord(poses, LEG, source + more)
+    chord = limbs.leg_chord(poses, LEG, source + more)
     assert chord[more == 0.0] == pytest.approx(source[more == 0.0], abs=1e-12)
     assert chord.max() < 0.8 and (np.diff(chord.reshape(3, 41)) > 0.0).all()
     # A straight leg presses its heel before it bends; a bent knee follows nearly as far.
     pressed = (chord - source - more)[more < 0]
-    assert 0.0 <= pressed.min() and 0.8 * two_bone.PRESS < pressed.max() <= two_bone.PRESS
+    assert 0.0 <= pressed.min() and 0.8 * limbs.PRESS < pressed.max() <= limbs.PRESS
     assert pressed[-20:].max() < 1e-4 and np.abs(chord - source - more)[-21:].max() < 0.02
 
 
@@ -101,8 +101,8 @@ def test_a_lifted_heel_leaves_the_ball_and_gives_the_leg_its_length():
     arm = poses.position(4) - poses.position(3)
     away = np.array([0.0, -0.005, -0.02]) * np.arange(5.0)[:, None]
     offset = poses.position(1) - poses.position(4) - away
-    chord = two_bone.leg_chord(poses, LEG, np.linalg.norm(offset + arm, axis=-1))
-    turns = heel_roll.heel_turns(offset, arm, chord)
+    chord = limbs.leg_chord(poses, LEG, np.linalg.norm(offset + arm, axis=-1))
+    turns = ball_path.heel_turns(offset, arm, chord)
     lifted = quat.rotate(turns, arm)
     assert np.linalg.norm(offset + lifted, axis=-1) == pytest.approx(chord, abs=1e-9)
     assert (-lifted @ UP)[1:].min() > (-arm @ UP).max()
@@ -112,7 +112,7 @@ def test_a_lifted_heel_leaves_the_ball_and_gives_the_leg_its_length():
 def test_ends_of_toes_are_not_below_the_floor():
     pitch = np.array([-1.2, -0.4, 0.0, 0.5])
     toe = 0.06 * floor_plane.at_height(np.cos(pitch) * np.exp(0.3j), np.sin(pitch))
-    bent = quat.rotate(heel_roll.toe_bends(toe, np.full(4, -0.01)), toe)
+    bent = quat.rotate(ball_path.toe_bends(toe, np.full(4, -0.01)), toe)
     assert bent @ UP == pytest.approx(np.maximum(toe @ UP, -0.01), abs=1e-9)
     assert np.linalg.norm(bent, axis=-1) == pytest.approx(0.06)
     assert bent[2:] == pytest.approx(toe[2:])

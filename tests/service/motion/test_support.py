@@ -5,7 +5,7 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF
 
-from posefield.kriging import kriging_model, support
+from posefield.kriging import support
 from posefield.kriging.support import NUGGET, covariances
 from posefield.synthesis import trust
 
@@ -36,8 +36,8 @@ def judged(own, controls, points, scale=support.SCALE):
     """Variance (B,) by scikit-learn."""
     ends = controls.min(axis=0), controls.max(axis=0)
     process = GaussianProcessRegressor(RBF(scale), alpha=support.NUGGET, optimizer=None)
-    process.fit(kriging_model.half_ranges(controls, *ends), np.zeros(len(controls)))
-    return process.predict(kriging_model.half_ranges(points, *ends), return_std=True)[1] ** 2
+    process.fit(support.half_ranges(controls, *ends), np.zeros(len(controls)))
+    return process.predict(support.half_ranges(points, *ends), return_std=True)[1] ** 2
 
 
 def test_left_out_each_sample_is_as_the_others_support_it(own, controls):

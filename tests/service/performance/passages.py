@@ -15,7 +15,7 @@ FEET = (3, 6)
 
 def character():
     """Return the character."""
-    return footsteps.choose_limbs(PARENTS, BONES, FEET, ()).character
+    return footsteps.choose_limbs(PARENTS, BONES, FEET, ())[0]
 
 
 def smooth(seed, frames=60, size=0.3, speed=1.0):

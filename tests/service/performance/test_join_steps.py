@@ -48,7 +48,7 @@ def slides(passage):
     found = []
     for foot, steps in enumerate(plan.steps):
         for stance in steps.stances:
-            path = feet[stance.begin : stance.end, foot][:, [0, 2]]
+            path = feet[stance.start : stance.stop, foot][:, [0, 2]]
             found.append(np.linalg.norm(path - path[0], axis=-1).max())
     return found
 

@@ -8,7 +8,6 @@ import pytest
 import rig_files
 
 from posefield.common.errors import InvalidField
-from posefield.feet.stance_rows import Interval
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import StanceResult
@@ -123,7 +122,7 @@ def test_an_elbow_bends_about_its_axis_where_a_hand_is_moved(walk, roles):
 def test_a_foot_stands_where_copied_orientations_put_it_on_average():
     copied, still = np.zeros((20, 1, 3)), np.zeros((20, 1, 3))
     copied[:, 0, 2] = np.linspace(0.0, 0.2, 20)
-    feet = planted_legs.SourceFeet(("leftFoot",), still, ((Interval(8, 18),),), np.zeros(1))
+    feet = planted_legs.SourceFeet(("leftFoot",), still, ((range(8, 18),),), np.zeros(1))
     found = planted_legs.plan_paths(feet, copied, np.zeros(1), 60.0)
     assert found[8:18, 0, 2] == pytest.approx(copied[8:18, 0, 2].mean())
 

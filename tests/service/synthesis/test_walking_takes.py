@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.feet import two_bone
+from posefield.feet import body_plans
 from posefield.inference import session
 from posefield.inference.level_selection import Camera
-from posefield.kriging import kriging_model
+from posefield.kriging import support
 from posefield.locomotion import floor_plane, gait, locomotion_plan, walking_crowd
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
@@ -146,7 +146,7 @@ def test_walkers_stay_on_their_paths(model, walk):
 def test_feet_of_takes_stand(model, walk):
     _, made = built(model, walk, take="index", detail=True)
     assert 100.0 * made.feet.skate.mean() < 5.0 < 100.0 * made.feet.skate_before.mean()
-    assert made.feet.drift.max() < 1e-6 and made.feet.lowered.max() <= two_bone.MOST
+    assert made.feet.drift.max() < 1e-6 and made.feet.lowered.max() <= body_plans.MOST
 
 
 def test_deviations_between_knots_are_those_of_the_field(model, walk):
@@ -175,7 +175,7 @@ def test_variances_of_deviations_are_those_of_kriging(model, twins):
     found = model.solver.variation.along_paths(controls, labels, seeds)[:, 0]
     ((sigma,),) = model.session.run(controls[:1, 0], None, "sigma", labels=labels[:1])
     ranges = model.session.card.sampled_ranges
-    assert np.abs(kriging_model.half_ranges(controls[0, 0], *ranges)).max() <= 1.0
+    assert np.abs(support.half_ranges(controls[0, 0], *ranges)).max() <= 1.0
     assert found.var() == pytest.approx(float(sigma) ** 2, rel=0.1)
     assert found.var() != pytest.approx(1.5 * float(sigma) ** 2, rel=0.1)
 
