@@ -34,6 +34,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "results/feet.md": lambda: data_pages.results("feet"),
     "results/support.md": lambda: data_pages.results("support"),
     "results/performances.md": lambda: data_pages.results("performances"),
+    "results/pedestrians.md": lambda: data_pages.results("pedestrians"),
     "results/discovery.md": lambda: data_pages.results("discovery"),
     "results/scale.md": lambda: data_pages.results("scale"),
     "results/speed.md": lambda: data_pages.results("speed"),

@@ -20,6 +20,7 @@ SPEED_FILES = (
 SPEED = tuple(f"speed/{name}" for name in SPEED_FILES)
 JUDGED = (
     "performed",
+    "tracks",
     "joins",
     "joint_angles",
     "target_frames",

@@ -8,7 +8,7 @@ Between steps the pose is blended into a standing one.
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,9 @@ MOST_CADENCE = 1.3
 """Most cycles a second of steps that are not forward."""
 POWER = 3.0
 """Exponent of the sum of the cadences of the way forward, to the side, and of the turn."""
+LEG_SHARE = 0.9
+"""Length of a leg over the height of the root."""
+Numbers = TypeVar("Numbers", Floats, FloorVectors)
 SWING = 0.36
 """Share of the cycle in which a foot swings and takes a new heading."""
 
@@ -51,7 +54,8 @@ class Stepping:
     """Steps and standing of N characters in F frames.
 
     shares: of the standing pose (N, F). firm: share (N, F) to which both feet stand. turns: of each
-    leg about the vertical (N, F, 2), rad.
+    leg about the vertical (N, F, 2), rad. shifts: of each foot (N, F, 2), m, in the frame that
+    travels.
     """
 
     poses: StandingPoses
@@ -59,6 +63,7 @@ class Stepping:
     shares: CharacterFrames
     firm: CharacterFrames
     turns: Annotated[Floats, "characters frames 2"]
+    shifts: Annotated[FloorVectors, "characters frames 2"]
 
     def apply(
         self,
@@ -74,7 +79,9 @@ class Stepping:
         rotations = quat.nlerp(walked.rotations, poses.rotations[combinations], share)
         heights = walked.heights + share * (poses.heights[combinations] - walked.heights)
         points = walked.places + share * (poses.points[combinations] - walked.places)
-        turn_legs(self.parents, rotations, poses.hips, self.turns[pair])
+        lengths = LEG_SHARE * poses.heights[combinations]
+        shifts = self.shifts[pair] / lengths[:, None]
+        turn_legs(self.parents, rotations, poses.hips, self.turns[pair], shifts)
         return RelativePoses(rotations, heights, points, walked.curves)
 
 
@@ -83,13 +90,23 @@ def turn_legs(
     rotations: Annotated[Floats, "poses joints 4"],
     hips: tuple[int, ...],
     turns: Annotated[Floats, "poses legs"],
+    tilts: Annotated[FloorVectors, "poses legs"] | None = None,
 ) -> None:
-    """Turn the legs of poses (K, J, 4) about the vertical through their hips (K, 2), rad."""
-    for hip, turn in zip(hips, turns.T, strict=True):
+    """Turn the legs of poses (K, J, 4) about the vertical through their hips (K, 2), rad.
+
+    tilts: sideways and ahead, by angles (K, 2) towards a direction over the floor, rad.
+    """
+    for leg, hip in enumerate(hips):
         above = rotations[:, 0]
         for joint in skeleton.joint_chain(parents, hip)[1:-1]:
             above = quat.mul(above, rotations[:, joint])
-        turned = quat.mul(quat.from_axis_angle(UP, turn), quat.mul(above, rotations[:, hip]))
+        turn = quat.from_axis_angle(UP, turns[:, leg])
+        if tilts is not None:
+            # A foot below the hip moves towards x as the leg turns about z.
+            tilt = tilts[:, leg]
+            axis = np.stack([-tilt.real, np.zeros(len(tilt)), tilt.imag], axis=-1)
+            turn = quat.mul(quat.exp(axis), turn)
+        turned = quat.mul(turn, quat.mul(above, rotations[:, hip]))
         rotations[:, hip] = quat.mul(quat.conj(above), turned)
 
 
@@ -113,22 +130,22 @@ def cadences(
     return np.asarray((walked**POWER + stepped**POWER) ** (1.0 / POWER))
 
 
-def leg_turns(
-    phases: Frames, beyond: Frames, passings: Annotated[Floats, "2"]
-) -> Annotated[Floats, "frames 2"]:
-    """Return the turns of both legs (F, 2), rad, with which feet keep their headings in stances.
+def stepped(
+    phases: Frames, beyond: Annotated[Numbers, "frames"], passings: Annotated[Floats, "2"]
+) -> Annotated[Numbers, "frames 2"]:
+    """Return the changes of both legs (F, 2) with which feet keep their places in stances.
 
-    phases: of the cycle (F,), without wrapping. beyond: turns of the body beyond those of the model
-    (F,), rad. passings: phase at which each foot swings past the other one. A foot has the heading
-    of the body in the middle of its stance, and takes the next one while it swings.
+    phases: of the cycle (F,), without wrapping. beyond: turns, rad, or ways, m, of the body beyond
+    those of the model (F,). passings: phase at which each foot swings past the other one. A foot
+    has the place of the body in the middle of its stance, and goes to the next one while it swings.
     """
-    turns = np.empty((len(phases), 2))
-    # Phases may rest, where the turn does, too.
+    changes = np.empty((len(phases), 2), beyond.dtype)
+    # Phases may rest, where the body does, too.
     rising = phases + 1e-9 * np.arange(len(phases))
     for foot, passing in enumerate(passings.tolist()):
         cycles = phases - passing
         swing = np.round(cycles)
         before, after = (np.interp(passing + swing + half, rising, beyond) for half in (-0.5, 0.5))
         share = quat.smoothstep(np.clip((cycles - swing) / SWING + 0.5, 0.0, 1.0))
-        turns[:, foot] = before + share * (after - before) - beyond
-    return turns
+        changes[:, foot] = before + share * (after - before) - beyond
+    return changes

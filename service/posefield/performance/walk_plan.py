@@ -273,7 +273,7 @@ def _leg_turns(
     passings = np.empty(2)
     for passing in pose.passings:
         passings[passing.swinging] = passing.phase
-    return stepping.leg_turns(phases, np.cumsum(beyond) / RATE, passings)
+    return stepping.stepped(phases, np.cumsum(beyond) / RATE, passings)
 
 
 def _route(

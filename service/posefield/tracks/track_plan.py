@@ -118,6 +118,7 @@ class _PersonPlan:
     shares: Frames
     firm: Frames
     turns: Annotated[Floats, "frames 2"]
+    shifts: Annotated[FloorVectors, "frames 2"]
 
 
 def plan_people(
@@ -154,7 +155,7 @@ def plan_people(
     steps = None
     if walkers.standing is not None:
         parents = gait.session.card.skeleton.parents
-        fields = (columns[name] for name in ("shares", "firm", "turns"))
+        fields = (columns[name] for name in ("shares", "firm", "turns", "shifts"))
         steps = Stepping(walkers.standing, parents, *fields)
     return LocomotionPlan(
         controls,
@@ -203,10 +204,15 @@ def _plan_person(
     shares = 1.0 - steps * np.maximum(LEAST_WALKED, np.sqrt(speed))
     shares = smooth(shares.astype(complex), EASE * rate, fixed=False).real
     offsets = np.interp(forward, table.speeds, table.offsets)
-    turns = np.zeros((frames, 2))
+    turns, shifts = np.zeros((frames, 2)), np.zeros((frames, 2), complex)
     if standing is not None:
-        beyond = np.cumsum(turning / rate - walked * durations * np.gradient(phases))
-        turns = stepping.leg_turns(phases, beyond, standing.passings[labels])
+        # Of the turn and the way since the middle of a stance the stride has a part in its pose.
+        passings = standing.passings[labels]
+        strides = (1.0 - shares)[:, None] * stepping.stepped(phases, phases, passings)
+        turns = stepping.stepped(phases, headings, passings)
+        turns -= (walked * durations)[:, None] * strides
+        shifts = stepping.stepped(phases, points, passings) * np.exp(-1j * headings)[:, None]
+        shifts -= lengths[:, None] * strides
         offsets = offsets + shares * (standing.points[labels] - offsets)
     else:
         shares = np.zeros(frames)
@@ -221,6 +227,7 @@ def _plan_person(
         shares,
         quat.smoothstep(np.clip(1.0 - steps, 0.0, 1.0)),
         turns,
+        shifts,
     )
 
 
