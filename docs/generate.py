@@ -37,6 +37,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "results/pedestrians.md": lambda: data_pages.results("pedestrians"),
     "results/discovery.md": lambda: data_pages.results("discovery"),
     "results/scale.md": lambda: data_pages.results("scale"),
+    "results/robots.md": lambda: data_pages.results("robots"),
     "results/speed.md": lambda: data_pages.results("speed"),
 }
 

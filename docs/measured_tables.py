@@ -39,6 +39,14 @@ STRIDE_COLUMNS = [
     "peak of a leg, m/s²",
     "skate, cm/s",
 ]
+GAIT_COLUMNS = [
+    "method",
+    "joints, degrees",
+    "worst gait, degrees",
+    "bodies, cm",
+    "travel, cm/s",
+    "turn, degrees/s",
+]
 PIXELS, FIELD = 1080, math.pi / 3.0
 """Height of the image, pixels, and vertical field of view, rad, for the distance of a level."""
 LEVELS_OF = "cmu_walk"
@@ -57,6 +65,12 @@ WISHES = {
         "processor time of reading and features": 10.0,
     },
     "found_families": {"clips of families: wrong": 5.0, "all actions: cuts missed": 5.0},
+    "robot_gaits": {
+        "tenths: joints": 0.6,
+        "travel": 0.5,
+        "seam": 1e-7,
+        "factor between error and sigma": 1.1,
+    },
     "scaled": {
         "92 clips: processor time": 8.0,
         "2,000 clips: distance to the truth": 0.4,
@@ -109,6 +123,13 @@ def recipes() -> Rows:
             f"{100 * own['truncation_rms_m']:.2f} ({100 * own['truncation_p99_m']:.1f})",
             f"{100 * own['leave_one_out_rms_m']:.1f}",
         ]
+
+
+def gaits(trial: str) -> Rows:
+    """Yield the errors of each method on the gaits of a robot that are left out together."""
+    for row in read("robot_gaits")["trials"][trial]["methods"]:
+        keys = ("joints_deg", "worst_gait_deg", "bodies_cm", "speed_cm_s", "turn_deg_s")
+        yield [row["method"], *(f"{row[key]:.2f}" for key in keys)]
 
 
 def levels() -> Rows:

@@ -28,6 +28,7 @@ JUDGED = (
     "found_families",
     "found_models",
     "proposed_controls",
+    "robot_gaits",
     "roles",
     "scaled",
     "strides",
@@ -74,6 +75,8 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
         tables.support(),
     ),
     "stride_speeds": lambda: (measured_tables.STRIDE_COLUMNS, measured_tables.stride_speeds()),
+    "robots_tenths": lambda: (measured_tables.GAIT_COLUMNS, measured_tables.gaits("tenths")),
+    "robots_grid": lambda: (measured_tables.GAIT_COLUMNS, measured_tables.gaits("grid")),
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
     **{
@@ -94,6 +97,8 @@ REMARKS: dict[str, Callable[[], str]] = {
 """A sentence made of the rows of a table, for some of them."""
 
 ORIGINS: dict[str, str] = {name: name for name in (*SPEED, *JUDGED)} | {
+    "robots_tenths": "robot_gaits",
+    "robots_grid": "robot_gaits",
     "recipes": "models",
     "levels": "models",
     "stride_speeds": "strides",

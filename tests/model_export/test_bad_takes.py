@@ -77,7 +77,7 @@ def test_probe_reports_readable_files_and_names_the_others(posefield, folder):
         assert name in warned
 
 
-@pytest.mark.parametrize("suffix", [".fbx", ".npz", ".asf"])
+@pytest.mark.parametrize("suffix", [".fbx", ".npy", ".asf"])
 def test_every_command_refuses_a_format_with_the_way_out(posefield, tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(b"x")

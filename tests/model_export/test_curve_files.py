@@ -156,3 +156,21 @@ def test_a_value_outside_its_range_is_refused(folder):
 def test_keys_that_contradict_each_other_are_refused(keys, said):
     with pytest.raises(ValidationError, match=re.escape(said)):
         Recipe.model_validate({**plain_recipe(), "curves": keys})
+
+
+def live_link(numbers, frames=FRAMES):
+    """Rows as Live Link Face writes them, at 30 frames a second, the numbers of their frames."""
+    head = "Timecode,BlendShapeCount,jawOpen,smile"
+    rows = zip(numbers, values(0, frames), strict=True)
+    cells = (f"10:59:{58 + n // 30}:{n % 30}.25,61,{a:.4f},{b:.4f}" for n, (a, b) in rows)
+    return "\n".join([head, *cells])
+
+
+def test_rows_of_live_link_face_are_frames(folder):
+    plain = read(folder)
+    (folder / "0.curves.csv").write_text(live_link(range(FRAMES)))
+    (first, *_) = read(folder)
+    np.testing.assert_array_equal(first.clip.curves.values, plain[0].clip.curves.values)
+    (folder / "0.curves.csv").write_text(live_link([*range(9), *range(10, FRAMES + 1)]))
+    with pytest.raises(RecipeError, match=r"csv:11: Timecode 10:59:58:10.25 lies 0.067 s behind"):
+        ingest.ingest(recipe_with(curves={"suffix": ".curves.csv"}, source={"rate": 30.0}), folder)

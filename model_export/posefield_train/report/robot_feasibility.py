@@ -102,12 +102,12 @@ class Feasibility:
 
     def _charts(self) -> Section:
         controls = self.model.synthesizer.session.card.controls
-        shown = [each for each in QUANTITIES if _largest(self.rows, each.key) is not None]
+        quantities = [each for each in QUANTITIES if _largest(self.rows, each.key) is not None]
         paragraphs = (
             "Each point is a command over the captured ranges: blue within the bound, which is a "
             "line, orange beyond it, grey where commands have no captured motions near.",
         )
-        charts = tuple(_chart(self.rows, quantity, controls) for quantity in shown)
+        charts = tuple(_chart(self.rows, quantity, controls) for quantity in quantities)
         return Section("commands", "Over the commands", paragraphs, (), charts)
 
     def _table(self) -> Section:

@@ -129,10 +129,10 @@ class Dynamics:
         scale = np.array([1.0, 1.0, 1.0, 10.0, 10.0, 10.0]) / self._weight
         matrix = np.vstack([scale[:, None] * edges[:, self._base].T, SMALL * np.eye(len(edges))])
         sizes, _ = nnls(matrix, np.concatenate([scale * needed, np.zeros(len(edges))]))
-        given = sizes @ edges
-        lack = float(np.linalg.norm(needed[:3] - given[self._base][:3]) / self._weight)
+        floor = sizes @ edges
+        lack = float(np.linalg.norm(needed[:3] - floor[self._base][:3]) / self._weight)
         distance = _beyond(self._zero_moment_point(state, needed), np.array(pressed)[:, :2])
-        return (forces - given)[self._dofs], distance, lack
+        return (forces - floor)[self._dofs], distance, lack
 
     def _zero_moment_point(self, state: "mujoco.MjData", needed: Floats) -> Floats:
         """Return the point (2,) of the floor about which the needed wrench has no level moment."""

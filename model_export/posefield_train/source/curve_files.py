@@ -19,6 +19,8 @@ from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.motion_file import ReadOptions
 
 FRAME = "frame"
+TIMECODE, COUNT = "Timecode", "BlendShapeCount"
+"""First columns of Live Link Face, which writes a row for each frame that it has."""
 RESTING_JOINT = "Root"
 """Name of the only joint of clips without a skeleton."""
 
@@ -27,7 +29,7 @@ def _open(row: ClipRow, rate: float | None) -> ClipTable:
     """Return the table of a row's curves; of a file of motions the weights of blend shapes."""
     file = row.curve_file
     if PurePosixPath(file.name).suffix.lower() not in motion_readers.SUFFIXES:
-        return _expect_frames(clip_table.open_table(file))
+        return _expect_frames(clip_table.open_table(file), rate)
     curves = motion_readers.read(file, ReadOptions(rate, row.animation)).curves
     columns = {name: map(repr, values.tolist()) for name, values in curves.items()}
     cells = zip(*columns.values(), strict=True)
@@ -100,8 +102,13 @@ def resting_clip(curves: CurveValues, rate: float) -> Clip:
     return Clip(joints, rotations, np.zeros((frames, 1, 3)), rate, curves)
 
 
-def _expect_frames(table: ClipTable) -> ClipTable:
-    """Return a table of curves; RecipeError unless its column of frames counts 0, 1, 2, …"""
+def _expect_frames(table: ClipTable, rate: float | None = None) -> ClipTable:
+    """Return a table of curves; RecipeError unless its column of frames counts 0, 1, 2, …
+
+    rate: frames a second, by which the time codes of Live Link Face count frames; None leaves them.
+    """
+    if table.columns[:2] == [TIMECODE, COUNT]:
+        return _numbered(table, rate)
     table.require({FRAME: "number of the frame, from 0"})
     numbers = [(line, table.frame(line, record, FRAME)) for line, record in table.records]
     for (_, before), (line, frame) in pairwise([(0, -1), *numbers]):
@@ -109,6 +116,37 @@ def _expect_frames(table: ClipTable) -> ClipTable:
             at = f"after {before}" if before >= 0 else "first"
             raise RecipeError(table.name, f"frame {frame} {at}, expected {before + 1}", line)
     return table
+
+
+def _numbered(table: ClipTable, rate: float | None) -> ClipTable:
+    """Return a table of Live Link Face with numbers of frames in place of time codes.
+
+    Raises RecipeError for a time code that is none, and where frames are missing.
+    """
+    codes = [_seconds(table, line, record[TIMECODE], rate) for line, record in table.records]
+    records = []
+    for number, (line, record) in enumerate(table.records):
+        if number and rate and abs((codes[number] - codes[number - 1]) * rate - 1.0) > 0.5:
+            raise RecipeError(
+                table.name,
+                f"{TIMECODE} {record[TIMECODE]} lies {codes[number] - codes[number - 1]:.3f} s "
+                f"behind the one before, expected one frame of {rate:g} a second",
+                line,
+            )
+        cells = {name: cell for name, cell in record.items() if name not in (TIMECODE, COUNT)}
+        records.append((line, {FRAME: str(number), **cells}))
+    return ClipTable(table.name, records)
+
+
+def _seconds(table: ClipTable, line: int, code: str, rate: float | None) -> float:
+    """Return the time, s, of a code of hours, minutes, seconds and frames."""
+    parts = code.split(":")
+    try:
+        hours, minutes, seconds, frames = map(float, parts)
+    except ValueError:
+        expected = f"{TIMECODE} {code!r}, expected hours:minutes:seconds:frames"
+        raise RecipeError(table.name, expected, line) from None
+    return 3600.0 * hours + 60.0 * minutes + seconds + frames / (rate or 60.0)
 
 
 def _expect_columns(table: ClipTable, names: Sequence[str], keys: Curves) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from posefield.common.errors import AcclaimError, FileError, MotionFileError
 from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
-from posefield_train.source import acclaim, bvh, data_folder
+from posefield_train.source import acclaim, bvh, data_folder, kimodo
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.motion_file import (
     AS_STATED,
@@ -128,6 +128,7 @@ FORMATS = (
     MotionFormat(
         "glTF", (".glb", ".gltf"), _read_gltf, "metres, y up, times of keys", several=True
     ),
+    MotionFormat("Kimodo", (".npz",), kimodo.read, "metres and y up, but no rate"),
     MotionFormat(
         "USD",
         (".usd", ".usda", ".usdc", ".usdz"),
@@ -144,8 +145,6 @@ REFUSED = {
     ".c3d": "C3D holds markers, not a skeleton: solve them in the capture software and export BVH",
     ".npy": "numpy arrays of features, such as those of HumanML3D, hold no joint rotations of a "
     "capture: use the BVH, AMC or SMPL source of the data set",
-    ".npz": "SMPL parameters, such as those of AMASS, need a body model for the bones' lengths: "
-    "export them with it as BVH or GLB",
     ".asf": "ASF holds a skeleton alone: name the .amc file, which is read with it",
     ".blend": "a Blender scene: export its armature as BVH or GLB",
     ".trc": "TRC holds markers, not a skeleton: solve them and export BVH",

@@ -5,6 +5,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.robots.file_conventions import File, tell_order, tell_quaternions, wxyz
+from posefield.robots.robot import Robot
 from posefield.robots.robot_motion import RobotMotion
 
 NAMED, UNNAMED = "names in the file", "order of the robot's file"
@@ -139,13 +140,88 @@ def from_qpos(file: File) -> RobotMotion:
     )
 
 
+LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll", "toe_base")
+ARM = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow")
+WRIST = ("wrist_roll", "wrist_pitch", "wrist_yaw", "hand_roll")
+KIMODO_G1 = (
+    "pelvis",
+    *(f"{side}_{joint}" for side in ("left", "right") for joint in LEG),
+    *("waist_yaw", "waist_roll", "waist_pitch"),
+    *(f"{side}_{joint}" for side in ("left", "right") for joint in (*ARM, *WRIST)),
+)
+"""Joints of Kimodo's robot G1 in the order of its files."""
+OFF_AXIS = np.radians(10.0)
+"""Largest mean turn of a joint about other axes than its hinge's."""
+
+
 def from_kimodo(file: File) -> RobotMotion:
-    """Raise MotionFileError: the file holds no joint angles, and the message says which does."""
-    joints = file.array("posed_joints", None, None, 3).shape[1]
-    raise file.error(
-        f"holds positions of {joints} joints, no joint angles: expected the CSV file that Kimodo "
-        "writes beside it for a robot, or its BVH for a person"
+    """Return the motion of the robot G1 of rotations of its bodies in the world, with Y up.
+
+    Kimodo predicts rotations, not angles: each joint's turn about its hinge is taken, and the mean
+    of what is left out is told.
+    """
+    positions = file.array("posed_joints", None, None, 3)
+    joints = positions.shape[1]
+    if joints != len(KIMODO_G1):
+        raise file.error(
+            f"holds {joints} joints of a person, expected the {len(KIMODO_G1)} of the robot G1: a "
+            "recipe without [robot] reads people of Kimodo"
+        )
+    robot = file.conventions.robot
+    if robot is None:
+        raise file.error(
+            "holds rotations of the robot G1, no angles: expected the robot too (--robot g1.xml)"
+        )
+    turns = quat.from_matrix(
+        file.array("global_rot_mats", len(positions), joints, 3, 3)[..., [2, 0, 1], :][
+            ..., [2, 0, 1]
+        ]
     )
+    angles, off_axis = [], []
+    for hinge, name in enumerate(robot.hinges):
+        body = robot.hinge_bodies[hinge]
+        row, parent = (_kimodo_joint(file, robot, b) for b in (body, robot.parents[body]))
+        local = quat.mul(quat.conj(turns[:, parent]), turns[:, row])
+        turn = quat.mul(quat.conj(robot.turns[body])[None], local)
+        angle = quat.twist(turn, robot.axes[hinge])
+        rest = quat.mul(quat.conj(quat.from_axis_angle(robot.axes[hinge], angle)), turn)
+        angles.append(angle)
+        off_axis.append(float(np.linalg.norm(quat.log(rest), axis=-1).mean()))
+        if off_axis[-1] > OFF_AXIS:
+            raise file.error(
+                f"joint {name!r} turns by {np.degrees(off_axis[-1]):.1f} degrees in the mean about "
+                f"other axes than its hinge in {robot.name}: expected the robot G1"
+            )
+    rate, rate_told = file.rate(None, " (Kimodo's files have 30)")
+    left_out = np.degrees(max(off_axis))
+    evidence = {
+        "joints": f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out",
+        "quaternions": "none: matrices",
+        "rate": rate_told,
+    }
+    return RobotMotion(
+        file.source,
+        "kimodo.npz",
+        positions[:, 0, [2, 0, 1]],
+        turns[:, 0],
+        np.unwrap(np.stack(angles, axis=-1), axis=0),
+        rate,
+        robot.hinges,
+        evidence=evidence,
+    )
+
+
+def _kimodo_joint(file: File, robot: Robot, body: int) -> int:
+    """Return the index of the joint of Kimodo's G1 that moves a body."""
+    if body == 0:
+        return 0
+    name = robot.hinges[robot.hinge_bodies.index(body)] if body in robot.hinge_bodies else ""
+    joint = name.removesuffix("_joint")
+    if joint not in KIMODO_G1:
+        raise file.error(
+            f"joint {name!r} of {robot.name} is none of Kimodo's G1: expected the robot G1"
+        )
+    return KIMODO_G1.index(joint)
 
 
 def from_gmr(file: File) -> RobotMotion:
