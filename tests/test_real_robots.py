@@ -3,13 +3,16 @@
 import json
 import zipfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import posefield
-from posefield.common.errors import InvalidField, MotionFileError
+from posefield.common.errors import InvalidField, ModelError, MotionFileError
 from posefield.motion import quat
+from posefield.reference.motion_plan import Arrays, Evaluator, Plan, ReferenceModel
+from posefield.registry import model_registry
 from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
 from posefield_train import training
@@ -148,6 +151,95 @@ def test_clips_of_a_robot_stand_on_their_soles_within_limits(model):
     assert after < 0.003
     with pytest.raises(InvalidField, match="robots stand as they were recorded"):
         opened.clip(floor=0.1)
+
+
+def mixed_commands(card, count):
+    """Return commands between captured ones, two captured ones and one far outside."""
+    commands, rng = np.array(card.examples), np.random.default_rng(5)
+    chosen = commands[rng.integers(0, len(commands), (count, 4))]
+    mixed = np.einsum("ek,ekd->ed", rng.dirichlet(np.ones(4), count), chosen)
+    return np.vstack([mixed, commands[:2], 1.4 * commands.max(axis=0)])
+
+
+def numpy_evaluator(path):
+    arrays = Arrays(np, np.asarray, lambda a: a.astype(int), lambda rows, indices: rows[indices])
+    return Evaluator(ReferenceModel(path), arrays, arrays)
+
+
+def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(model):
+    opened, evaluator = posefield.load(model), numpy_evaluator(model)
+    card = opened.synthesizer.session.card
+    commands, names = mixed_commands(card, 6), [control.name for control in card.controls]
+    plan = evaluator.plan(commands)
+    joints = list(robot_clip.of(card.robot).hinge_joints)
+    steps = card.frames - 1
+    for row, command in enumerate(commands.tolist()):
+        question = dict(zip(names, command, strict=True))
+        clip = opened.clip(fps=97, joint_sigma=True, extrapolate="ok", **question)
+        motion, trust = clip.robot_motion(), clip.trust
+        phase = np.arange(len(motion)) / 97 / trust.duration
+        one = Plan(*(np.repeat(values[[row]], len(phase), axis=0) for values in plan))
+        reference = evaluator.sample(one, np.minimum(phase, 1.0 - 1e-12))
+        np.testing.assert_allclose(reference.joint_positions, motion.angles, atol=1e-5)
+        np.testing.assert_allclose(reference.base_positions, motion.base_path, atol=1e-5)
+        signs = np.sign(np.sum(reference.base_rotations * motion.base_rotations, axis=-1))
+        rotations = signs[:, None] * reference.base_rotations
+        np.testing.assert_allclose(rotations, motion.base_rotations, atol=1e-5)
+        np.testing.assert_allclose(1.0 / reference.phase_rates, trust.duration, atol=1e-6)
+        # The service squares small differences of large numbers in single precision.
+        np.testing.assert_allclose(plan.sigmas[row], trust.sigma, atol=5e-5)
+        sigmas = np.array(trust.joint_sigma)[joints]
+        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=5e-5)
+        assert plan.supported[row] == trust.supported
+        # Negative control: feet as predicted differ.
+        predicted = opened.clip(feet="as_predicted", fps=97, extrapolate="ok", **question)
+        apart = reference.joint_positions - predicted.robot_motion().angles
+        assert np.abs(apart).max() > 1e-3
+    cycle = Plan(*(np.repeat(values[:1], steps, axis=0) for values in plan))
+    frames = evaluator.sample(cycle, np.arange(steps) / steps)
+    around = (np.roll(frames.joint_positions, s, axis=0) for s in (-1, 1))
+    rates = np.subtract(*around) * steps / (2.0 * plan.durations[0])
+    np.testing.assert_allclose(frames.joint_velocities, rates, atol=1e-4)
+    assert set(np.round(frames.contacts, 5).ravel()) == {0.0, 1.0}
+    with pytest.raises(ModelError, match="expected a model whose recipe has"):
+        ReferenceModel(model_registry.file_or_shipped(Path("cmu_walk")))
+
+
+def test_torch_and_jax_agree_with_numpy_and_pass_gradients(model):
+    """Need torch and JAX, which are not among the project's packages: five gigabytes."""
+    torch, jax = pytest.importorskip("torch"), pytest.importorskip("jax")
+    from posefield.reference import jax as in_jax
+    from posefield.reference import torch as in_torch
+
+    evaluator = numpy_evaluator(model)
+    commands = mixed_commands(posefield.load(model).synthesizer.session.card, 5)
+    commands = commands.astype(np.float32).astype(float)
+    phase = np.linspace(-0.3, 1.9, len(commands))
+    expected = evaluator.sample(evaluator.plan(commands), phase)
+    torch_motion = in_torch.ReferenceMotion(model)
+    moving = torch.tensor(commands, dtype=torch.float32)
+    answers = [
+        torch_motion.sample(moving, torch.tensor(phase)),
+        in_jax.ReferenceMotion(model).sample(commands.astype("f4"), phase.astype("f4")),
+    ]
+    # Commands that change are planned again, and only they.
+    changed = moving.flip(0)
+    changed[0] = moving[0]
+    again = torch_motion.sample(changed, torch.tensor(phase))
+    fresh = evaluator.sample(evaluator.plan(changed.double().numpy()), phase)
+    for answer, truth in [*((answer, expected) for answer in answers), (again, fresh)]:
+        for name, values, right in zip(truth._fields, answer, truth, strict=True):
+            speed = name.endswith(("velocities", "rates"))
+            np.testing.assert_allclose(values, right, atol=2e-4 if speed else 1e-5, err_msg=name)
+    double = in_torch.ReferenceMotion(model, dtype=torch.float64)
+    inputs = [torch.tensor(values[:3], requires_grad=True) for values in (commands, phase)]
+
+    def outputs(*arguments):
+        answer = double.sample(*arguments)
+        return torch.cat([answer.joint_positions, answer.base_rotations, answer.sigmas], -1)
+
+    assert torch.autograd.gradcheck(outputs, inputs, atol=1e-4)
+    assert jax.devices()
 
 
 def test_gaits_left_out_are_predicted_better_than_a_lookup_does(biped):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -26,42 +26,47 @@ from posefield.common.units import (
     Samples,
 )
 
+Array = Any
+"""Array of NumPy, torch or JAX."""
 # Where the Matérn covariances of unit rate have fallen to 5 %.
 RATE32, RATE52 = 4.743865, 5.918277
 
 
-def exponential(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+def exponential(squared: Array, xp: Any = np) -> Array:
     """Return exp(-3 h)."""
-    return np.exp(-3.0 * np.sqrt(squared))
+    return xp.exp(-3.0 * xp.sqrt(squared))
 
 
-def gaussian(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+def gaussian(squared: Array, xp: Any = np) -> Array:
     """Return exp(-3 h²)."""
-    return np.exp(-3.0 * squared)
+    return xp.exp(-3.0 * squared)
 
 
-def spherical(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+def spherical(squared: Array, xp: Any = np) -> Array:
     """Return 1 - 3/2 h + 1/2 h³ up to h = 1, and zero beyond."""
-    h = np.minimum(np.sqrt(squared), 1.0)
+    h = xp.clip(xp.sqrt(squared), None, 1.0)
     return 1.0 - 1.5 * h + 0.5 * h**3
 
 
-def matern32(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+def matern32(squared: Array, xp: Any = np) -> Array:
     """Return the Matérn covariance of smoothness 3/2."""
-    a = RATE32 * np.sqrt(squared)
-    return (1.0 + a) * np.exp(-a)
+    a = RATE32 * xp.sqrt(squared)
+    return (1.0 + a) * xp.exp(-a)
 
 
-def matern52(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
+def matern52(squared: Array, xp: Any = np) -> Array:
     """Return the Matérn covariance of smoothness 5/2."""
-    a = RATE52 * np.sqrt(squared)
-    return (1.0 + a + RATE52**2 / 3.0 * squared) * np.exp(-a)
+    a = RATE52 * xp.sqrt(squared)
+    return (1.0 + a + RATE52**2 / 3.0 * squared) * xp.exp(-a)
 
 
-COVARIANCE_MODELS: dict[str, Callable[[Floats], Floats]] = {
+COVARIANCE_MODELS: dict[str, Callable[..., Array]] = {
     formula.__name__: formula for formula in (exponential, gaussian, spherical, matern32, matern52)
 }
-"""Covariance models by the names that recipes and cards use."""
+"""Covariance models of squared distances by the names that recipes and cards use.
+
+They take the module of the arrays, which is NumPy unless it is given: training loops use others.
+"""
 
 KERNEL_GAINS = {
     "exponential": 9.0,

@@ -21,13 +21,14 @@ from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.robots.robot import Robot
 
-ITERATIONS = 4
-"""Gauss-Newton steps. From predictions two centimetres off, the fourth moves nothing by 1e-6 m."""
+ITERATIONS = 3
+"""Gauss-Newton steps. From predictions two centimetres off, the third moves nothing by 1e-6 m."""
 DAMPING = 1e-6
 """Added to the squares of the lever arms, m²: bounds the steps of a straight leg."""
 
 Array = Any
 """Array of NumPy, torch or JAX."""
+Repeat = Callable[[Callable[[list[Array]], list[Array]], list[Array]], list[Array]]
 Constant = Callable[[Floats], Array]
 """Function from NumPy's arrays to arrays of the right kind, precision and device."""
 
@@ -90,16 +91,30 @@ def _count(chains: Iterable[tuple[int, ...]], body: int) -> int:
     return sum(body in chain for chain in chains)
 
 
+def repeated(step: Callable[[list[Array]], list[Array]], columns: list[Array]) -> list[Array]:
+    """Return the columns after ITERATIONS steps."""
+    for _ in range(ITERATIONS):
+        columns = step(columns)
+    return columns
+
+
 class StandingSoles:
     """Solver of the legs of a robot for its sole points.
 
-    constant: makes arrays of `xp` of NumPy's. steps: N of a cycle.
+    constant: makes arrays of `xp` of NumPy's. steps: N of a cycle. repeat: as `repeated`, for a
+    module that compiles loops.
     """
 
     def __init__(
-        self, xp: Any, constant: Constant, robot: Robot, points: Sequence[SolePoint], steps: int
+        self,
+        xp: Any,
+        constant: Constant,
+        robot: Robot,
+        points: Sequence[SolePoint],
+        steps: int,
+        repeat: Repeat = repeated,
     ) -> None:
-        self._xp, self._robot, self._steps = xp, robot, steps
+        self._xp, self._robot, self._steps, self._repeat = xp, robot, steps, repeat
         self._legs = legs(robot, points)
         order = [row for leg in self._legs for row in leg.rows]
         runs = [_stance_matrices(points[row], steps) for row in order]
@@ -120,7 +135,6 @@ class StandingSoles:
         crosses = [_cross_matrix(axis) for axis in robot.axes]
         self._crosses = [(constant(k), constant(k @ k)) for k in crosses]
         self._identity = constant(np.eye(3))
-        self._damping = [constant(DAMPING * np.eye(len(leg.hinges))) for leg in self._legs]
 
     def limited(self, angles: Array) -> Array:
         """Return angles (..., H), rad, within the robot's limits."""
@@ -143,15 +157,24 @@ class StandingSoles:
         first = 0
         for leg, (_, hinges, rows) in enumerate(self._legs):
             goal, first = goals[..., first : first + len(rows), :], first + len(rows)
-            for _ in range(ITERATIONS):
+
+            def step(
+                columns: list[Array],
+                leg: int = leg,
+                hinges: tuple[int, ...] = hinges,
+                goal: Array = goal,
+            ) -> list[Array]:
                 points, slopes = self._points(leg, columns)
                 across = xp.swapaxes(slopes, -1, -2)
                 gaps = (goal - points).reshape(*slopes.shape[:-1], 1)
-                square = across @ slopes + self._damping[leg]
-                step = xp.linalg.solve(square, across @ gaps)[..., 0]
-                for column, hinge in enumerate(hinges):
-                    angle = columns[hinge] + step[..., column]
-                    columns[hinge] = xp.clip(angle, self._low[hinge], self._high[hinge])
+                turns = _solution(across @ slopes, (across @ gaps)[..., 0])
+                solved = list(columns)
+                for turn, hinge in zip(turns, hinges, strict=True):
+                    angle = columns[hinge] + turn
+                    solved[hinge] = xp.clip(angle, self._low[hinge], self._high[hinge])
+                return solved
+
+            columns = self._repeat(step, columns)
         solved = xp.stack(columns, -1)
         return xp.concatenate([solved, solved[..., :1, :]], -2)
 
@@ -168,14 +191,17 @@ class StandingSoles:
         turned = _turned(xp, turn, x - start[..., 0, :, :], y - start[..., 1, :, :])
         x2 = xp.concatenate([x, turned[0] + end[..., 0, :, :]], -1)
         y2 = xp.concatenate([y, turned[1] + end[..., 1, :, :]], -1)
-        displaced = [(self._displace @ values[..., None])[..., 0] for values in (x2, y2)]
+        displaced = [self._linear(self._displace, values) for values in (x2, y2)]
         # In a frame that turns with the cycle displacements repeat, and change smoothly in swings.
         displaced = _turned(xp, -turn * self._when, *displaced)
-        displaced = [(self._smooth @ values[..., None])[..., 0] for values in displaced]
+        displaced = [self._linear(self._smooth, values) for values in displaced]
         displaced = _turned(xp, turn * self._shares, *displaced)
         above = xp.clip(z, 0.0, None)
         goals = xp.stack([x + displaced[0], y + displaced[1], above], -1)
         return xp.swapaxes(goals, -2, -3)
+
+    def _linear(self, functions: Array, values: Array) -> Array:
+        return self._xp.einsum("...pj,pij->...pi", values, functions)
 
     def _points(self, leg: int, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Return a leg's sole points (..., p, 3), m, from the base, and slopes (..., 3 p, h).
@@ -183,7 +209,8 @@ class StandingSoles:
         columns: angles (...) of each hinge, rad.
         """
         xp, robot, chain = self._xp, self._robot, self._legs[leg]
-        turn, origin = self._identity, self._offsets[0] * 0.0
+        turn = columns[0][..., None, None] * 0.0 + self._identity
+        origin = turn[..., 0] * 0.0
         axes, fixed_points = list[Array](), list[Array]()
         for body in chain.bodies:
             origin = origin + turn @ self._offsets[body]
@@ -199,12 +226,33 @@ class StandingSoles:
                 turn = turn @ spin
                 origin = fixed - turn @ self._anchors[hinge]
         points = self._positions[leg] @ xp.swapaxes(turn, -1, -2) + origin[..., None, :]
-        slopes = []
-        for axis, fixed in zip(axes, fixed_points, strict=True):
-            arms = points - fixed[..., None, :]
-            slope = xp.stack(_cross(axis[..., None, :], arms), -1)
-            slopes.append(slope.reshape(*slope.shape[:-2], -1))
-        return points, xp.stack(slopes, -1)
+        arms = points[..., None, :] - xp.stack(fixed_points, -2)[..., None, :, :]
+        slopes = xp.stack(_cross(xp.stack(axes, -2)[..., None, :, :], arms), -2)
+        return points, slopes.reshape(*slopes.shape[:-3], -1, len(axes))
+
+
+def _solution(matrix: Array, vector: Array) -> list[Array]:
+    """Return the n numbers (...) that solve damped symmetric systems (..., n, n), (..., n).
+
+    By elimination over all systems at once, which for legs takes a tenth of the time of a library's
+    solver of one after the other.
+    """
+    size = matrix.shape[-1]
+    rows = [[matrix[..., i, j] for j in range(i + 1)] for i in range(size)]
+    sides = [vector[..., i] for i in range(size)]
+    for pivot in range(size):
+        inverse = 1.0 / (rows[pivot][pivot] + DAMPING)
+        for i in range(pivot + 1, size):
+            share = rows[i][pivot] * inverse
+            for j in range(pivot + 1, i + 1):
+                rows[i][j] = rows[i][j] - share * rows[j][pivot]
+            sides[i] = sides[i] - share * sides[pivot]
+        sides[pivot] = sides[pivot] * inverse
+    for i in reversed(range(size)):
+        for j in range(i + 1, size):
+            # Of an eliminated column its own pivot's share is left.
+            sides[i] = sides[i] - rows[j][i] * sides[j] / (rows[i][i] + DAMPING)
+    return sides
 
 
 def _turned(xp: Any, angle: Array, x: Array, y: Array) -> list[Array]:

@@ -1,0 +1,405 @@
+"""Evaluation of a robot's model for many commands at once, by NumPy, torch or JAX.
+
+A plan holds what depends on a command alone: its cycle, with standing soles, as rows of numbers at
+the canonical frames. A sample reads two rows of it and is linear between them, as the model is. All
+functions are written for the module of arrays that `Arrays` names, are the same for each, and pass
+gradients on. The answers are those of the service, which evaluates the same file in single
+precision.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from posefield.common.errors import ModelError
+from posefield.common.units import Floats
+from posefield.inference import reduced_motion, session
+from posefield.kriging import kriging_model, support
+from posefield.kriging.kriging_model import COVARIANCE_MODELS
+from posefield.model_file import onnx_file
+from posefield.model_file.model_card import ModelCard
+from posefield.motion import quat
+from posefield.reference import array_rotations as rotations
+from posefield.robots import robot_clip, standing_soles
+from posefield.robots.standing_soles import Array, Repeat, StandingSoles
+from posefield.validation import question_validation
+
+TO_Z_UP = [2, 0, 1]
+
+
+class Arrays(NamedTuple):
+    """A module of arrays.
+
+    xp: `numpy`, `torch` or `jax.numpy`. constant: makes an array of NumPy's. whole: an array's
+    numbers, rounded down, as indices. take: rows of an array (R, C) at indices. repeat: loop
+    of the legs' solver.
+    """
+
+    xp: Any
+    constant: Callable[[Floats], Array]
+    whole: Callable[[Array], Array]
+    take: Callable[[Array, Array], Array]
+    repeat: Repeat = standing_soles.repeated
+
+
+class Plan(NamedTuple):
+    """Cycles of E commands.
+
+    rows (E, T, C): numbers of each canonical frame. warps (E, P): of the phase. travels (E, 3): of
+    a cycle, m, m and rad: ahead, to the left, and of the heading. durations (E,): of a cycle, s.
+    sigmas (E,), m. supported (E,): 1 where clips of like commands were captured, else 0.
+    """
+
+    rows: Array
+    warps: Array
+    travels: Array
+    durations: Array
+    sigmas: Array
+    supported: Array
+
+
+class Reference(NamedTuple):
+    """Reference of E robots of H hinges and K feet, each at its phase. Z up, in SI units.
+
+    base_positions (E, 3) and base_rotations (E, 4), w x y z, are in the frame in which the cycle
+    begins, X ahead; base_velocities (E, 3), m/s, and base_turn_rates (E, 3), rad/s, too. Velocities
+    are central differences over canonical frames. contacts (E, K): 1 while a foot stands.
+    phase_rates (E,): cycles a second. sigmas (E, H): standard deviation of the place of each joint
+    from that of a captured gait, m. supported (E,): 1 where gaits of like commands were captured.
+    travels (E, 3): of a whole cycle: ahead, to the left, m, and of the heading, rad.
+    """
+
+    joint_positions: Array
+    joint_velocities: Array
+    base_positions: Array
+    base_rotations: Array
+    base_velocities: Array
+    base_turn_rates: Array
+    contacts: Array
+    phase_rates: Array
+    sigmas: Array
+    supported: Array
+    travels: Array
+
+
+class ReferenceModel:
+    """Model of a robot's gaits in a file; raises ModelError for a file of another kind.
+
+    labels: name or weights by label set, such as a style; sets that are not given are open.
+    hinges, feet: names, in the order of the reference. controls: names, in that of commands.
+    """
+
+    def __init__(self, path: str | Path, labels: Mapping[str, Any] | None = None) -> None:
+        opened = session.load(Path(path))
+        card = opened.card
+        _check(path, card)
+        assert card.robot is not None
+        self.card, self.robot = card, card.robot
+        self.controls = tuple(control.name for control in card.controls)
+        self.hinges = self.robot.hinges
+        self.feet = tuple(self.robot.bodies[body] for body in self._foot_bodies)
+        self._weights = onnx_file.initializers(opened.content)
+        self.labels = question_validation.label_weights(card, None, labels or {})[0]
+        self.bounds = opened.bounds
+
+    @cached_property
+    def _foot_bodies(self) -> list[int]:
+        return list(dict.fromkeys(point.body for point in self.card.soles))
+
+    def constants(self) -> dict[str, Floats]:
+        """Return the arrays of the evaluation by name, in double precision."""
+        card, weights, bounds = self.card, self._weights, self.bounds
+        hyper = card.kriging
+        count, columns = len(self.labels), weights["linear_weights"].shape[1]
+        samples = weights["samples"].T.astype(np.float64)
+        sizes = {"travel": 3, "offsets": len(weights["offset_directions"]), "duration": 1}
+        sizes["warp"] = len(weights["warp_still"])
+        sizes["pose"] = columns - 2 - sum(sizes.values())
+        duals = [np.zeros((len(samples), 1))]
+        for name, size in sizes.items():
+            duals.append(weights.get(f"{name}_weights", np.zeros((len(samples), size))))
+        shares = np.ones(len(samples))
+        for index, (kernel, named) in enumerate(
+            zip(hyper.labels, kriging_model.label_columns(0, hyper.label_counts), strict=True)
+        ):
+            same = self.labels[weights[f"whose_{index}"]]
+            assert named.stop <= count
+            shares *= kernel.correlation + (1.0 - kernel.correlation) * same
+        form = np.zeros((count + 1 + len(bounds.low) + len(samples),) * 2)
+        form[np.tril_indices(len(form))] = weights["precision"]
+        captured = support.fit_support(np.array(card.examples)).table()
+        return {
+            "low": bounds.low,
+            "high": bounds.high,
+            "least": bounds.limits[0],
+            "greatest": bounds.limits[1],
+            "scales": np.asarray(hyper.scales),
+            "samples": samples,
+            "label_shares": shares,
+            "leading": np.append(self.labels, 1.0),
+            "weights": np.vstack([weights["linear_weights"][:, 1:], np.hstack(duals)]),
+            "splits": np.cumsum([1, *sizes.values()]),
+            "form": form + np.tril(form, -1).T,
+            "sill": weights["sill"].astype(np.float64)[0],
+            "shortest": np.array(bounds.duration_limits),
+            **_power_law(weights, len(bounds.low)),
+            "warp_still": weights["warp_still"],
+            "warp_form": weights["warp_form"],
+            "warp_breaks": weights["warp_breaks"][3:, 0, 0],
+            "joint_sigma": np.array(card.joint_sigma)[list(robot_clip.of(self.robot).hinge_joints)],
+            **{f"support_{name}": np.asarray(value) for name, value in captured.items()},
+            **self._tensor(),
+            "contacts": self._contacts(),
+        }
+
+    def _tensor(self) -> dict[str, Floats]:
+        """Return the decoder: moves of the root, the base's rotation and the angles alone."""
+        reduced = reduced_motion.read(self._weights, self.card.levels[0], self.card)
+        rig = robot_clip.of(self.robot)
+        rows = np.vstack([reduced.mean, reduced.directions])
+        numbers = rows[:, 3:].reshape(len(rows), -1, 3)
+        joints = list(rig.hinge_joints)
+        turned = np.sum(numbers[:, joints] * rig.axes, axis=-1)
+        rest = np.array(
+            [
+                quat.twist(reduced.rotations[joint], axis)
+                for joint, axis in zip(joints, rig.axes, strict=True)
+            ]
+        )
+        # Between turns of the whole circle, angles are those nearest to their ranges.
+        means = rest + turned[0] - self.robot.ranges.mean(axis=1)
+        rest -= 2.0 * np.pi * np.round(means / (2.0 * np.pi))
+        moves = np.hstack([rows[:, :3][:, TO_Z_UP], numbers[:, 0][:, TO_Z_UP], turned])
+        base = reduced.rotations[0]
+        moves[0, 6:] += rest
+        return {
+            "core": reduced.core.reshape(-1, reduced.core.shape[2]).T,
+            "time": reduced.time,
+            "mean": moves[0],
+            "moves": moves[1:],
+            "base": np.append(base[:1], base[1:][TO_Z_UP]),
+        }
+
+    def _contacts(self) -> Floats:
+        """Return 1 for canonical frames (T, K) in which a foot stands, else 0."""
+        steps = self.card.frames - 1
+        contacts = np.zeros((steps, len(self._foot_bodies)))
+        for point in self.card.soles:
+            for first, last in point.stances:
+                frames = np.arange(first, last + 1) % steps
+                contacts[frames, self._foot_bodies.index(point.body)] = 1.0
+        return np.vstack([contacts, contacts[:1]])
+
+
+def _check(path: str | Path, card: ModelCard) -> None:
+    """Raise ModelError for a model that is not of the gaits of a robot."""
+    measured = [control.name for control in card.controls if control.measure]
+    if card.robot is None:
+        raise ModelError(path, "no robot's, expected a model whose recipe has [robot]")
+    if not card.cyclic or card.root != "travelling":
+        raise ModelError(path, "of motions that are no cycles or stay in place, expected gaits")
+    if card.making.chart != "rotation_vector":
+        raise ModelError(path, "of an earlier version, whose angles are curved: train it again")
+    if measured:
+        raise ModelError(
+            path, f"{measured[0]} is measured, expected controls from columns of the table alone"
+        )
+
+
+def _power_law(weights: Mapping[str, Any], controls: int) -> dict[str, Floats]:
+    """Return floor and exponents (d,) of the controls in the duration."""
+    if "duration_floor" not in weights:
+        return {"floor": np.ones(controls), "exponents": np.zeros(controls)}
+    exponents = weights["duration_exponents"][:controls, 0]
+    return {"floor": weights["duration_floor"][:controls], "exponents": exponents}
+
+
+class Evaluator:
+    """Evaluation of a model by one module of arrays.
+
+    fine: arrays in which plans are made. fast: those in which samples are.
+    """
+
+    def __init__(self, model: ReferenceModel, fine: Arrays, fast: Arrays) -> None:
+        self._model, self._xp = model, fine.xp
+        constants = model.constants()
+        self._splits = [int(end) for end in constants.pop("splits")]
+        self._fine = {name: fine.constant(values) for name, values in constants.items()}
+        self._fast = {
+            name: fast.constant(constants[name])
+            for name in ("warp_breaks", "base", "joint_sigma", "mean")
+        }
+        self._whole, self._take, self._steps = fast.whole, fast.take, model.card.frames - 1
+        self._hinges, self._feet = len(model.hinges), len(model.feet)
+        arguments = model.robot, model.card.soles, self._steps
+        self._soles = StandingSoles(fine.xp, fine.constant, *arguments, fine.repeat)
+        self._limits = StandingSoles(fast.xp, fast.constant, *arguments)
+        self._covariance = COVARIANCE_MODELS[model.card.kriging.covariance]
+
+    def plan(self, commands: Array) -> Plan:
+        """Return the cycles of commands (E, d), in the model's units and the order of controls."""
+        xp, w = self._xp, self._fine
+        limited = xp.clip(commands, w["least"], w["greatest"])
+        values = self._basis(limited) @ w["weights"]
+        logarithms, travel, _, duration, warp, pose = (
+            values[:, first:end]
+            for first, end in zip([0, *self._splits[:-1]], self._splits, strict=True)
+        )
+        raw = xp.exp(duration[:, 0] + self._power(limited))
+        inside = xp.clip(commands, w["low"], w["high"])
+        nearest = self._basis(inside) @ w["weights"]
+        place = self._splits[2]
+        nearest = xp.exp(nearest[:, place] + self._power(inside))
+        shortest = xp.minimum(nearest, nearest * 0.0 + w["shortest"][0])
+        longest = xp.maximum(nearest, nearest * 0.0 + w["shortest"][1])
+        durations = xp.clip(raw, shortest, longest)
+        # Sigma is that of the commands as they are.
+        basis = self._basis(commands)
+        variance = w["sill"] * xp.sum((basis @ w["form"]) * basis, -1)
+        variance = variance + xp.exp(logarithms[:, 0])
+        travels = xp.stack([travel[:, 1], travel[:, 0], travel[:, 2]], -1)
+        shares = xp.exp(warp + w["warp_still"])
+        shares = shares / xp.sum(shares, -1)[:, None]
+        return Plan(
+            self._rows(pose, travels),
+            shares @ w["warp_form"].T,
+            travels,
+            durations,
+            xp.sqrt(xp.clip(variance, rotations.TINY, None)),
+            self._supported(commands),
+        )
+
+    def _basis(self, commands: Array) -> Array:
+        """Return labels, one, controls and covariances (E, p + 1 + d + n) at commands (E, d)."""
+        xp, w = self._xp, self._fine
+        half = (2.0 * commands - w["low"] - w["high"]) / (w["high"] - w["low"])
+        gaps = (half[:, None] - w["samples"]) * w["scales"]
+        near = self._covariance(xp.sum(gaps * gaps, -1) + rotations.TINY, xp) * w["label_shares"]
+        leading = half[:, :1] * 0.0 + w["leading"]
+        return xp.concatenate([leading, half, near], -1)
+
+    def _power(self, commands: Array) -> Array:
+        w = self._fine
+        return (
+            self._xp.log(self._xp.maximum(commands, w["floor"] + 0.0 * commands)) @ w["exponents"]
+        )
+
+    def _supported(self, commands: Array) -> Array:
+        xp, w = self._xp, self._fine
+        scale, bounds = w["support_scale"], w["support_bounds"]
+        squares = xp.sum((commands * scale[:, 0] - scale[:, 1]) ** 2, -1)
+        near = xp.exp(commands @ w["support_slopes"].T + w["support_offsets"])
+        explained = xp.exp(-2.0 * w["support_rate"] * squares)
+        explained = explained * xp.sum((near @ w["support_inverse"]) * near, -1)
+        inside = (bounds[:, 0] <= commands) & (commands <= bounds[:, 1])
+        within = (1.0 - explained <= w["support_limit"]) & inside.all(-1)
+        return 1.0 * within
+
+    def _rows(self, pose: Array, travel: Array) -> Array:
+        """Return the rows (E, T, C) of coefficients (E, r3) and travels (E, 3).
+
+        Columns: base position without travel and rotation numbers, angles, then the changes of
+        angles, position and rotation by frame, and contacts.
+        """
+        xp, w, steps = self._xp, self._fine, self._steps
+        r1 = w["moves"].shape[0]
+        reduced = (pose @ w["core"]).reshape(len(pose), -1, r1)
+        numbers = w["mean"] + (w["time"] @ reduced) @ w["moves"]
+        frames = xp.cumsum(numbers[:1, :, 0] * 0.0 + 1.0, -1) - 1.0
+        share = frames / steps
+        path, turns = placed(xp, w["base"], numbers, travel, share)
+        angles = numbers[..., 6:]
+        if self._model.card.soles:
+            changed = self._soles.corrected(path, rotations.matrices(xp, turns), angles)
+            angles = angles + (changed - self._soles.limited(angles))
+        before = turns[:, :-1] * self._constant_signs(turns)
+        spins = rotations.rotation_vectors(xp, rotations.product(xp, turns[:, 1:], before))
+        cycle = travel[:, 2]
+        contacts = w["contacts"] + 0.0 * numbers[..., : self._feet]
+        return xp.concatenate(
+            [
+                numbers[..., :6],
+                angles,
+                central(xp, angles[:, 1:] - angles[:, :-1], None),
+                central(xp, path[:, 1:] - path[:, :-1], cycle),
+                central(xp, spins, cycle),
+                contacts,
+            ],
+            -1,
+        )
+
+    def _constant_signs(self, turns: Array) -> Array:
+        """Return the signs that conjugate quaternions."""
+        one = turns[:1, :1, :1] * 0.0 + 1.0
+        return self._xp.concatenate([one, -one, -one, -one], -1)
+
+    def sample(self, plan: Plan, phase: Array) -> Reference:
+        """Return the reference at phases (E,), in cycles; whole cycles do not count."""
+        xp, w, steps = self._xp, self._fast, self._steps
+        u = phase - xp.floor(phase)
+        late = xp.clip(u[:, None] - w["warp_breaks"], 0.0, None)
+        powers = xp.concatenate([u[:, None], (u * u)[:, None], (u**3)[:, None], late**3], -1)
+        frame = xp.clip(xp.sum(powers * plan.warps, -1), 0.0, float(steps))
+        slopes = [u[:, None] * 0.0 + 1.0, 2.0 * u[:, None], 3.0 * (u * u)[:, None], 3.0 * late**2]
+        pace = xp.sum(xp.concatenate(slopes, -1) * plan.warps, -1) / plan.durations
+        first = xp.clip(self._whole(frame), 0, steps - 1)
+        count, frames, columns = plan.rows.shape
+        flat = plan.rows.reshape(count * frames, columns)
+        at = first + self._whole(xp.cumsum(phase * 0.0 + float(frames), -1)) - frames
+        share = (frame - first)[:, None]
+        before, after = (self._take(flat, index) for index in (at, at + 1))
+        row = before + share * (after - before)
+        h = self._hinges
+        numbers, changes = row[:, : 6 + h], row[:, 6 + h : 12 + 2 * h] * pace[:, None]
+        done = (frame / steps)[:, None]
+        path, turns = placed(xp, w["base"], numbers[:, None], plan.travels, done)
+        sigmas = plan.sigmas[:, None] * w["joint_sigma"]
+        return Reference(
+            self._limits.limited(numbers[:, 6:]),
+            changes[:, :h],
+            path[:, 0],
+            turns[:, 0],
+            changes[:, h : h + 3],
+            changes[:, h + 3 :],
+            row[:, 12 + 2 * h :],
+            1.0 / plan.durations,
+            sigmas,
+            # Copies: torch's plans change where commands do.
+            plan.supported + 0.0,
+            plan.travels + 0.0,
+        )
+
+
+def placed(xp: Any, base: Array, numbers: Array, travel: Array, share: Array) -> list[Array]:
+    """Return base positions (E, S, 3), m, and rotations (E, S, 4) with the travel in them.
+
+    numbers (E, S, 6 or more): position without travel and rotation about the mean `base` (4,).
+    travel (E, 3): ahead, to the left and of the heading. share (E or 1, S): of the cycle done.
+    """
+    done = travel[:, None] * share[..., None]
+    flat = xp.stack([done[..., 0], done[..., 1], done[..., 0] * 0.0], -1)
+    half = 0.5 * numbers[..., 3:6]
+    size = xp.sqrt(xp.sum(half * half, -1) + rotations.TINY)[..., None]
+    turn = xp.concatenate([xp.cos(size), half * (xp.sin(size) / size)], -1)
+    angle = 0.5 * done[..., 2]
+    zero = angle * 0.0
+    heading = xp.stack([xp.cos(angle), zero, zero, xp.sin(angle)], -1)
+    turned = rotations.product(xp, heading, rotations.product(xp, base + 0.0 * turn, turn))
+    return [numbers[..., :3] + flat, turned]
+
+
+def central(xp: Any, steps: Array, turn: Array | None) -> Array:
+    """Return central differences (E, N + 1, n) of a cycle's steps (E, N, n) from frame to frame.
+
+    turn (E,): of the next cycle about the vertical, rad; None for values that it does not turn.
+    """
+    before, after = steps[:, -1:], steps[:, :1]
+    if turn is not None:
+        before, after = (
+            rotations.about_vertical(xp, before, -turn),
+            rotations.about_vertical(xp, after, turn),
+        )
+    return 0.5 * (xp.concatenate([before, steps], 1) + xp.concatenate([steps, after], 1))
