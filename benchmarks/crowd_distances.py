@@ -4,7 +4,7 @@ import time
 
 from rows import Row
 
-from posefield.locomotion import collision_avoidance, locomotion_plan, paths, walking_crowd
+from posefield.locomotion import collision_avoidance, locomotion_plan, walking_crowd
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 
@@ -41,8 +41,8 @@ def _as_drawn(gait: Gait, count: int) -> FloorVectors:
     """Return the places of walks that keep no distances."""
     cells, collision_avoidance.MOST_CELLS = collision_avoidance.MOST_CELLS, 0
     try:
-        characters = paths.draw_characters(gait, count, 0)
-        ways = paths.draw_paths(gait, characters, SECONDS)
+        characters = collision_avoidance.draw_characters(gait, count, 0)
+        ways = collision_avoidance.draw_paths(gait, characters, SECONDS)
     finally:
         collision_avoidance.MOST_CELLS = cells
     frames = int(SECONDS * RATE) + 1

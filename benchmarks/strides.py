@@ -24,7 +24,7 @@ from posefield.common.units import Floats
 from posefield.feet import ball_path, body_plans, footsteps
 from posefield.feet.limbs import Limb
 from posefield.locomotion import gait
-from posefield.locomotion.paths import Route
+from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion.clip import Clip
 from posefield.performance import composition

@@ -35,7 +35,7 @@ CEILINGS = {
     "plain clip": (29, 161, 13),
     "standing feet": (50, 340, 31),
     "pose": (21, 60, 5),
-    "crowd": (45, 367, 37),
+    "crowd": (44, 367, 37),
     "performance": (58, 433, 49),
 }
 """Most modules, functions and classes of each request."""

@@ -9,7 +9,7 @@ import pytest
 import posefield
 from posefield.common.errors import FileError, InvalidField
 from posefield.locomotion import floor_plane
-from posefield.locomotion.paths import Route
+from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
 from posefield.tracks import route_tracks, track_crowd, track_files

@@ -13,10 +13,9 @@ from posefield.common.errors import FileError
 from posefield.common.units import Floats
 from posefield.console.progress import ProgressBar
 from posefield.encode import crowd_formats
-from posefield.locomotion import gait, walking_crowd
-from posefield.locomotion import paths as given
+from posefield.locomotion import gait, locomotion_plan, walking_crowd
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.paths import Route
+from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
 from posefield.question.walk_question import WalkQuestion
@@ -82,7 +81,7 @@ def routes(path: Path) -> Sequence[Route]:
 
     Raises FileError for a file that is not JSON, and InvalidField for invalid routes.
     """
-    return given.parse_routes(_read_json(path))
+    return locomotion_plan.parse_routes(_read_json(path))
 
 
 def _read_json(path: Path) -> Any:

@@ -3,7 +3,8 @@
 Prioritised planning (Erdmann and Lozano-Pérez, "On multiple moving objects", 1987): the walks of
 earlier characters are known functions of time, counted in a grid of time and space. A character
 that would meet one of them goes slower, faster or to one side for a while. Speeds and rates of
-turning stay within those of the gait, and no character depends on later ones.
+turning stay within those of the gait, and no character depends on later ones. The random numbers of
+a character are one row of a table: they depend on the seed and its index, not on the crowd's size.
 """
 
 import math
@@ -14,10 +15,12 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.units import Floats, Indices
-from posefield.locomotion import floor_plane
+from posefield.common.units import CharacterPoints, Floats, Indices, PerCharacter
+from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
-from posefield.locomotion.gait import GaitRegion
+from posefield.locomotion.gait import Gait, GaitRegion
+from posefield.locomotion.locomotion_plan import POINT_SPACING, Paths
+from posefield.motion.clip import Placement
 
 RADIUS = 0.25
 """Radius of a character seen from above, m: half the width of the shoulders."""
@@ -284,3 +287,151 @@ def find_overlaps(
             firsts[key] = min(frame, firsts.get(key, frame))
     found = sorted((frame, pair) for pair, frame in firsts.items())
     return [Overlap(*pair, frame / rate) for frame, pair in found]
+
+
+# Spacing of the initial grid, and largest offset of a character from its grid point, m.
+SPACING, MAX_JITTER = 2.0, 0.5
+# Phases of neighbours on the grid in each direction, and their largest variation: any of the eight
+# neighbours differ by at least a tenth of a cycle.
+PHASE_STEPS, PHASE_VARIATION = (0.4, 0.2), 0.1
+# Rings of the grid around a crowd whose starts are kept free.
+RINGS = 2
+# Wavelengths, m, and weights of the variation of turning and speed along a path.
+WAVELENGTHS, WAVE_WEIGHTS = np.array([23.0, 11.0, 6.1]), np.array([0.5, 0.3, 0.2])
+# Share of the sampled turning that is used, and relative variation of the speed.
+DRAWN_TURNING, SPEED_VARIATION = 0.8, 0.15
+
+
+@dataclass(frozen=True)
+class Characters:
+    """Performers, phases and random numbers of N characters.
+
+    who: (N,), labels by index in `stride.label_rows`, -1 for a model without any. phases: (N,), of
+    the cycle at the beginning. random_numbers: (N, columns), random numbers from 0 to 1 for the
+    paths. later: (M,), starts of further characters of the seed, around these.
+    """
+
+    who: Annotated[Indices, "characters"]
+    phases: PerCharacter
+    random_numbers: Annotated[Floats, "characters columns"]
+    later: Annotated[FloorVectors, "later"]
+
+
+def draw_characters(gait: Gait, count: int, seed: int) -> Characters:
+    """Return the characters of a seed."""
+    all_rows = _random_table((int(np.ceil(np.sqrt(count))) + RINGS) ** 2, seed)
+    table, (rows, columns) = all_rows[:count], grid_cells(count)
+    phases = PHASE_STEPS[0] * rows + PHASE_STEPS[1] * columns + PHASE_VARIATION * table[:, 1]
+    later = _starts(all_rows[:, 2:4])[count:]
+    return Characters(gait.labels.draw(table[:, 0]), phases % 1.0, table[:, 2:], later)
+
+
+def initial_placement(count: int, seed: int) -> Placement:
+    """Return the initial positions and headings of `count` characters' paths."""
+    numbers = _random_table(count, seed)[:, 2:]
+    return Placement(
+        floor_plane.at_height(_starts(numbers[:, :2]), np.zeros(count)), _initial_headings(numbers)
+    )
+
+
+def draw_paths(gait: Gait, characters: Characters, seconds: float) -> Paths:
+    """Return random paths that keep their distances, long enough for `seconds`.
+
+    Beyond them a path goes on with its last speed and curvature.
+    """
+    walks = _draw_walks(gait, characters, seconds)
+    walks = keep_distances(gait.region, walks, characters.later)
+    count = int(np.ceil(gait.region.speeds[1] * seconds / POINT_SPACING)) + 3
+    along = np.linspace(0.0, (count - 1) * POINT_SPACING, count)
+    gone = cumulative_integrals(walks.speeds)
+    speeds, turning = (
+        np.stack([np.interp(along, *pair) for pair in zip(gone, rates, strict=True)])
+        for rates in (walks.speeds, walks.turning)
+    )
+    # Curvatures, 1/m. The trapezoidal rule: that of a step is the mean of those at its ends.
+    bends = turning / speeds
+    turns = np.cumsum(0.5 * POINT_SPACING * (bends[:, 1:] + bends[:, :-1]), axis=1)
+    headings = walks.headings[:, None] + np.pad(turns, ((0, 0), (1, 0)))
+    return Paths(walks.starts, headings, speeds, np.full(len(headings), along[-1]))
+
+
+def _draw_walks(gait: Gait, characters: Characters, seconds: float) -> RandomWalks:
+    """Return random walks of characters that do not know of one another."""
+    numbers = characters.random_numbers
+    waves = 2.0 * np.pi * numbers[:, 4:].reshape(len(numbers), 2, len(WAVELENGTHS))
+    mean_speeds = _captured_speeds(gait, characters.who, numbers[:, 3])
+    along = mean_speeds * STEP * np.arange(int(np.ceil(seconds / STEP)) + 2)
+    speeds = _speeds(gait, mean_speeds, _wave(along, waves[:, 0]))
+    low, high = gait.region.turning(speeds)
+    # Straight where the wave is zero.
+    turning = _vary(DRAWN_TURNING * _wave(along, waves[:, 1]), low, np.zeros(1), high)
+    return RandomWalks(_starts(numbers[:, :2]), _initial_headings(numbers), speeds, turning)
+
+
+def _random_table(count: int, seed: int) -> Annotated[Floats, "{count} columns"]:
+    return np.random.Generator(np.random.PCG64(seed)).random((count, 6 + 2 * len(WAVELENGTHS)))
+
+
+def _initial_headings(
+    numbers: Annotated[Floats, "characters columns"],
+) -> PerCharacter:
+    return 2.0 * np.pi * numbers[:, 2]
+
+
+def _starts(spot: Annotated[Floats, "characters 2"]) -> Annotated[FloorVectors, "characters"]:
+    """Return starts (N,), m, on a grid numbered in growing squares.
+
+    A character's start does not depend on how many characters follow.
+    """
+    rows, columns = grid_cells(len(spot))
+    jitter = MAX_JITTER * (2.0 * spot - 1.0)
+    return (SPACING * rows + jitter[:, 0]) + 1j * (SPACING * columns + jitter[:, 1])
+
+
+def grid_cells(
+    count: int,
+) -> tuple[Annotated[Indices, "characters"], Annotated[Indices, "characters"]]:
+    """Return the rows and columns (N,) of a grid that is numbered in growing squares."""
+    number = np.arange(count)
+    ring = np.sqrt(number).astype(np.int64)
+    on = number - ring**2
+    return np.minimum(2 * ring - on, ring), np.minimum(on, ring)
+
+
+def _wave(
+    along: Annotated[Floats, "characters steps"], phases: Annotated[Floats, "characters waves"]
+) -> Annotated[Floats, "characters steps"]:
+    """Return values (N, T) from -1 to 1 that vary smoothly along (N, T) m."""
+    angles = 2.0 * np.pi * along[..., None] / WAVELENGTHS + phases[:, None]
+    return np.sin(angles) @ WAVE_WEIGHTS
+
+
+def _captured_speeds(
+    gait: Gait, combinations: Annotated[Indices, "characters"], numbers: PerCharacter
+) -> Annotated[Floats, "characters 1"]:
+    """Return speeds (N, 1), m/s, of captured clips, each of the character's own performer."""
+    moved_by = stride.clip_performers(gait.session.card)
+    order = np.argsort(moved_by, kind="stable")
+    first, after = (
+        np.searchsorted(moved_by[order], combinations, side) for side in ("left", "right")
+    )
+    clips = order[first + (numbers * (after - first)).astype(np.int64)]
+    return gait.rates[clips, :1]
+
+
+def _speeds(
+    gait: Gait,
+    mean_speeds: Annotated[Floats, "characters 1"],
+    wave: CharacterPoints,
+) -> CharacterPoints:
+    """Return speeds (N, K), m/s, that vary about the mean ones (N, 1)."""
+    captured = np.array(gait.region.speeds)
+    low, high = captured + SPEED_MARGIN * (captured[::-1] - captured)
+    middle = np.clip(mean_speeds, low, high)
+    slower = np.maximum((1.0 - SPEED_VARIATION) * middle, low)
+    faster = np.minimum((1.0 + SPEED_VARIATION) * middle, high)
+    return _vary(wave, slower, middle, faster)
+
+
+def _vary(wave: Floats, low: Floats, middle: Floats, high: Floats) -> Floats:
+    return middle + np.where(wave < 0.0, middle - low, high - middle) * wave

@@ -1,4 +1,4 @@
-"""Locomotion plans: positions, phases, controls and levels of detail of all characters over time.
+"""Paths on the floor, and plans along them: positions, phases, controls and levels of detail.
 
 A plan is cheap and computed for all characters and frames at once. Poses are computed for any pairs
 of character and frame. Between two levels, poses of both are blended over a quarter of a second;
@@ -6,23 +6,153 @@ the levels are known in advance, so a finer one is complete before the coarser w
 """
 
 from dataclasses import dataclass, replace
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
-from posefield.common.units import CharacterFrames, CharacterPoints, Floats, Indices, PerCharacter
+from posefield.common.units import (
+    CharacterFrames,
+    CharacterPoints,
+    Floats,
+    Indices,
+    PerCharacter,
+)
 from posefield.inference import level_selection
-from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
+from posefield.inference.level_selection import HYSTERESIS, MAX_COORDINATE, Camera, LevelTable
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait, WalkerLabels
-from posefield.locomotion.paths import POINT_SPACING, Paths
 from posefield.locomotion.stepping import Stepping
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.motion import quat
+
+# Distance between known points of a path, m. Heading is linear between them.
+POINT_SPACING = 0.1
+
+
+@dataclass(frozen=True)
+class Paths:
+    """N paths, each known at K points that lie `POINT_SPACING` apart along it.
+
+    starts: (N,), first points. headings: (N, K), rad, of the tangents, without jumps; between two
+    points a path is an arc. speeds: (N, K), m/s. lengths: (N,), m.
+    """
+
+    starts: Annotated[FloorVectors, "characters"]
+    headings: CharacterPoints
+    speeds: CharacterPoints
+    lengths: PerCharacter
+
+    @property
+    def curvatures(self) -> CharacterPoints:
+        """Curvature (N, K), 1/m, positive to the left."""
+        return np.gradient(self.headings, POINT_SPACING, axis=1)
+
+    @property
+    def places(self) -> Annotated[FloorVectors, "characters points"]:
+        """Known points of the paths (N, K)."""
+        turns = np.diff(self.headings, axis=1)
+        steps = floor_plane.unit_vectors(self.headings[:, :-1]) * floor_plane.arc_displacement(
+            np.array(POINT_SPACING), turns
+        )
+        return self.starts[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
+
+    def at(
+        self, gone: CharacterFrames
+    ) -> tuple[Annotated[FloorVectors, "characters frames"], CharacterFrames]:
+        """Return points (N, F) and headings (N, F), rad, of the tangents after (N, F) metres."""
+        before, share = self._between(gone)
+        turns = share * np.take_along_axis(np.diff(self.headings, axis=1), before, axis=1)
+        first = np.take_along_axis(self.headings, before, axis=1)
+        along = floor_plane.unit_vectors(first) * floor_plane.arc_displacement(
+            POINT_SPACING * share, turns
+        )
+        return np.take_along_axis(self.places, before, axis=1) + along, first + turns
+
+    def interpolate(
+        self,
+        values: Annotated[Floats, "characters points *values"],
+        gone: CharacterFrames,
+    ) -> Annotated[Floats, "characters frames *values"]:
+        """Return values (N, K, ...) of the known points after (N, F) metres: (N, F, ...)."""
+        before, share = self._between(gone)
+        rows = np.arange(len(values))[:, None]
+        share = share.reshape(*share.shape, *[1] * (values.ndim - 2))
+        return (1.0 - share) * values[rows, before] + share * values[rows, before + 1]
+
+    def _between(
+        self, gone: CharacterFrames
+    ) -> tuple[Annotated[Indices, "characters frames"], CharacterFrames]:
+        before = np.minimum((gone / POINT_SPACING).astype(np.int64), self.headings.shape[1] - 2)
+        return before, gone / POINT_SPACING - before
+
+
+# Largest length, m, which takes hours to walk, and most waypoints, whose spline takes seconds.
+MAX_LENGTH, MAX_WAYPOINTS = 10_000.0, 1_000
+
+
+@dataclass(frozen=True)
+class Route:
+    """Waypoints (P, 2) in order, x to the left and z forward, m, and one speed, m/s."""
+
+    waypoints: Floats
+    speed: float
+
+
+def parse_routes(plain: Any) -> list[Route]:
+    """Return the routes of [{"waypoints": [[x, z], ...], "speed": v}, ...].
+
+    Raises InvalidField for malformed values.
+    """
+    if not isinstance(plain, list) or not plain:
+        raise InvalidField("paths", "expected a list of one or more routes")
+    return [_parse_route(f"paths/{index}", entry) for index, entry in enumerate(plain)]
+
+
+def _parse_route(field: str, entry: Any) -> Route:
+    if not isinstance(entry, dict) or set(entry) != {"waypoints", "speed"}:
+        raise InvalidField(field, "expected an object of waypoints and speed")
+    try:
+        waypoints = np.array(entry["waypoints"])
+        if waypoints.dtype.kind not in "if" or isinstance(entry["speed"], str | bool):
+            raise ValueError(waypoints.dtype)
+        return Route(waypoints.astype(float), float(entry["speed"]))
+    except (TypeError, ValueError) as fault:
+        raise InvalidField(field, "expected pairs of numbers and a number") from fault
+
+
+def check_route(gait: Gait, index: int, route: Route) -> None:
+    """Raise InvalidField, with its number, for a route that no walker of the gait can follow."""
+    points, (low, high) = route.waypoints, gait.region.speeds
+    field = f"paths/{index}/waypoints"
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
+        raise InvalidField(
+            field, f"numbers {points.shape}, expected two or more pairs of finite ones"
+        )
+    if len(points) > MAX_WAYPOINTS or not (np.abs(points) <= MAX_COORDINATE).all():
+        raise InvalidField(
+            field,
+            f"{len(points)} up to {np.abs(points).max():g} m away, expected at most "
+            f"{MAX_WAYPOINTS} up to {MAX_COORDINATE:g} m",
+        )
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    if length > MAX_LENGTH:
+        raise InvalidField(field, f"{length:.0f} m from one to the last, expected {MAX_LENGTH:g} m")
+    if not low <= route.speed <= high:
+        raise InvalidField(
+            f"paths/{index}/speed", f"{route.speed:g} m/s, expected {low:.3g} to {high:.3g} m/s"
+        )
+    short = np.linalg.norm(np.diff(points, axis=0), axis=1) < POINT_SPACING
+    if short.any():
+        at = int(np.argmax(short))
+        raise InvalidField(
+            f"paths/{index}/waypoints/{at + 1}",
+            f"less than {POINT_SPACING:g} m from the one before, expected a way to it",
+        )
+
 
 Numbers = TypeVar("Numbers", Floats, FloorVectors)
 

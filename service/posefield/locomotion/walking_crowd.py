@@ -16,7 +16,6 @@ from posefield.locomotion import (
     collision_avoidance,
     floor_plane,
     locomotion_plan,
-    paths,
     stride,
 )
 from posefield.locomotion.collision_avoidance import RADIUS
@@ -62,8 +61,8 @@ def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) 
     Raises InvalidField for numbers out of range.
     """
     frames = frame_count(count, seconds, rate, seed)
-    characters = paths.draw_characters(gait, count, seed)
-    ways = paths.draw_paths(gait, characters, seconds)
+    characters = collision_avoidance.draw_characters(gait, count, seed)
+    ways = collision_avoidance.draw_paths(gait, characters, seconds)
     return locomotion_plan.plan_along_paths(
         gait, ways, characters.who, characters.phases, frames, rate
     )
@@ -345,7 +344,7 @@ def build_crowd(
     crowd, places = crowd_of_plan(gait.session, plan, levels, make), plan.places
     if order.motions is not None:
         # The characters reuse the motions in turn.
-        stands = paths.initial_placement(order.count, order.seed)
+        stands = collision_avoidance.initial_placement(order.count, order.seed)
         motion = np.arange(len(stands)) % len(plan.who)
         crowd = replace(crowd, placement=stands, motion=motion)
     if not collision_avoidance.is_searchable(len(crowd.motion), plan.places.shape[1], plan.rate):

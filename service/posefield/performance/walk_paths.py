@@ -18,7 +18,7 @@ from posefield.common.units import Floats, PerPoint
 from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import Ends, FloorVectors
-from posefield.locomotion.paths import MAX_LENGTH, MAX_WAYPOINTS
+from posefield.locomotion.locomotion_plan import MAX_LENGTH, MAX_WAYPOINTS
 from posefield.performance.passage import FloorMotion
 
 SPACING = 0.02

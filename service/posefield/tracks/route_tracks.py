@@ -5,9 +5,9 @@ from math import ceil
 
 import numpy as np
 
-from posefield.locomotion import paths
+from posefield.locomotion import locomotion_plan
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.paths import Route
+from posefield.locomotion.locomotion_plan import Route
 from posefield.performance import walk_paths, walk_plan, walk_request
 from posefield.performance.passage import RATE
 from posefield.performance.walk_request import SpeedRamps
@@ -26,7 +26,7 @@ def tracks_of_routes(gait: Gait, routes: Sequence[Route], seconds: float) -> tup
     count = ceil(seconds * RATE) + 1
     tracks = []
     for index, route in enumerate(routes):
-        paths.check_route(gait, index, route)
+        locomotion_plan.check_route(gait, index, route)
         path = walk_paths.through(route.waypoints, None, None)
         curve = np.zeros(1), np.array([route.speed])
         slower = path.distances, walk_plan.curve_speeds(gait, path)

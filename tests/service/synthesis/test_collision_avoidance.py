@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from posefield.inference import session
-from posefield.locomotion import collision_avoidance, gait, paths, walking_crowd
-from posefield.locomotion.paths import Route
+from posefield.locomotion import collision_avoidance, gait, walking_crowd
+from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
@@ -58,8 +58,8 @@ def test_overlaps_are_those_of_all_pairs(rng):
 
 
 def test_neighbours_begin_at_different_phases(own):
-    drawn = paths.draw_characters(own, 100, 3)
-    grid = np.stack(paths.grid_cells(100))
+    drawn = collision_avoidance.draw_characters(own, 100, 3)
+    grid = np.stack(collision_avoidance.grid_cells(100))
     beside = np.abs(grid[:, :, None] - grid[:, None]).max(axis=0) == 1
     gaps = np.abs(drawn.phases[:, None] - drawn.phases)[beside]
     assert np.minimum(gaps, 1.0 - gaps).min() >= 0.1 - 1e-9

@@ -8,7 +8,14 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import floor_plane, gait, locomotion_plan, paths, stride, walking_crowd
+from posefield.locomotion import (
+    collision_avoidance,
+    floor_plane,
+    gait,
+    locomotion_plan,
+    stride,
+    walking_crowd,
+)
 from posefield.motion import quat, skeleton
 
 # float32 of places some metres away, and of phases after some strides.
@@ -137,8 +144,8 @@ def wandering(own, count, seconds=6.0, seed=3):
 
 
 def test_who_walks_keeps_to_the_way(own):
-    characters = paths.draw_characters(own, 20, 3)
-    ways = paths.draw_paths(own, characters, 6.0)
+    characters = collision_avoidance.draw_characters(own, 20, 3)
+    ways = collision_avoidance.draw_paths(own, characters, 6.0)
     frames = 181
     plan = locomotion_plan.plan_along_paths(
         own, ways, characters.who, characters.phases, frames, RATE
@@ -174,7 +181,7 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
 
 def test_a_way_that_ends_too_soon_is_refused(own):
     starts = np.zeros(1, dtype=np.complex128)
-    ways = paths.Paths(starts, np.zeros((1, 31)), np.ones((1, 31)), np.array([3.0]))
+    ways = locomotion_plan.Paths(starts, np.zeros((1, 31)), np.ones((1, 31)), np.array([3.0]))
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
         locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
 

@@ -5,8 +5,8 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import floor_plane, gait, paths
-from posefield.locomotion.paths import POINT_SPACING, Paths
+from posefield.locomotion import collision_avoidance, floor_plane, gait, locomotion_plan
+from posefield.locomotion.locomotion_plan import POINT_SPACING, Paths
 
 
 @pytest.fixture(scope="module")
@@ -40,12 +40,14 @@ def test_even_turns_are_a_circle_between_places_too():
 )
 def test_what_is_no_route_is_refused(plain, field):
     with pytest.raises(InvalidField) as refusal:
-        paths.parse_routes(plain)
+        locomotion_plan.parse_routes(plain)
     assert refusal.value.field == field
 
 
 def test_characters_that_wander_stay_within_what_was_sampled(own):
-    ways = paths.draw_paths(own, paths.draw_characters(own, 200, 1), 10.0)
+    ways = collision_avoidance.draw_paths(
+        own, collision_avoidance.draw_characters(own, 200, 1), 10.0
+    )
     turning = ways.speeds * ways.curvatures
     assert own.region.contains(ways.speeds, turning).all()
     # They do turn, and change their speed.
@@ -55,7 +57,9 @@ def test_characters_that_wander_stay_within_what_was_sampled(own):
 
 def test_nobody_begins_within_a_metre_of_another_however_many(own):
     for count in (2, 50, 701):
-        ways = paths.draw_paths(own, paths.draw_characters(own, count, 5), 1.0)
+        ways = collision_avoidance.draw_paths(
+            own, collision_avoidance.draw_characters(own, count, 5), 1.0
+        )
         apart = np.abs(ways.starts[:, None] - ways.starts) + 9.0 * np.eye(count)
         assert apart.min() >= 1.0
     side = np.ptp(ways.starts.real)
@@ -63,14 +67,16 @@ def test_nobody_begins_within_a_metre_of_another_however_many(own):
 
 
 def test_a_character_hangs_on_its_number_and_the_seed_alone(own):
-    few, many = (paths.draw_characters(own, count, 7) for count in (5, 10))
+    few, many = (collision_avoidance.draw_characters(own, count, 7) for count in (5, 10))
     assert np.array_equal(few.who, many.who[:5])
     assert np.array_equal(few.random_numbers, many.random_numbers[:5])
-    assert set(paths.draw_characters(own, 50, 7).who) == {0, 1}
-    of_few, of_many = (paths.draw_paths(own, some, 4.0) for some in (few, many))
+    assert set(collision_avoidance.draw_characters(own, 50, 7).who) == {0, 1}
+    of_few, of_many = (collision_avoidance.draw_paths(own, some, 4.0) for some in (few, many))
     assert np.array_equal(of_few.starts, of_many.starts[:5])
     assert np.array_equal(of_few.headings, of_many.headings[:5])
-    assert not np.array_equal(paths.draw_characters(own, 5, 8).random_numbers, few.random_numbers)
+    assert not np.array_equal(
+        collision_avoidance.draw_characters(own, 5, 8).random_numbers, few.random_numbers
+    )
 
 
 ROUNDING = 1e-12

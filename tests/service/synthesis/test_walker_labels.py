@@ -7,7 +7,7 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import gait, locomotion_plan, paths, walking_crowd
+from posefield.locomotion import collision_avoidance, gait, locomotion_plan, walking_crowd
 
 RATE, COUNT = 30.0, 60
 MIXED = {"style": {"marching": 0.7, "sneaking": 0.3}}
@@ -38,12 +38,12 @@ def test_a_name_holds_for_all_and_the_other_sets_vary(own):
 
 def test_a_mixture_draws_its_names_by_their_weights(own):
     labelled = own.with_labels(MIXED)
-    drawn = paths.draw_characters(labelled, 4000, 5).who
+    drawn = collision_avoidance.draw_characters(labelled, 4000, 5).who
     styles = np.array([labelled.labels.rows[who]["style"] for who in drawn])
     assert np.mean(styles == "marching") == pytest.approx(0.7, abs=0.03)
     assert not np.any(styles == "plain")
     # Without a request all styles are as frequent.
-    free = paths.draw_characters(own, 4000, 5).who
+    free = collision_avoidance.draw_characters(own, 4000, 5).who
     assert np.mean([own.labels.rows[who]["style"] == "plain" for who in free]) > 0.3
     facts, _ = made(own, MIXED, count=2)
     assert facts["labels"] == {"style": [MIXED["style"]] * 2}
