@@ -1,6 +1,7 @@
 """Readers of tracks, and what is told of those that cannot be used."""
 
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
 from posefield.tracks import route_tracks, track_crowd, track_files
-from posefield.tracks.track import MAX_PEOPLE
+from posefield.tracks.track import MAX_PEOPLE, of_arrays
 from posefield.tracks.track_files import TrackReading
 
 DEGREES = TrackReading("degrees")
@@ -232,3 +233,37 @@ def test_people_that_overlap_are_told(walk):
     assert facts["overlaps"]["pairs"] == 1
     apart = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks[:1]).facts
     assert apart["overlaps"]["pairs"] == 0
+
+
+def test_a_person_has_the_same_bytes_alone_and_in_a_crowd(walk):
+    routes = [Route(np.array([[x, 0.0], [x, 3.0], [x + 2.0, 4.0]]), 1.1) for x in range(3)]
+    tracks = route_tracks.tracks_of_routes(walk.gait, routes, 4.0)
+    short = replace(tracks[1], times=tracks[1].times[:150], points=tracks[1].points[:150])
+    crowd = (tracks[0], short, *tracks[1:])
+    order = CrowdOrder(len(crowd), take="index")
+    together = motions_by_person(walk, order, crowd)
+    assert len(together) == 3
+    for track in (tracks[0], tracks[2]):
+        alone = motions_by_person(walk, order, (track,))
+        assert alone[track.person] == together[track.person]
+    assert together["0"] != together["2"]
+
+
+def motions_by_person(walk, order, tracks):
+    crowd = track_crowd.find_people(walk, walk.gait, order, tracks)
+    return {
+        person.track.person: motions.rotations[index].tobytes()
+        + motions.root_position[index].tobytes()
+        for people, _, motions in crowd.batches()
+        for index, person in enumerate(people)
+    }
+
+
+@pytest.mark.parametrize("rate", [1.0, 1000.0])
+def test_slow_and_fast_samples_are_followed(walk, rate):
+    times = np.arange(0.0, 6.0 + 1e-9, 1.0 / rate)
+    points = np.column_stack([1.2 * times, np.zeros(len(times))])
+    person = of_arrays("a", times, points)
+    crowd = track_crowd.find_people(walk, walk.gait, CrowdOrder(1), (person,))
+    assert crowd.frames == 181
+    assert crowd.people[0].path.errors.max() < 1e-6

@@ -73,8 +73,8 @@ class TrackCrowd:
     def motions(self, people: Sequence[Person]) -> tuple[LocomotionPlan, Motions]:
         """Return the plan and the motions of people, each from the first frame of its own path.
 
-        The plan is in the world and in the model's size. The motions have the frames of the
-        longest path, begin at the start of their paths, and each has its person's size.
+        The paths have equal lengths. The plan is in the world and in the model's size; the motions
+        begin at the start of their paths, and each has its person's size.
         """
         rate, card = self.order.fps, self.gait.session.card
         combinations = self.gait.labels.draw(np.array([person.number for person in people]))
@@ -101,15 +101,16 @@ class TrackCrowd:
         )
 
     def batches(self) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
-        """Yield people with their plans and motions, as many together as fit a batch."""
+        """Yield people with their plans and motions, neighbours of equal length together.
+
+        The motion of a person does not depend on the others: a crowd may be made in parts.
+        """
         first = 0
         while first < len(self.people):
             cancellation.check()
-            end, longest = first, 0
-            while end < len(self.people):
-                longest = max(longest, len(self.people[end].path))
-                if end > first and longest * (end + 1 - first) > POSES_PER_BATCH:
-                    break
+            end, frames = first + 1, len(self.people[first].path)
+            most = first + max(1, POSES_PER_BATCH // frames)
+            while end < min(most, len(self.people)) and len(self.people[end].path) == frames:
                 end += 1
             people = self.people[first:end]
             yield people, *self.motions(people)

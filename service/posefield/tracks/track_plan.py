@@ -129,14 +129,14 @@ def plan_people(
     scales: PerCharacter,
     rate: float,
 ) -> LocomotionPlan:
-    """Return the plan of people (N) in the frames of the longest of their paths.
+    """Return the plan of people (N) whose paths have equal lengths.
 
     combinations: of labels of each. numbers: random ones from 0 to 1, of the phase and of the
-    sway. scales: heights over those of the model. Who has arrived stands on.
+    sway. scales: heights over those of the model.
     """
-    gait, frames = walkers.gait, max(map(len, paths))
+    gait, frames = walkers.gait, len(paths[0])
     plans = [
-        _plan_person(walkers, path, int(combination), draw, scale, frames, rate)
+        _plan_person(walkers, path, int(combination), draw, scale, rate)
         for path, combination, draw, scale in zip(
             paths, combinations, numbers, scales.tolist(), strict=True
         )
@@ -175,14 +175,11 @@ def _plan_person(
     labels: int,
     numbers: Annotated[Floats, "2"],
     scale: float,
-    frames: int,
     rate: float,
 ) -> _PersonPlan:
     table, standing = walkers.striders[labels], walkers.standing
-    pad = (0, frames - len(path))
-    points = np.pad(path.points, pad, "edge") / scale
-    velocities = np.pad(path.velocities, pad) / scale
-    headings = np.pad(path.headings, pad, "edge")
+    frames, headings = len(path), path.headings
+    points, velocities = path.points / scale, path.velocities / scale
     low, high = walkers.gait.region.speeds
     slow = smooth(velocities, SLOW_WINDOW * rate, fixed=False)
     stepped = np.where(np.abs(velocities) < SLOW, slow, velocities) * np.exp(-1j * headings)
