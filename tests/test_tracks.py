@@ -59,7 +59,20 @@ def test_all_formats_give_the_same_person(tmp_path):
     )
     # JuPedSim's first frame has no orientation yet.
     rows = [(round(10 * t), 7, x, y, 0.0, float(t > 0.0)) for t, x, y in steps]
+    states = "".join(
+        f"<state><position><point><x>{x}</x><y>{y}</y></point></position>"
+        f"<orientation><exact>{np.pi / 2}</exact></orientation>"
+        f"<time><exact>{round(10 * t)}</exact></time></state>"
+        for t, x, y in steps
+    )
+    road = (
+        '<commonRoad timeStepSize="0.1">'
+        '<dynamicObstacle id="8"><type>car</type><initialState/></dynamicObstacle>'
+        f'<dynamicObstacle id="7"><type>pedestrian</type><trajectory>{states}</trajectory>'
+        "</dynamicObstacle></commonRoad>"
+    )
     files = [
+        write(tmp_path, "road.xml", road),
         write(tmp_path, "a.csv", table),
         write(tmp_path, "a.xml", f"<fcd-export>{xml}</fcd-export>"),
         database(tmp_path / "a.sqlite", rows),
@@ -91,6 +104,12 @@ BAD = [
     ("none.sqlite", "no database", "no SQLite database"),
     ("none.txt", "1 0 0 0 0\n", "expected '# framerate:' above 0"),
     ("none.xml", "<routes/>", "none.xml:1: root element 'routes', expected 'fcd-export'"),
+    (
+        "state.xml",
+        '<commonRoad timeStepSize="0.1"><dynamicObstacle id="7"><type>pedestrian</type>'
+        "<initialState/></dynamicObstacle></commonRoad>",
+        "state.xml:1: a state without exact time",
+    ),
     ("cut.xml", "<fcd-export>", "no XML: no element found"),
     (
         "bomb.xml",

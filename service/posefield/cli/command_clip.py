@@ -119,8 +119,8 @@ def crowd(
         Path | None,
         typer.Option(
             help="instead of random paths: places over time, which people follow for as long as "
-            "they last: SUMO FCD (.xml), JuPedSim (.sqlite, .txt) or a table (.csv) of "
-            "time,id,x,y or time,id,x,y,heading, in seconds and metres, x east and y north",
+            "they last: SUMO FCD or CommonRoad (.xml), JuPedSim (.sqlite, .txt) or a table (.csv) "
+            "of time,id,x,y or time,id,x,y,heading, in seconds and metres, x east and y north",
             metavar="FILE",
         ),
     ] = None,

@@ -9,7 +9,7 @@ import math
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Literal
 from xml.parsers import expat
@@ -215,7 +215,8 @@ class _XmlEvents:
 
     path: Path
     start: Callable[[str, dict[str, str], int], None]
-    end: Callable[[str], None]
+    end: Callable[[str, str], None]
+    text: str = ""
 
     def feed(self) -> Iterator[None]:
         """Parse the file; yield after each chunk."""
@@ -223,7 +224,8 @@ class _XmlEvents:
         parser.StartElementHandler = lambda name, values: self.start(
             name, values, parser.CurrentLineNumber
         )
-        parser.EndElementHandler = self.end
+        parser.EndElementHandler = self._end
+        parser.CharacterDataHandler = self._add
         parser.StartDoctypeDeclHandler = self._refuse
         parser.EntityDeclHandler = self._refuse
         try:
@@ -237,6 +239,14 @@ class _XmlEvents:
             message = expat.ErrorString(fault.code)
             raise FileError(self.path, f"no XML: {message}", fault.lineno) from fault
 
+    def _add(self, text: str) -> None:
+        # Numbers are shorter.
+        self.text = (self.text + text)[-200:]
+
+    def _end(self, name: str) -> None:
+        self.end(name, self.text.strip())
+        self.text = ""
+
     def _refuse(self, *_: Any) -> None:
         raise FileError(self.path, "a document type or an entity, expected elements alone")
 
@@ -247,16 +257,14 @@ class _SumoReader:
 
     path: Path
     rows: list[Row]
-    steps: list[tuple[float, float]]
+    steps: list[tuple[float, float]] = field(default_factory=list)
     time: float | None = None
-    root: str | None = None
+
+    def end(self, name: str, text: str) -> None:
+        """Take the end of an element: all is in its attributes."""
 
     def start(self, name: str, values: dict[str, str], line: int) -> None:
         """Take an element."""
-        if self.root is None:
-            self.root = name
-            if name != "fcd-export":
-                raise FileError(self.path, f"root element {name!r}, expected 'fcd-export'", line)
         if name == "timestep":
             self.time = self._value(values, "time", line)
         elif name == "person":
@@ -300,12 +308,71 @@ class _SumoReader:
         self.last: dict[str, tuple[float, float, float]] = {}
 
 
+@dataclass
+class _CommonRoadReader:
+    """Rows of the pedestrians of a CommonRoad scenario, as its elements come."""
+
+    path: Path
+    rows: list[Row]
+    step: float = math.nan
+    person: str = ""
+    kind: str = ""
+    line: int = 0
+    elements: list[str] = field(default_factory=list)
+    state: dict[str, float] = field(default_factory=dict)
+
+    def start(self, name: str, values: dict[str, str], line: int) -> None:
+        """Take an element."""
+        self.elements.append(name)
+        self.line = line
+        if name == "commonRoad":
+            self.step = _number(self.path, values.get("timeStepSize", ""), "timeStepSize", line)
+        elif name == "dynamicObstacle":
+            self.person, self.kind = values.get("id", ""), ""
+
+    def end(self, name: str, text: str) -> None:
+        """Take the end of an element, and its text."""
+        self.elements.pop()
+        above = self.elements[-1] if self.elements else ""
+        if name == "type" and above == "dynamicObstacle":
+            self.kind = text
+        elif (above, name) in (("point", "x"), ("point", "y")):
+            self.state[name] = _number(self.path, text, name, self.line)
+        elif name == "exact" and above in ("time", "orientation"):
+            self.state[above] = _number(self.path, text, above, self.line)
+        elif name in ("initialState", "state"):
+            if self.kind == "pedestrian":
+                if missing := [key for key in ("time", "x", "y") if key not in self.state]:
+                    raise FileError(self.path, f"a state without exact {missing[0]}", self.line)
+                time, x, y = (self.state[key] for key in ("time", "x", "y"))
+                angle = self.state.get("orientation", math.nan)
+                self.rows.append((self.person, self.step * time, x, y, angle, self.line))
+            self.state = {}
+
+
+ROOTS: dict[str, Callable[[Path, list[Row]], _SumoReader | _CommonRoadReader]] = {
+    "fcd-export": _SumoReader,
+    "commonRoad": _CommonRoadReader,
+}
+"""Readers of XML by its root element."""
+
+
 def _xml_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
-    """Yield the rows of SUMO's floating car data, vehicles left out."""
-    reader = _SumoReader(path, [], [])
-    for _ in _XmlEvents(path, reader.start, lambda name: None).feed():
-        yield from reader.rows
-        reader.rows.clear()
+    """Yield the rows of people in SUMO's floating car data or a CommonRoad scenario."""
+    rows: list[Row] = []
+    readers: list[_SumoReader | _CommonRoadReader] = []
+
+    def start(name: str, values: dict[str, str], line: int) -> None:
+        if not readers:
+            if name not in ROOTS:
+                expected = " or ".join(map(repr, ROOTS))
+                raise FileError(path, f"root element {name!r}, expected {expected}", line)
+            readers.append(ROOTS[name](path, rows))
+        readers[0].start(name, values, line)
+
+    for _ in _XmlEvents(path, start, lambda name, text: readers[0].end(name, text)).feed():
+        yield from rows
+        rows.clear()
 
 
 READERS: dict[str, Callable[[Path, TrackReading], Iterator[Row]]] = {
