@@ -17,7 +17,7 @@ from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis import poses
 
 CLIP = "/v1/models/reach/clip"
-FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack")
+FORMATS = ("usda", "usdc", "usdz", "json", "bvh", "glb", "vrma", "npz", "arrow", "msgpack")
 
 
 def url(path, controls, **more):

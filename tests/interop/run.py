@@ -20,6 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import addon
+import avatars
 import blender_bvh
 import blender_motion
 import cache
@@ -91,6 +92,7 @@ def main() -> int:
         slow_clients=slow_clients.faults,
         curves=lambda: faces.faults(python, node),
         engines=lambda: engines.faults(*environment.node()),
+        avatars=lambda: avatars.faults(*environment.node()),
         page=lambda: page.faults(node),
         addon=addon.faults,
         godot=godot.faults,

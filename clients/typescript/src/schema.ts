@@ -175,7 +175,7 @@ export interface paths {
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
                  * @example usda
                  */
                 format: components["parameters"]["clipEnding"];
@@ -184,13 +184,13 @@ export interface paths {
         };
         /**
          * Get a clip in a format
-         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up. A model of a robot also has the reference motions that programs which train robots read, such as `mjlab.npz`, always in metres with Z up (since 5.2.0).
+         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `vrma`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF and VRM animations are always in metres with Y up. A model of a robot also has the reference motions that programs which train robots read, such as `mjlab.npz`, always in metres with Z up. These and `vrma` are there since 5.2.0.
          */
         get: operations["getClipInFormat"];
         put?: never;
         /**
          * Query a clip in a format
-         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF is always in metres with Y up. A model of a robot also has the reference motions that programs which train robots read, such as `mjlab.npz`, always in metres with Z up (since 5.2.0).
+         * @description The response is `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `vrma`, `npz`, `arrow` or `msgpack`. By default lengths are in metres and Y is up. BVH files are in centimetres by default. glTF and VRM animations are always in metres with Y up. A model of a robot also has the reference motions that programs which train robots read, such as `mjlab.npz`, always in metres with Z up. These and `vrma` are there since 5.2.0.
          */
         post: operations["queryClipInFormat"];
         delete?: never;
@@ -483,7 +483,7 @@ export interface paths {
             header?: never;
             path: {
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack.
                  * @example usda
                  */
                 format: components["parameters"]["clipFormat"];
@@ -494,7 +494,7 @@ export interface paths {
         put?: never;
         /**
          * Query a performance in a format
-         * @description The response is the whole performance as `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. Only `json` has a plan. Since 4.1.0.
+         * @description The response is the whole performance as `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `vrma`, `npz`, `arrow` or `msgpack`. Only `json` has a plan. Since 4.1.0.
          */
         post: operations["queryPerformanceInFormat"];
         delete?: never;
@@ -1355,7 +1355,7 @@ export interface components {
              * @description File format of all performances, as a file extension.
              * @enum {string}
              */
-            format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
+            format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "vrma" | "npz" | "arrow" | "msgpack";
             layout?: components["schemas"]["PerformanceLayout"];
             character?: components["schemas"]["CharacterName"];
             scripts: components["schemas"]["NamedScript"][];
@@ -1651,7 +1651,7 @@ export interface components {
              * @description File format of all clips, as a file extension.
              * @enum {string}
              */
-            format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
+            format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "vrma" | "npz" | "arrow" | "msgpack";
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
@@ -2525,6 +2525,7 @@ export interface components {
                 "application/json": components["schemas"]["ClipDocument"];
                 "application/x-bvh": string;
                 "model/gltf-binary": string;
+                "model/vnd.vrma": string;
                 "application/x-npz": string;
                 "application/vnd.apache.arrow.stream": string;
                 "application/vnd.msgpack": string;
@@ -2554,6 +2555,7 @@ export interface components {
                 "application/json": components["schemas"]["ClipDocument"];
                 "application/x-bvh": string;
                 "model/gltf-binary": string;
+                "model/vnd.vrma": string;
                 "application/x-npz": string;
                 "application/vnd.apache.arrow.stream": string;
                 "application/vnd.msgpack": string;
@@ -2643,6 +2645,7 @@ export interface components {
                 "application/json": components["schemas"]["PerformanceDocument"];
                 "application/x-bvh": string;
                 "model/gltf-binary": string;
+                "model/vnd.vrma": string;
                 "application/x-npz": string;
                 "application/vnd.apache.arrow.stream": string;
                 "application/vnd.msgpack": string;
@@ -2920,15 +2923,15 @@ export interface components {
          */
         model: string;
         /**
-         * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+         * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack.
          * @example usda
          */
-        clipFormat: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
+        clipFormat: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "vrma" | "npz" | "arrow" | "msgpack";
         /**
-         * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
+         * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
          * @example usda
          */
-        clipEnding: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack" | "unitree.csv" | "qpos.csv" | "holosoma.npz" | "mjlab.npz" | "beyondmimic.npz" | "isaaclab.npz" | "locomujoco.npz" | "qpos.npz" | "gmr.pkl" | "mimickit.pkl" | "asap.pkl" | "awd.json" | "amp.txt";
+        clipEnding: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "vrma" | "npz" | "arrow" | "msgpack" | "unitree.csv" | "qpos.csv" | "holosoma.npz" | "mjlab.npz" | "beyondmimic.npz" | "isaaclab.npz" | "locomujoco.npz" | "qpos.npz" | "gmr.pkl" | "mimickit.pkl" | "asap.pkl" | "awd.json" | "amp.txt";
         /**
          * @description JSON, MessagePack, NumPy arrays or an Arrow stream.
          * @example json
@@ -3906,7 +3909,7 @@ export interface operations {
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
                  * @example usda
                  */
                 format: components["parameters"]["clipEnding"];
@@ -3941,7 +3944,7 @@ export interface operations {
                  */
                 model: components["parameters"]["model"];
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack; of a model of a robot also a reference motion, such as `mjlab.npz` (since 5.2.0).
                  * @example usda
                  */
                 format: components["parameters"]["clipEnding"];
@@ -4724,7 +4727,7 @@ export interface operations {
             header?: never;
             path: {
                 /**
-                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, a VRM animation, NumPy arrays, an Arrow stream or MessagePack.
                  * @example usda
                  */
                 format: components["parameters"]["clipFormat"];
@@ -5160,6 +5163,7 @@ export const MEDIA_TYPES = {
   "json": "application/json",
   "bvh": "application/x-bvh",
   "glb": "model/gltf-binary",
+  "vrma": "model/vnd.vrma",
   "npz": "application/x-npz",
   "arrow": "application/vnd.apache.arrow.stream",
   "msgpack": "application/vnd.msgpack",

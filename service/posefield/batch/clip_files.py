@@ -223,6 +223,9 @@ def clip_format(work: WorkerInput, extension: str) -> ClipFormat:
 
         order = delivery.deliver(work.character, encoder, job)
         return ClipFormat(encoder, order.convention, order)
+    if encoder.is_humanoid:
+        card = open_model_of(work).session.card
+        encoder.check_body(card.skeleton, card.roles)
     write = layouts.find_layout(job.layout).encode
     encoder = encoder if write is None else replace(encoder, write=write)
     return ClipFormat(encoder, encoder.convention(job.unit, job.up, job.body))

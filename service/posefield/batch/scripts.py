@@ -147,6 +147,7 @@ class PerformanceFormat:
         question, character = script.question, script.character
         if self.character is None:
             self.encoder.convention(question.unit, question.up, question.body)
+            self.encoder.check_body(character.skeleton, character.roles)
         else:
             order = delivery.deliver(self.character, self.encoder, question)
             order.check_layout(self.layout)

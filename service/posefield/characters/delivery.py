@@ -126,7 +126,8 @@ class Delivery:
         )
         facts = {"character": character.name, "file": character.file, **report.facts()}
         bone = clip.root_bone or character.has_floor_root
-        return replace(retargeted, root_bone=bone), facts, tuple(facts.pop("warnings"))
+        retargeted = replace(retargeted, root_bone=bone, roles=character.rig.joints)
+        return retargeted, facts, tuple(facts.pop("warnings"))
 
 
 def deliver(character: UserCharacter, form: ClipEncoder, axes: FileAxes) -> Delivery:

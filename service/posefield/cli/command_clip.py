@@ -52,10 +52,10 @@ def clip(
 ) -> None:
     """Write a clip to a file: USD, glTF, BVH or numbers.
 
-    The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack; bvh carries no
-    curves. With --character, the character of another file moves: USD files refer to it, glTF files
-    animate its nodes, others have its skeleton. Blender plays USD files at the scene's frame rate,
-    24 by default: write them with --fps 24, or set the scene's rate.
+    The file's extension is usda, usdc, usdz, glb, bvh, json, vrma, npz, arrow or msgpack; bvh
+    carries no curves. With --character, the character of another file moves: USD files refer to it,
+    glTF files animate its nodes, others have its skeleton. Blender plays USD files at the scene's
+    frame rate, 24 by default: write them with --fps 24, or set the scene's rate.
 
     Of a model of a robot a name such as walk.mjlab.npz writes a reference motion, in any format
     that `posefield doctor` writes.

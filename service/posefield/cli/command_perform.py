@@ -105,7 +105,7 @@ def perform(
 ) -> None:
     """Write the motion of a script: walks, acts and holds as one.
 
-    The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack. Of many
+    The file's extension is usda, usdc, usdz, glb, bvh, json, vrma, npz, arrow or msgpack. Of many
     scripts, each has a file in the folder performances and a line in manifest.jsonl; the same
     command resumes, and makes again what changed. With --crowd they are one stage.
     """

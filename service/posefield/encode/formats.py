@@ -4,7 +4,7 @@ The table of archives is `archives.ARCHIVE_WRITERS`.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -14,14 +14,15 @@ from msgspec import structs
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField, UnknownFormat, did_you_mean
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.encode import character, glb, model_tables, motion_tables
+from posefield.encode import character, glb, model_tables, motion_tables, vrma
 from posefield.encode import table as tables
 from posefield.encode.archives import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
 from posefield.encode.character import CENTIMETRES, METRES, METRES_PER_UNIT, Convention
 from posefield.encode.crowd_size import STREAMS
 from posefield.encode.table import Table, arrow_stream, npz_table
-from posefield.motion import bvh_writer, root_bone
+from posefield.motion import bvh_writer, joint_roles, root_bone
 from posefield.motion.clip import CrowdPoses
+from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import BodyKind
 from posefield.question.performance_question import PerformanceLayout
 from posefield.question.performance_report import PerformanceAnswer
@@ -56,6 +57,7 @@ class ClipEncoder(Format):
     format allows no other convention. inline_limit: number of frames up to which a file is written
     in a millisecond or two, so that other requests may wait for it. has_body, has_curves: whether
     the format carries a body and curves. of_robots: whether it holds reference motions of robots.
+    is_humanoid: whether it has the bones of a person alone.
     """
 
     write: Callable[[Sequence[SampledClip], Convention], list[bytes]]
@@ -67,11 +69,20 @@ class ClipEncoder(Format):
     has_body: bool = False
     has_curves: bool = True
     of_robots: bool = False
+    is_humanoid: bool = False
 
     def check(self, robot: Robot | None) -> None:
         """Raise InvalidField for a reference motion of a model of no robot."""
         if self.of_robots:
             robot_clip.require(robot, self.extension)
+
+    def check_body(self, joints: Skeleton, roles: Mapping[str, str]) -> None:
+        """Raise InvalidField for a skeleton that files of the format cannot move.
+
+        roles: joint name by role.
+        """
+        if self.is_humanoid:
+            vrma.humanoid(joints, joint_roles.role_joints(joints, roles))
 
     def convention(
         self, unit: LengthUnit | None, up: UpAxis | None, body: BodyKind | None = None
@@ -209,6 +220,15 @@ CLIP_ENCODERS = by_extension(
         24,
         convention_fixed=True,
         has_body=True,
+    ),
+    # Not registered with IANA: its readers go by the ending of the name.
+    ClipEncoder(
+        "vrma",
+        "model/vnd.vrma",
+        sequential_writer(vrma.vrma),
+        24,
+        convention_fixed=True,
+        is_humanoid=True,
     ),
     ClipEncoder("npz", NPZ, table_writer(npz_table), 24),
     ClipEncoder("arrow", ARROW, table_writer(arrow_stream), 24),

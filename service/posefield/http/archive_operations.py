@@ -86,6 +86,7 @@ def clip_order(
     order = None
     if body.character is None:
         convention = encoder.convention(body.unit, body.up, body.body)
+        encoder.check_body(model.session.card.skeleton, model.session.card.roles)
     else:
         order = delivery.deliver(characters.find(body.character), encoder, body)
         convention = order.convention
@@ -193,6 +194,7 @@ def _planned(
         with _element("scripts", index):
             encoder.convention(question.unit, question.up, question.body)
             script = resolve_script(question, library.find)
+            encoder.check_body(script.character.skeleton, script.character.roles)
             largest = max(len(script.character.skeleton), joints)
             longest = max_poses(settings.output_limit, largest, encoder)
             report = composition.plan(script, longest)

@@ -329,6 +329,11 @@ class NamedModel:
         """Cache of skeletons by naming convention."""
         return {"own": self.session.card.skeleton}
 
+    @cached_property
+    def role_joints(self) -> dict[str, int]:
+        """Return the index of the joint of each role."""
+        return joint_roles.role_joints(self.session.card.skeleton, self.session.card.roles)
+
     def skeleton(self, names: NamingConvention) -> Skeleton:
         """Return the skeleton with these names; InvalidField if the model has no roles for them."""
         card = self.session.card

@@ -1,7 +1,7 @@
 """Clips and crowds: motions of one skeleton, sampled at a constant rate."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -30,7 +30,8 @@ class Clip:
     rotations (F, J, 4): unit quaternions local to the parent. translations (F, J, 3): joint
     translations local to the parent, m; the root's is its path, the others' are the bone offsets.
     rate: frames a second. curves: values of scalar channels; None for a family without them.
-    root_bone: whether files have a joint on the floor above the hips (`root_bone`).
+    root_bone: whether files have a joint on the floor above the hips (`root_bone`). roles: joints,
+    by index, of the roles that the model's recipe gives.
     """
 
     skeleton: Skeleton
@@ -39,6 +40,7 @@ class Clip:
     rate: float
     curves: CurveValues | None = None
     root_bone: bool = False
+    roles: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         frames, joints = len(self.rotations), len(self.skeleton)

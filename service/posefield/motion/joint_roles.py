@@ -76,6 +76,11 @@ NAMES_BY_CONVENTION: dict[str, dict[str, str]] = {
 """Each convention's name for each role."""
 
 
+def role_joints(joints: Skeleton, roles: Mapping[str, str]) -> dict[str, int]:
+    """Return the index of the joint of each role; roles: joint name by role."""
+    return {role: joints.names.index(name) for role, name in roles.items()}
+
+
 def rename_joints(
     skeleton: Skeleton, roles: Mapping[str, str], names: NamingConvention
 ) -> Skeleton:

@@ -77,7 +77,9 @@ def perform(script: Script, frame_limit: int) -> PerformanceAnswer:
     joints = joint_roles.rename_joints(character.skeleton, character.roles, question.names)
     clip = assemble(joints, quat.normalize(rotations), roots, character.bones, question.fps)
     bone = question.root == "bone" or (question.root is None and question.names == "ue5")
-    clip = replace(clip, root_bone=bone)
+    indices = {name: joint for joint, name in enumerate(character.skeleton.names)}
+    roles = {role: indices[name] for role, name in character.roles.items()}
+    clip = replace(clip, root_bone=bone, roles=roles)
     report = _report(script, timeline, joins, played, feet)
     return PerformanceAnswer(clip, report, _held_joints(timeline, clip, times))
 

@@ -189,7 +189,7 @@ def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer | QueryEr
     clip = assemble(draft.skeleton, turns, path, offsets, float(question.fps))
     if answer.curves is not None:
         clip = replace(clip, curves=CurveValues(model.session.card.curves, answer.curves))
-    clip = replace(clip, root_bone=question.root_bone)
+    clip = replace(clip, root_bone=question.root_bone, roles=model.role_joints)
     robot = model.session.card.robot
     if robot is not None:
         motion = draft.unlimited or robot_clip.of(robot).motion(clip, "")
