@@ -261,6 +261,28 @@ def test_wrong_numbers_are_named_with_their_frame(message, robot, tmp_path):
         robot_formats.read(path, Conventions(robot, rate=50.0))
 
 
+UNITS = {
+    "if they are degrees": lambda motion: replace(motion, angles=np.degrees(motion.angles)),
+    "expected metres with Z up": lambda motion: raised(motion, 90.0),
+    "-0.67 to -0.67 m high": lambda motion: replace(
+        motion, base_path=motion.base_path[:, [1, 2, 0]] * [1, 1, 0]
+    ),
+}
+
+
+@pytest.mark.parametrize("message", UNITS)
+def test_other_units_and_axes_are_told(message, robot, tmp_path):
+    sound = standing(robot)
+    path = save(tmp_path, sound, robot, "awd.json")
+    assert robot_formats.read(path, Conventions(robot)).format == "awd.json"
+    if "degrees" in message:
+        # Angles of a standing robot are zero in any unit.
+        sound = raised(motion_of(robot), 0.0)
+    path = save(tmp_path, UNITS[message](sound), robot, "awd.json")
+    with pytest.raises(MotionFileError, match=message):
+        robot_formats.read(path, Conventions(robot))
+
+
 def test_a_file_of_another_robot_is_refused_with_both_counts(robot, tmp_path):
     path = save(tmp_path, motion_of(robot), robot, "qpos.csv")
     np.savetxt(path, np.loadtxt(path, delimiter=",")[:, :-2], delimiter=",")
@@ -470,6 +492,7 @@ REFUSED = {
     "biped/clip.mjlab.npz?pace=0.45&up=y": "expected 'z'",
     "biped/clip.mjlab.npz?pace=0.45&body=bones": "carry no body",
     "biped/clip.mjlab.npy?pace=0.45": "mjlab.npz",
+    "biped/clip.mjlab.npz?pace=0.45&end=0": "1 frame, expected two or more",
 }
 
 

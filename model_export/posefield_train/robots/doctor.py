@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posefield.common.units import Booleans, Floats, Frames
 from posefield.motion.contact_detection import ContactThresholds, detect_contacts
@@ -21,11 +22,15 @@ JUMP, JUMP_RATIO = np.radians(5.0), 8.0
 many times its 90th percentile in the motion."""
 SEAM_RATIO = 3.0
 """Step from the last frame to the first over the largest of the motion at which a seam is told."""
-OUTLIER = 6.5
+OUTLIER = 13.0
 """Residual of a joint, in standard deviations, at which a motion is told as an outlier."""
-FEWEST_COMPARED, COMPONENTS, ROUNDS = 12, 8, 5
+FEWEST_COMPARED, COMPONENTS, ROUNDS = 12, 10, 5
 """Motions from which on they are compared; components at most, and rounds, of the regression."""
-LEAST_DEVIATION = np.radians(0.3)
+LEAST_DEVIATION = np.radians(0.15)
+RHYTHMS = np.arange(0.3, 4.0, 0.02)
+"""Frequencies, a second, among which that of a motion's cycle is searched."""
+HARMONICS, SHIFTS, MATCHES = np.array([1.0, 2.0]), 120, 4
+"""Harmonics of it, phases at which motions are matched, and rounds of that."""
 
 
 @dataclass(frozen=True)
@@ -219,13 +224,14 @@ def sliding_speeds(points: Annotated[Floats, "frames points 3"], rate: float) ->
 def outliers(motions: Sequence[RobotMotion]) -> dict[int, Finding]:
     """Return a finding for each motion that breaks what the others have in common, by its index.
 
-    How far each joint turns and how fast is predicted from the other joints of the same motion, by
-    a regression over all motions in which odd ones count little. The residual is told in standard
-    deviations. Fewer than a dozen motions, or other joints, are not compared.
+    How far each joint turns, how fast and when in the cycle is predicted from the other joints of
+    the same motion, by a regression over all motions in which odd ones count little. The residual
+    is told in standard deviations. Fewer than a dozen motions, or
+    other joints, are not compared.
     """
     if len(motions) < FEWEST_COMPARED or len({motion.angles.shape[1] for motion in motions}) > 1:
         return {}
-    features = np.array([_features(motion) for motion in motions])
+    features = _features(motions)
     residuals = np.stack(
         [_residuals(features, hinge) for hinge in range(features.shape[1])], axis=-1
     )
@@ -241,11 +247,43 @@ def outliers(motions: Sequence[RobotMotion]) -> dict[int, Finding]:
     }
 
 
-def _features(motion: RobotMotion) -> Annotated[Floats, "hinges features"]:
-    """Return what is compared of each angle: its mean and spread, rad, and its speeds, rad/s."""
+def _features(motions: Sequence[RobotMotion]) -> Annotated[Floats, "motions hinges features"]:
+    """Return what is compared of each angle: mean, spread, speeds, and harmonics of the cycle."""
+    single = np.array([_paces(motion) for motion in motions])
+    waves = _in_phase(np.array([_waves(motion) for motion in motions]))
+    return np.concatenate([single, waves.real, waves.imag], axis=-1)
+
+
+def _paces(motion: RobotMotion) -> Annotated[Floats, "hinges features"]:
+    """Return the mean and spread of each angle, rad, and its speeds, tenths of a rad/s."""
     speeds = np.abs(velocities(motion.angles, motion.rate))
     pace = 0.1 * np.sqrt((speeds**2).mean(axis=0)), 0.1 * speeds.max(axis=0)
     return np.stack([motion.angles.mean(axis=0), motion.angles.std(axis=0), *pace], axis=-1)
+
+
+def _waves(motion: RobotMotion) -> NDArray[np.complex128]:
+    """Return the amplitudes (H, K), rad, of the harmonics of the strongest rhythm of all angles."""
+    window = np.hanning(len(motion) + 2)[1:-1, None]
+    angles = (motion.angles - motion.angles.mean(axis=0)) * window * (2.0 / window.sum())
+    times = np.arange(len(motion)) / motion.rate
+    powers = (np.abs(np.exp(-2j * np.pi * np.outer(RHYTHMS, times)) @ angles) ** 2).sum(axis=1)
+    rhythms = HARMONICS * RHYTHMS[int(powers.argmax())]
+    return np.asarray((np.exp(-2j * np.pi * np.outer(rhythms, times)) @ angles).T)
+
+
+def _in_phase(waves: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return the amplitudes (M, H, K) of motions that begin at one phase of the cycle.
+
+    Each is shifted to where it matches the median of all best; one odd joint changes little.
+    """
+    phases = np.linspace(0.0, 2.0 * np.pi, SHIFTS, endpoint=False)
+    shifts = np.exp(1j * np.outer(phases, HARMONICS))
+    typical, shifted = waves[0], waves
+    for _ in range(MATCHES):
+        matches = np.real(np.einsum("mhk,pk,hk->mp", waves, shifts, typical.conj()))
+        shifted = waves * shifts[matches.argmax(axis=1)][:, None]
+        typical = np.median(shifted.real, axis=0) + 1j * np.median(shifted.imag, axis=0)
+    return shifted
 
 
 def _residuals(

@@ -244,6 +244,8 @@ def _robot_encoder(form: RobotFormat) -> ClipEncoder:
         single = answer if isinstance(answer, ClipAnswer) else None
         robot = robot_clip.require(single.robot if single else None, form.name)
         assert single
+        if len(single.clip) < 2:
+            raise InvalidField("end", "1 frame, expected two or more: files have velocities")
         source = single.trust.model.partition("@")[0]
         return form.content(robot_clip.of(robot).motion(single.clip, source, single.loops), robot)
 

@@ -5,14 +5,16 @@ told, or the user is asked.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from posefield.common.errors import MotionFileError
 from posefield.common.units import Floats
+from posefield.motion import quat
 from posefield.robots.robot import BodyPositions, HingeAngles, Order, Robot, upright
+from posefield.robots.robot_motion import RobotMotion
 
 QuaternionOrder = Literal["wxyz", "xyzw"]
 
@@ -23,6 +25,11 @@ MATCH = 0.01
 
 UPRIGHT = 0.5
 """Least vertical component of the base's own vertical axis of a robot that does not lie."""
+
+WITHIN, WITHIN_NOT = 0.95, 0.1
+"""Shares of angles: within the limits as degrees at least, and beyond them as radians."""
+MOST_HIGH, MOST_DEEP = 1.5, 0.5
+"""Height and depth of the lowest sole in all frames, in heights of the robot, that are told."""
 
 Content = Mapping[str, Any]
 """Fields of a file by name; the numbers of a CSV file are the field "rows"."""
@@ -128,6 +135,39 @@ def _sole_tilt(robot: Robot, path: Floats, rotations: Floats, angles: HingeAngle
     extents = np.stack([np.ptp(height, axis=1) for height in heights])
     lower = np.argmin([height.min(axis=1) for height in heights], axis=0)
     return float(np.take_along_axis(extents, lower[None], axis=0).mean())
+
+
+def expect_radians(motion: RobotMotion, conventions: Conventions) -> None:
+    """Raise MotionFileError for angles that are beyond a turn, and within the limits as degrees."""
+    robot = conventions.robot
+    farthest = float(np.abs(motion.angles).max(initial=0.0))
+    if robot is None or conventions.degrees or farthest < 2.0 * np.pi:
+        return
+    as_degrees = replace(motion, angles=np.radians(motion.angles)).beyond_limits(robot)
+    if (as_degrees < 0.0).mean() > WITHIN and (
+        motion.beyond_limits(robot) > 0.0
+    ).mean() > WITHIN_NOT:
+        raise motion.error(
+            f"angles reach {farthest:.3g} rad, and lie within the limits of {robot.name} if they "
+            "are degrees: expected radians, or --degrees"
+        )
+
+
+def expect_floor(motion: RobotMotion, robot: Robot) -> None:
+    """Raise MotionFileError for a robot that is never near the floor: another unit or up axis."""
+    if not robot.feet:
+        return
+    still = np.zeros((1, motion.angles.shape[1]))
+    positions, turns = robot.body_poses(np.zeros((1, 3)), quat.IDENTITY[None], still)
+    rest = min(float(points[..., 2].min()) for points in robot.foot_points(positions, turns))
+    tall = float(positions[..., 2].max()) - rest
+    soles = robot.foot_points(*motion.body_poses(robot))
+    heights = np.stack([points[..., 2].min(axis=1) for points in soles]).min(axis=0)
+    if heights.min() > MOST_HIGH * tall or heights.max() < -MOST_DEEP * tall:
+        raise motion.error(
+            f"the lowest sole is {heights.min():.2f} to {heights.max():.2f} m high, and "
+            f"{robot.name} is {tall:.2f} m tall: expected metres with Z up and the floor at 0"
+        )
 
 
 def tell_order(

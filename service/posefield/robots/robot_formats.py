@@ -11,7 +11,7 @@ from typing import IO, Any, Literal, Protocol
 import numpy as np
 
 from posefield.common.errors import MotionFileError
-from posefield.robots import file_readers, file_writers, restricted_pickle
+from posefield.robots import file_conventions, file_readers, file_writers, restricted_pickle
 from posefield.robots.file_conventions import Content, Conventions, File
 from posefield.robots.robot import Robot
 from posefield.robots.robot_motion import RobotMotion
@@ -177,7 +177,12 @@ def read(path: RobotFile, conventions: Conventions) -> RobotMotion:
     if conventions.degrees:
         motion = replace(motion, angles=np.radians(motion.angles))
     motion = motion.checked()
-    return motion.on(conventions.robot) if conventions.robot else motion
+    if conventions.robot is None:
+        return motion
+    motion = motion.on(conventions.robot)
+    file_conventions.expect_radians(motion, conventions)
+    file_conventions.expect_floor(motion, conventions.robot)
+    return motion
 
 
 def _content(path: RobotFile) -> Content:
