@@ -119,7 +119,8 @@ def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
     intervals = []
     for foot, joint in enumerate(joints):
         row = frame_groups.one_row(len(contacts), RATE)
-        down = stance_rows.from_probabilities(contacts[:, foot].astype(float), row).mask(row)
+        likely = np.round(contacts[:, foot].astype(float), stance_rows.DECIMALS)
+        down = stance_rows.tidy(likely > stance_rows.STANDING, row).mask(row)
         intervals.append(stance_rows.statistics(joint, paths[::step, foot, 1], RATE, down))
     passage = Passage(
         clip.rotations[::step],

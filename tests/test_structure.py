@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 
 BUDGETS = {
-    "service/posefield": 51_500,
+    "service/posefield": 51_080,
     "model_export/posefield_train": 28_900,
     "clients/python": 2_160,
     "clients/blender": 1_280,
@@ -30,7 +30,7 @@ VAGUE = set(
 MOST_VAGUE = 0.004
 """Share of the bindings of what ships whose names say nothing of the thing."""
 GENERATED = {"generated.py", "client.py", "schema.ts", "constants.ts"}
-MOST_TESTS = 0.755
+MOST_TESTS = 0.74
 """Lines of Python under tests for each line that ships."""
 
 

@@ -67,15 +67,6 @@ class FrameGroups:
         smallest: Floats = np.minimum.reduceat(values, self.starts)
         return smallest
 
-    def every(self, values: Annotated[Booleans, "frames"]) -> Annotated[Booleans, "motions"]:
-        """Return whether all values of each motion (M,) are true."""
-        true: Booleans = np.logical_and.reduceat(values, self.starts)
-        return true
-
-    def times(self, copies: int) -> "FrameGroups":
-        """Return the groups of arrays in which the frames of all motions are repeated."""
-        return FrameGroups(np.tile(self.counts, copies))
-
 
 @dataclass(frozen=True)
 class FrameRows:

@@ -98,7 +98,7 @@ class JointChain:
         vectors = numbers[:, 3:].reshape(len(moves), -1, 3)
         turns = self.rotations @ quat.to_matrix(self.chart.quaternions(vectors))
         slopes = None
-        if len(self.hinges):
+        if self.hinges.joints:
             joints = list(self.hinges.joints)
             bent = quat.mul(self.hinge_means, self.chart.quaternions(vectors[:, joints]))
             angles = self.hinges.turn_angles(bent)
@@ -153,7 +153,7 @@ class MotionVariables:
 
     def hinge_centres(self, frames: Frames) -> HingeAngles:
         """Return the predicted angles (S, H, 3) of the hinges at canonical frames (S,), rad."""
-        if not len(self.hinges):
+        if not self.hinges.joints:
             return np.zeros((len(frames), 0, 3))
         centres = quat.interpolate_rows(self._canonical_centres, frames)
         return centres.reshape(len(frames), -1, 3)
@@ -307,7 +307,7 @@ def evaluate_poses(
     ]
     products, roots = (np.concatenate(arrays) for arrays in zip(*pairs, strict=True))
     rotations = first.reduced.rotations_of(products)
-    if len(first.hinges):
+    if first.hinges.joints:
         pairs_of_centres = zip(motions, frames, strict=True)
         centres = [motion.scene.hinge_centres(at) for motion, at in pairs_of_centres]
         rotations = first.hinges.within(rotations, np.concatenate(centres))

@@ -75,8 +75,9 @@ def lifts(
     """
     rows = feet.rows
     added = np.zeros(len(floor))
-    lowest = _led_heights(feet, stances, led)
-    ended = stances.mask(rows) | ~np.isnan(led)
+    is_led = ~np.isnan(led)
+    lowest = _led_heights(feet, stances, led) if is_led.any() else np.zeros(len(floor))
+    ended = stances.mask(rows) | is_led
     swings = stance_rows.runs(~ended, rows)
     # Those with a stance before or after them.
     swings = swings.select(swings.lengths < rows.counts[swings.rows])
@@ -84,7 +85,14 @@ def lifts(
         return added, lowest
     run, frames = swings.frames()
     flat, groups = rows.flat(swings.rows[run], frames), FrameGroups(swings.lengths)
-    outer_frames = _ends(swings, feet)
+    # Frames in which feet stand before and after swings, or the clips' ends.
+    counts, cyclic = rows.groups.counts[swings.rows], rows.cyclic[swings.rows]
+    later = np.where(cyclic & (swings.begins == 0), counts, 0)
+    before, after = swings.begins - 1 + later, swings.ends + later
+    outer_frames = (
+        np.where(cyclic, before, np.maximum(before, 0)),
+        np.where(cyclic, after, np.minimum(after, counts - 1)),
+    )
     first, last = (lowest[rows.flat(swings.rows, end)] for end in outer_frames)
     begin, end = (stance_rows.places(feet, floor, swings.rows, edge) for edge in outer_frames)
     smallest_lift = (
@@ -131,17 +139,6 @@ def _shares(swings: Runs, feet: FootRows) -> tuple[Annotated[Floats, "frames"], 
     steps = frames - swings.begins[run] + 1.0
     shares: Floats = (steps + ((durations - 1 - swings.lengths) * leads)[run]) / durations[run]
     return shares, durations
-
-
-def _ends(swings: Runs, feet: FootRows) -> tuple[PerRun, PerRun]:
-    """Return the frames in which feet stand before and after swings, or the clips' ends."""
-    counts, cyclic = feet.rows.counts[swings.rows], feet.rows.cyclic[swings.rows]
-    after = np.where(cyclic & (swings.begins == 0), counts, 0)
-    first_frames, last_frames = swings.begins - 1 + after, swings.ends + after
-    return (
-        np.where(cyclic, first_frames, np.maximum(first_frames, 0)),
-        np.where(cyclic, last_frames, np.minimum(last_frames, counts - 1)),
-    )
 
 
 def _lift_shares(share: Frames, seconds: float | Frames) -> Frames:
@@ -230,7 +227,15 @@ def trimmed(stances: Runs, feet: FootRows) -> Runs:
     run, frames = stances.frames()
     row = stances.rows[run]
     ankles = feet.floor - floor_plane.project(feet.arms)
-    speeds = [_speeds(path, feet, row, frames) for path in (feet.floor, ankles)]
+    count, in_cycle = rows.groups.counts[row], rows.cyclic[row]
+    before, after = (
+        np.where(in_cycle, frame + count, np.clip(frame, 0, count - 1))
+        for frame in (frames - 1, frames + 1)
+    )
+    speeds = []
+    for path in (feet.floor, ankles):
+        first, second = (stance_rows.places(feet, path, row, frame) for frame in (before, after))
+        speeds.append(np.abs(second - first) * rows.rates[row] / np.maximum(after - before, 1))
     still = np.flatnonzero(np.minimum(*speeds) < contact_detection.DEFAULT.grown_speed)
     begins, ends = stances.begins.copy(), stances.ends.copy()
     begins[run[still[::-1]]], ends[run[still]] = frames[still[::-1]], frames[still] + 1
@@ -240,20 +245,6 @@ def trimmed(stances: Runs, feet: FootRows) -> Runs:
     ends = np.where(~cyclic & (stances.ends == counts), counts, ends)
     later = np.where(begins >= counts, counts, 0)
     return Runs(stances.rows, begins - later, ends - later).sort()
-
-
-def _speeds(
-    path: Annotated[FloorVectors, "frames"], feet: FootRows, row: PerRun, frames: PerRun
-) -> Annotated[Floats, "runs"]:
-    """Return the speeds (V,), m/s, of paths (N,) of rows (V,) at frames (V,)."""
-    counts, cyclic = feet.rows.counts[row], feet.rows.cyclic[row]
-    before, after = (
-        np.where(cyclic, frame + counts, np.clip(frame, 0, counts - 1))
-        for frame in (frames - 1, frames + 1)
-    )
-    first, second = (stance_rows.places(feet, path, row, frame) for frame in (before, after))
-    speeds: Floats = np.abs(second - first) * feet.rows.rates[row] / np.maximum(after - before, 1)
-    return speeds
 
 
 def heel_turns(offset: Points, arm: Points, chord: Values) -> Turns:

@@ -18,7 +18,7 @@ from posefield.common.units import UP, Floats, Frames
 from posefield.feet import ball_path, footsteps, limbs, stance_rows
 from posefield.feet.footsteps import FeetPlan, Footsteps, Led, PlanRequest
 from posefield.feet.limbs import Limb, LimbPoses, Points, Turns, Values
-from posefield.feet.stance_rows import NO_CYCLE, SUNK, UNEVEN, FootRows, Runs
+from posefield.feet.stance_rows import DECIMALS, NO_CYCLE, STANDING, SUNK, UNEVEN, FootRows, Runs
 from posefield.locomotion import floor_plane
 from posefield.motion import quat
 from posefield.question.motion_question import LEVEL_FLOOR
@@ -166,7 +166,8 @@ def _feet(bodies: _Bodies) -> tuple[FootRows, Runs]:
     likely = [request.likely for request in requests if request.likely is not None]
     if likely:
         contacts = [request.contacts[leg] for leg in range(len(legs)) for request in requests]
-        down = stance_rows.from_probabilities(np.concatenate(likely).T.ravel(), rows)
+        probabilities = np.round(np.concatenate(likely).T.ravel(), DECIMALS)
+        down = stance_rows.tidy(probabilities > STANDING, rows)
     else:
         motions = [request for _ in legs for request in requests]
         paths = rows.groups.split(points)
@@ -225,7 +226,7 @@ def _toe_drops(bodies: _Bodies, contacts: Runs, rows: FrameRows) -> Annotated[Fl
 def _led_stances(leads: Sequence[Led], stances: Runs, feet: FootRows) -> Runs:
     """Return the stances that agree with where the feet are led."""
     down, groups = stances.mask(feet.rows), feet.rows.groups
-    points = groups.split(feet.positions)
+    points = groups.split(floor_plane.at_height(feet.floor, feet.heights))
     for row, standing in enumerate(groups.split(down)):
         exact = np.flatnonzero(leads[row % len(leads)].feet[row // len(leads)])
         rate, contact = float(feet.rows.rates[row]), feet.contact(row)
@@ -262,7 +263,8 @@ def _reachable_steps(
     slopes = np.array([request.floor.slope for request in bodies.requests])
     limit = np.clip(bodies.room[1] - followed, 0.0, (MOST + STEP * slopes)[group])
     limit[np.array([request.character.fixed for request in bodies.requests])[group]] = 0.0
-    goal = np.where(bodies.led.feet.ravel()[:, None], feet.positions, np.nan)
+    positions = floor_plane.at_height(feet.floor, feet.heights)
+    goal = np.where(bodies.led.feet.ravel()[:, None], positions, np.nan)
     paths = ball_path.plan_paths(feet, stances, goal)
     needs = _needs(bodies, paths, followed)
     for _ in range(ROUNDS):

@@ -19,6 +19,7 @@ from posefield.feet.stance_rows import NO_CYCLE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion import quat, skeleton
+from posefield.motion.contact_detection import PLANTED_HEIGHT
 
 Points = Annotated[Floats, "frames 3"]
 FootPaths = Annotated[Floats, "frames feet 3"]
@@ -101,6 +102,35 @@ def largest_drifts(
         away = np.concatenate([np.zeros((1, 3)), *offsets])
         drifts.append(float(np.hypot(away[:, 0], away[:, 2]).max()))
     return drifts
+
+
+def mean_skate_speeds(
+    feet: Sequence[Annotated[Floats, "_ _ 3"]], rates: Sequence[float]
+) -> list[float]:
+    """Return the mean speeds over the floor of planted feet (F, K, 3) of several motions, m/s.
+
+    Each has the bytes that it has alone. Motions with equally many feet are measured at once.
+    """
+    means: dict[int, float] = {}
+    counts = [paths.shape[1] for paths in feet]
+    for count in dict.fromkeys(counts):
+        clips = [clip for clip, joints in enumerate(counts) if joints == count]
+        groups = frame_groups.of_lengths([feet[clip] for clip in clips])
+        paths = np.concatenate([feet[clip] for clip in clips])
+        heights = paths @ UP
+        lowest = np.minimum.reduceat(heights, groups.starts, axis=0)[groups.group]
+        down = heights < lowest + PLANTED_HEIGHT
+        planted = np.zeros(down.shape, bool)
+        planted[:-1] = down[1:] & down[:-1]
+        # The step from the last frame of a motion to the first of the next is none.
+        planted[groups.starts + groups.counts - 1] = False
+        steps = np.diff(paths, axis=0, append=paths[-1:])
+        rate = np.array([rates[clip] for clip in clips])[groups.group, None]
+        speeds = rate * np.hypot(steps[..., 0], steps[..., 2])
+        frames = groups.sums(planted.astype(float)).sum(axis=1)
+        sums = groups.sums(speeds * planted).sum(axis=1) / np.maximum(frames, 1.0)
+        means |= zip(clips, sums.tolist(), strict=True)
+    return [means[clip] for clip in range(len(feet))]
 
 
 def _kind(plan: FeetPlan) -> tuple[object, ...]:

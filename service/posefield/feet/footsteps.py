@@ -285,7 +285,7 @@ def choose_limbs(
             has_toes = parents[foot] == leg.lower
             legs[index] = replace(leg, toe=tips.get(foot)) if has_toes else leg
         used |= chain
-    arms, fixed = _arms(parents, bones, joints, used, hinges)
+    arms, fixed = _arms(parents, bones, joints, used, hinges) if joints else ([], False)
     character = Character(
         parents,
         bones,

@@ -9,7 +9,6 @@ direction to the new one, so that no axes of joints are assumed. The end keeps i
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -58,25 +57,21 @@ class LimbPoses:
     orientations: Annotated[Floats, "frames chain 4"]
     groups: FrameGroups | None = None
 
-    @cached_property
-    def _places(self) -> dict[int, int]:
-        return {joint: index for index, joint in enumerate(self.joints)}
-
     def position(self, joint: int) -> Points:
         """Return the positions (F, 3), m, of a joint of the whole skeleton."""
-        return self.positions[..., self._places[joint], :]
+        return self.positions[..., self.joints.index(joint), :]
 
     def orientation(self, joint: int) -> Turns:
         """Return the orientations (F, 4) of a joint of the whole skeleton."""
-        return self.orientations[..., self._places[joint], :]
+        return self.orientations[..., self.joints.index(joint), :]
 
     def parent_orientation(self, joint: int) -> Turns:
         """Return the orientations (F, 4) of a joint's parent."""
-        return self.orientations[..., self.parents[self._places[joint]], :]
+        return self.orientations[..., self.parents[self.joints.index(joint)], :]
 
     def length(self, joint: int) -> Annotated[Floats, "_"]:
         """Return the length (1,) of the bone that ends at a joint, m; (F,) for groups."""
-        lengths: Floats = np.linalg.norm(self.bones[..., self._places[joint], :], axis=-1)
+        lengths: Floats = np.linalg.norm(self.bones[..., self.joints.index(joint), :], axis=-1)
         return lengths[..., None] if self.groups is None else lengths[self.groups.group]
 
     def split(self) -> "list[LimbPoses]":

@@ -133,11 +133,6 @@ class FootRows:
         selected |= {name: getattr(self, name)[rows] for name in names}
         return replace(self, rows=self.rows.select(rows), **selected)
 
-    @property
-    def positions(self) -> Annotated[Floats, "frames 3"]:
-        """Return the paths (N, 3), m."""
-        return floor_plane.at_height(self.floor, self.heights)
-
     def contact(self, row: int) -> FootContact:
         """Return the statistics of one row's contacts."""
         statistics = (self.height, self.swing, self.longest_swing, self.clearance)
@@ -273,11 +268,6 @@ def shortened(stances: Runs, beyond: Mask, rows: FrameRows) -> Runs:
 STANDING, DECIMALS = 0.5, 6
 # Swings of a motion in which no foot swings: median and longest duration, s.
 DEFAULT_SWING, DEFAULT_LONGEST = 0.3, 0.5
-
-
-def from_probabilities(likely: Annotated[Floats, "frames"], rows: FrameRows) -> Runs:
-    """Return the contacts of feet, whose probabilities are (N,)."""
-    return tidy(np.round(likely, DECIMALS) > STANDING, rows)
 
 
 def detect(path: Annotated[Floats, "frames 3"], rate: float, cycle: Cycle | None = None) -> Mask:

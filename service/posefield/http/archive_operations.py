@@ -25,8 +25,8 @@ from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
 from posefield.http import responses
 from posefield.http.api import problems
 from posefield.http.api.settings import Settings
+from posefield.http.batching import ARCHIVE_LIMITER, LONG_LIMITER, run_in_thread
 from posefield.http.request import ServiceRequest, read_body
-from posefield.http.worker_threads import ARCHIVE_LIMITER, LONG_LIMITER, run_in_thread
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding

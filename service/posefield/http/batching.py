@@ -3,26 +3,105 @@
 There is no timer. A batch of poses holds the requests of one iteration of the event loop. Clips of
 a batch share much of the work, and a thread switch takes a tenth of a millisecond: those that
 arrive during a batch form the next one.
+
+Work that takes longer runs in threads of its own, with limits by kind of work, and cancellation.
 """
 
 import asyncio
+import logging
+import math
+import os
 from asyncio import Future, Task
 from collections.abc import Callable, Hashable, Sequence
-from contextvars import Context, copy_context
+from contextlib import suppress
+from contextvars import copy_context
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar, TypeVarTuple
 
-from anyio import to_thread
+from anyio import CancelScope, CapacityLimiter, to_thread
 
 from posefield.common import cancellation
+from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.character import Convention
 from posefield.encode.formats import ClipEncoder
-from posefield.http import metrics, worker_threads
+from posefield.http import metrics
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clip_draft, clips, poses
 from posefield.synthesis.poses import OutputRow, PreparedPoseQuestion
 from posefield.synthesis.synthesizer import Synthesizer
+
+faults = logging.getLogger(__name__)
+
+Result = TypeVar("Result")
+Arguments = TypeVarTuple("Arguments")
+
+CORES = os.cpu_count() or 1
+HALF = max(1, CORES // 2)
+POSE_LIMITER = CapacityLimiter(CORES)
+"""Limit on threads for poses that take milliseconds, which wait for no other work."""
+SYNTHESIS_LIMITER = CapacityLimiter(HALF)
+"""Limit on threads for work of up to tenths of a second: clips with targets or standing feet, long
+clips, grids, compression. More threads would delay the event loop and poses several times as long:
+each holds Python's lock in turn (decision 0030)."""
+PERFORMANCE_LIMITER = CapacityLimiter(HALF)
+LONG_LIMITER = CapacityLimiter(1)
+CROWD_LIMITER = CapacityLimiter(HALF)
+ARCHIVE_LIMITER = CapacityLimiter(CORES)
+"""Limits on threads for work of seconds, separate so that other work does not wait for it. Long
+performances and those of archives are made one at a time: each may take all memory for answers."""
+SWITCH_INTERVAL = 0.001
+"""Seconds after which a thread lets others run Python, such as the event loop that answers poses;
+Python's default of 5 ms is that long for each thread before it."""
+
+# The limiters above count the threads; anyio's own limit must not apply.
+_UNBOUNDED = CapacityLimiter(math.inf)
+
+
+async def run_in_thread(
+    work: Callable[[*Arguments], Result],
+    *arguments: *Arguments,
+    limiter: CapacityLimiter = SYNTHESIS_LIMITER,
+) -> Result:
+    """Call `work` in a thread within a limit, and return its result.
+
+    If the awaiting task is cancelled, the work is asked to stop (`posefield.common.cancellation`),
+    and counts against the limit until it has stopped.
+    """
+    async with limiter:
+        return await within(work, *arguments)
+
+
+async def within(work: Callable[[*Arguments], Result], *arguments: *Arguments) -> Result:
+    """Call `work` in a thread as `run_in_thread` does, for a caller that holds a place already."""
+    flag = Cancellation()
+    token = cancellation.current.set(flag)
+    try:
+        thread = asyncio.ensure_future(to_thread.run_sync(work, *arguments, limiter=_UNBOUNDED))
+    finally:
+        cancellation.current.reset(token)
+    try:
+        return await asyncio.shield(thread)
+    except asyncio.CancelledError:
+        flag.cancel()
+        await _wait_until_ended(thread)
+        raise
+
+
+async def _wait_until_ended(thread: "asyncio.Future[Result]") -> None:
+    """Wait until a thread has ended, even if the waiting task is cancelled again.
+
+    Log the exception of work that failed for another reason than its cancellation.
+    """
+    # anyio repeats a cancellation, asyncio delivers it once: the scope shields from the former.
+    with CancelScope(shield=True):
+        while not thread.done():
+            with suppress(asyncio.CancelledError):
+                await asyncio.wait({thread})
+    fault = thread.exception()
+    if fault is not None and not isinstance(fault, Cancelled):
+        faults.error("work that no client waits for has failed", exc_info=fault)
+
 
 MAX_CLIPS = 32
 """Maximum clips of a batch: all of its requests wait for the whole batch, some 15 ms."""
@@ -63,9 +142,7 @@ class ClipBatcher:
             answer = clips.synthesize_clip(model, question, longest)
             return answer, await self.file(encoder, convention, answer)
         if clip_draft.largest_frame_count(model, question) > MAX_BATCHED_FRAMES:
-            answer = await worker_threads.run_in_thread(
-                clips.synthesize_clip, model, question, longest
-            )
+            answer = await run_in_thread(clips.synthesize_clip, model, question, longest)
             return answer, await self.file(encoder, convention, answer)
         key = encoder.extension, convention, model.identity, question.level, longest
         work = partial(_encoded_clips, model, longest, encoder, convention)
@@ -77,7 +154,7 @@ class ClipBatcher:
         if len(answer.clip) <= encoder.inline_limit:
             return encoder.encode(answer, convention)
         if len(answer.clip) > MAX_BATCHED_FRAMES:
-            return await worker_threads.run_in_thread(encoder.encode, answer, convention)
+            return await run_in_thread(encoder.encode, answer, convention)
 
         def work(answers: Sequence[ClipAnswer]) -> list[bytes]:
             return encoder.write(answers, convention)
@@ -89,7 +166,10 @@ class ClipBatcher:
         future: Future[Any] = asyncio.get_running_loop().create_future()
         if key not in self._waiting:
             self._waiting[key] = []
-            task = asyncio.create_task(self._work(key, work), context=_uncancelled_context())
+            # A batch serves several requests: without the cancellation of one.
+            context = copy_context()
+            context.run(cancellation.current.set, None)
+            task = asyncio.create_task(self._work(key, work), context=context)
             # The event loop keeps only weak references to tasks.
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
@@ -99,7 +179,19 @@ class ClipBatcher:
     async def _work(self, key: Hashable, work: Work) -> None:
         while waiting := self._waiting[key]:
             self._waiting[key] = waiting[MAX_CLIPS:]
-            await _work_batch(work, waiting[:MAX_CLIPS])
+            batch = [(item, future) for item, future in waiting[:MAX_CLIPS] if not future.done()]
+            try:
+                items = [item for item, _ in batch]
+                results = await to_thread.run_sync(work, items) if batch else []
+            except Exception as fault:
+                results = [fault] * len(batch)
+            for (_, future), result in zip(batch, results, strict=True):
+                if future.done():
+                    continue
+                if isinstance(result, Exception):
+                    future.set_exception(result)
+                else:
+                    future.set_result(result)
         del self._waiting[key]
 
 
@@ -116,28 +208,6 @@ def _encoded_clips(
     return [
         answer if isinstance(answer, Exception) else (answer, next(files)) for answer in answers
     ]
-
-
-def _uncancelled_context() -> Context:
-    """Return a context without a request's cancellation: a batch serves several requests."""
-    context = copy_context()
-    context.run(cancellation.current.set, None)
-    return context
-
-
-async def _work_batch(work: Work, batch: Pending) -> None:
-    batch = [(item, future) for item, future in batch if not future.done()]
-    try:
-        results = await to_thread.run_sync(work, [item for item, _ in batch]) if batch else []
-    except Exception as fault:
-        results = [fault] * len(batch)
-    for (_, future), result in zip(batch, results, strict=True):
-        if future.done():
-            continue
-        if isinstance(result, Exception):
-            future.set_exception(result)
-        else:
-            future.set_result(result)
 
 
 MAX_POSES = 64

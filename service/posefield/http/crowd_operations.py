@@ -24,8 +24,8 @@ from posefield.encode.formats import (
 from posefield.http import responses
 from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
 from posefield.http.api.settings import Settings
+from posefield.http.batching import CROWD_LIMITER, run_in_thread
 from posefield.http.request import ServiceRequest, read_body
-from posefield.http.worker_threads import CROWD_LIMITER, run_in_thread
 from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.locomotion import walking_crowd
 from posefield.locomotion import walking_crowd as orders

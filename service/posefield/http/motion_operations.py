@@ -16,9 +16,9 @@ from posefield.encode.formats import (
     TableEncoder,
     max_poses,
 )
-from posefield.http import responses, worker_threads
+from posefield.http import batching, responses
+from posefield.http.batching import POSE_LIMITER, SYNTHESIS_LIMITER, run_in_thread
 from posefield.http.request import ServiceRequest
-from posefield.http.worker_threads import POSE_LIMITER, SYNTHESIS_LIMITER, run_in_thread
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer
 from posefield.robots import robot_clip
@@ -82,7 +82,7 @@ async def answer_clip(request: ServiceRequest) -> Response:
     else:
         # A correction takes milliseconds, which would block the event loop.
         async with SYNTHESIS_LIMITER:
-            answer = await worker_threads.within(clips.synthesize_clip, model, question, longest)
+            answer = await batching.within(clips.synthesize_clip, model, question, longest)
             content = await batcher.file(encoder, convention, answer)
     return responses.clip_file(content, encoder, encoder.noted(answer).trust)
 

@@ -17,7 +17,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
-from posefield.http import worker_threads
+from posefield.http import batching
 from posefield.http.api.problems import NOT_ACCEPTABLE, RequestError
 
 VARY = "Accept"
@@ -173,9 +173,7 @@ async def _compress_body(response: Response, coding: str) -> None:
     content = bytes(response.body)
     quick = len(content) <= MAX_INLINE_SIZE
     compress = _COMPRESS[coding]
-    response.body = (
-        compress(content) if quick else await worker_threads.run_in_thread(compress, content)
-    )
+    response.body = compress(content) if quick else await batching.run_in_thread(compress, content)
     headers: MutableHeaders = response.headers
     headers["Content-Encoding"] = coding
     headers["Content-Length"] = str(len(response.body))
@@ -195,7 +193,7 @@ async def _compress_stream(pieces: AsyncIterator[bytes], coding: str) -> AsyncIt
     """
     stream = _STREAMS[coding]()
     async for piece in pieces:
-        if packed := await worker_threads.run_in_thread(stream.compress, piece):
+        if packed := await batching.run_in_thread(stream.compress, piece):
             yield packed
     yield stream.flush()
 

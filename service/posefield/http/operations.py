@@ -16,12 +16,12 @@ from posefield.encode.formats import (
 )
 from posefield.http import metrics, responses
 from posefield.http.archive_operations import answer_clips, answer_performances
+from posefield.http.batching import POSE_LIMITER, run_in_thread
 from posefield.http.crowd_operations import WALK_FORMATS, answer_crowd, answer_walk
 from posefield.http.motion_operations import CLIP_FILES, CLIP_FORMATS, answer_clip, answer_pose
 from posefield.http.performance_operations import PERFORMANCE_FORMATS, answer_performance
 from posefield.http.request import ServiceRequest
 from posefield.http.routing import Handler
-from posefield.http.worker_threads import POSE_LIMITER, run_in_thread
 from posefield.model_file import model_card
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.synthesis import trust

@@ -13,8 +13,8 @@ from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
 from posefield.http import responses
 from posefield.http.api import problems
 from posefield.http.api.problems import BAD_PARAMETER, RequestError
+from posefield.http.batching import LONG_LIMITER, PERFORMANCE_LIMITER, run_in_thread
 from posefield.http.request import ServiceRequest, query_pairs, read_body
-from posefield.http.worker_threads import LONG_LIMITER, PERFORMANCE_LIMITER, run_in_thread
 from posefield.performance import composition
 from posefield.performance.passage import RATE
 from posefield.performance.script import resolve_script

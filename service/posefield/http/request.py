@@ -227,7 +227,7 @@ class DeadlineTimer:
     async def within(self, limit: float, answer: Awaitable[Result]) -> Result:
         """Await a response; raises RequestError 503 if it takes longer than `limit` seconds.
 
-        The awaiting task is cancelled then, and `worker_threads.run_in_thread` asks the thread's
+        The awaiting task is cancelled then, and `batching.run_in_thread` asks the thread's
         work to stop.
         """
         task, loop = asyncio.current_task(), asyncio.get_running_loop()

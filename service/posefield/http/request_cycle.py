@@ -203,15 +203,12 @@ def requested_deadline(prefer: bytes | None, longest: float) -> float:
 
 
 async def send_response(request: ServiceRequest, response: Response) -> None:
-    """Compress a response, add the common headers and send it."""
+    """Compress a response, add the common headers and send it.
+
+    They are request id, security, connection, CORS and caching.
+    """
     if request.coding is not None and response.status_code == 200:
         await negotiation.compress_response(response, request.coding)
-    response.raw_headers += _common_headers(request, response)
-    await response(request.scope, request.receive, request.transmit)
-
-
-def _common_headers(request: ServiceRequest, response: Response) -> list[tuple[bytes, bytes]]:
-    """Return the headers of every response: request id, security, connection, CORS and caching."""
     # A Content-Security-Policy with a 304 would replace that of the browser's cached page, which
     # could then load nothing.
     is_page = response.media_type == "text/html" or response.status_code == 304
@@ -229,7 +226,8 @@ def _common_headers(request: ServiceRequest, response: Response) -> list[tuple[b
         headers += [(b"etag", request.tag.encode()), (b"cache-control", request.lifetime)]
     elif "cache-control" not in response.headers:
         headers.append((b"cache-control", responses.NO_STORE))
-    return headers
+    response.raw_headers += headers
+    await response(request.scope, request.receive, request.transmit)
 
 
 def record(request: ServiceRequest) -> None:

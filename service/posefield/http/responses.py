@@ -27,7 +27,7 @@ from starlette.responses import Response, StreamingResponse
 import posefield
 from posefield.common.errors import InvalidField
 from posefield.encode.archives import Format
-from posefield.http import worker_threads
+from posefield.http import batching
 from posefield.question.performance_report import PerformanceReport
 from posefield.question.results import Trust
 
@@ -290,5 +290,5 @@ async def _sent(pieces: Iterator[bytes], limiter: CapacityLimiter) -> AsyncItera
     pieces: none may be empty. When the client disconnects, generation stops after the current
     piece.
     """
-    while piece := await worker_threads.run_in_thread(next, pieces, b"", limiter=limiter):
+    while piece := await batching.run_in_thread(next, pieces, b"", limiter=limiter):
         yield piece

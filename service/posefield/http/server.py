@@ -34,7 +34,7 @@ from uvicorn.supervisors.multiprocess import Process
 
 from posefield.common.cancellation import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
-from posefield.http import metrics, telemetry, worker_threads
+from posefield.http import batching, metrics, telemetry
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.readiness import Readiness
@@ -248,7 +248,7 @@ def open_models(
 def _application(
     models: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
 ) -> App:
-    sys.setswitchinterval(worker_threads.SWITCH_INTERVAL)
+    sys.setswitchinterval(batching.SWITCH_INTERVAL)
     log = telemetry.LogBuffer(sys.stderr.fileno()) if settings.log == "on" else None
     background = partial(lifespan, models=models, announcement=announcement)
     return create_app(Readiness(models), settings, log, background)

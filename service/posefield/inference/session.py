@@ -35,7 +35,7 @@ from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import support
 from posefield.kriging.kriging_model import KrigingWeights
 from posefield.model_file import checked_file, onnx_file
-from posefield.model_file.model_card import ROW_VALUES, Control, ModelCard, shape_rows
+from posefield.model_file.model_card import ROW_VALUES, Control, ModelCard
 
 MARGIN = 0.25
 """Margin of controls, as a share of the sampled range, and of durations, as a share of the captured
@@ -117,6 +117,24 @@ def limit_control(control: Control, value: float) -> float:
     """Return the value at which a control acts: at most the margin outside its sampled range."""
     room = MARGIN * (control.maximum - control.minimum)
     return min(max(value, control.minimum - room), control.maximum + room)
+
+
+def shape_rows(
+    output: str, rows: Annotated[Singles, "rows columns"], questions: int, joints: int
+) -> Any:
+    """Return an output of the graph in its shape, from its rows, without a copy.
+
+    questions: B. Rotations are (B, S, J, 4), bone offsets (B, J, 3), durations and sigmas (B,), all
+    others (B, S, n).
+    """
+    if output in ("duration", "sigma"):
+        # Sigma has two equal columns, so that its sums have one order (`GraphBuilder.row_sums`).
+        return rows[:, 0]
+    if output == "rotations":
+        return rows.reshape(questions, -1, joints, 4)
+    if output == "bone_offsets":
+        return rows.reshape(questions, joints, 3)
+    return rows.reshape(questions, -1, rows.shape[1])
 
 
 # Estimate of memory, by the shipped models: each level has up to six sessions, one for each set of

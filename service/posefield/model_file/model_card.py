@@ -7,6 +7,7 @@ older reader would misread a file. `checked_file` reads what `dump` writes.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, Literal, SupportsFloat
 
 import msgspec
@@ -25,7 +26,7 @@ from posefield.common.bounded_types import (
     Slug,
     Text,
 )
-from posefield.common.units import Floats, Positions, Singles
+from posefield.common.units import Floats, Positions
 from posefield.kriging.kriging_model import Hyper
 from posefield.motion import measures
 from posefield.motion.contact_detection import FootContact
@@ -106,22 +107,6 @@ ROW_VALUES = {
     "curves": "curve_rows",
 }
 """Name of the value with the rows, by output of the graph."""
-
-
-def shape_rows(output: str, rows: Singles, questions: int, joints: int) -> Any:
-    """Return an output of the graph in its shape, from its rows, without a copy.
-
-    questions: B. Rotations are (B, S, J, 4), bone offsets (B, J, 3), durations and sigmas (B,), all
-    others (B, S, n).
-    """
-    if output in ("duration", "sigma"):
-        # Sigma has two equal columns, so that its sums have one order (`GraphBuilder.row_sums`).
-        return rows[:, 0]
-    if output == "rotations":
-        return rows.reshape(questions, -1, joints, 4)
-    if output == "bone_offsets":
-        return rows.reshape(questions, joints, 3)
-    return rows.reshape(questions, -1, rows.shape[1])
 
 
 FORMAT = 5
@@ -300,7 +285,7 @@ class ModelCard:
         """Return the number of names of each label set."""
         return tuple(len(label.names) for label in self.labels)
 
-    @property
+    @cached_property
     def performers(self) -> tuple[str, ...]:
         """Return the names of performers; empty where the model does not distinguish them."""
         return next((label.names for label in self.labels if label.name == PERFORMER), ())

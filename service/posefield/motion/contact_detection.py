@@ -3,13 +3,11 @@
 A contact is a run of frames that are slow and low, of which one at least is slower and lower still.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common import frame_groups
 from posefield.common.bounded_types import Index, NonNegative, Number, Positive
 from posefield.common.units import UP, Booleans, Floats, Indices
 
@@ -183,39 +181,3 @@ def mean_skate_speed(
     planted = down[..., 1:, :] & down[..., :-1, :]
     speeds = rate * np.linalg.norm(np.diff(feet, axis=-3) * (1.0 - UP), axis=-1)
     return np.sum(speeds * planted, axis=(-2, -1)) / np.maximum(planted.sum(axis=(-2, -1)), 1)
-
-
-def mean_skate_speeds(
-    feet: Sequence[Annotated[Floats, "_ _ 3"]], rates: Sequence[float]
-) -> list[float]:
-    """Return `mean_skate_speed` of the feet (F, K, 3) of several motions.
-
-    Each has the bytes that it has alone. Motions with equally many feet are measured at once.
-    """
-    means: dict[int, float] = {}
-    counts = [paths.shape[1] for paths in feet]
-    for count in dict.fromkeys(counts):
-        clips = [clip for clip, joints in enumerate(counts) if joints == count]
-        speeds = _mean_speeds([feet[at] for at in clips], np.array([rates[at] for at in clips]))
-        means |= zip(clips, speeds.tolist(), strict=True)
-    return [means[clip] for clip in range(len(feet))]
-
-
-def _mean_speeds(
-    feet: Sequence[Annotated[Floats, "_ feet 3"]], rates: Annotated[Floats, "motions"]
-) -> Annotated[Floats, "motions"]:
-    """Return the mean speeds (M,) of planted feet (F, K, 3), m/s; K feet in each motion."""
-    groups = frame_groups.of_lengths(feet)
-    paths = np.concatenate(feet)
-    heights = paths @ UP
-    lowest = np.minimum.reduceat(heights, groups.starts, axis=0)[groups.group]
-    down = heights < lowest + PLANTED_HEIGHT
-    planted = np.zeros(down.shape, bool)
-    planted[:-1] = down[1:] & down[:-1]
-    # The step from the last frame of a motion to the first of the next is none.
-    planted[groups.starts + groups.counts - 1] = False
-    steps = np.diff(paths, axis=0, append=paths[-1:])
-    speeds = rates[groups.group, None] * np.hypot(steps[..., 0], steps[..., 2])
-    counts = groups.sums(planted.astype(float)).sum(axis=1)
-    means: Floats = groups.sums(speeds * planted).sum(axis=1) / np.maximum(counts, 1.0)
-    return means

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Annotated, NamedTuple
 
@@ -47,21 +47,18 @@ class Skeleton:
             )
         if len(set(self.names)) != count:
             raise ValueError("joint names must be unique")
-        if self.parents[0] != -1 or any(not 0 <= p < j for j, p in self._children()):
+        if self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents[1:], 1)):
             raise ValueError("the root comes first and every parent before its children")
         if self.tip_offsets.shape != (len(self.tip_joints), 3):
             raise ValueError(f"{len(self.tip_joints)} tips, offsets {self.tip_offsets.shape}")
         if max(self.tip_joints, default=0) >= count:
             raise ValueError(f"a tip at joint {max(self.tip_joints)}, expected 0 to {count - 1}")
 
-    @property
+    @cached_property
     def tips(self) -> dict[int, tuple[float, float, float]]:
         """Return the translation of a joint's end site, m, by joint."""
         offsets = [(x, y, z) for x, y, z in self.tip_offsets.tolist()]
         return dict(zip(self.tip_joints, offsets, strict=True))
-
-    def _children(self) -> list[tuple[int, int]]:
-        return list(enumerate(self.parents))[1:]
 
     def __len__(self) -> int:
         return len(self.names)
@@ -71,7 +68,7 @@ class Skeleton:
     ) -> Annotated[Floats, "*poses joints 3"]:
         """Return the joint positions (..., J, 3) in the rest pose with offsets (..., J, 3), m."""
         positions = offsets.copy()
-        for joint, parent in self._children():
+        for joint, parent in enumerate(self.parents[1:], 1):
             positions[..., joint, :] += positions[..., parent, :]
         return positions
 

@@ -171,9 +171,8 @@ def _set_strides(model: Synthesizer, draft: ClipDraft, duration: float) -> None:
         draft.strides = measure(model.session, question.point, question.labels, question.level)
     if draft.stands:
         # A motion that climbs does not repeat.
-        if card.cyclic and draft.question.ground.is_level:
-            draft.cycle = standing_feet.cycle_of(draft.strides)
-        draft.plan_times = standing_feet.plan_times(duration, draft.cycle is not None)
+        cyclic = card.cyclic and draft.question.ground.slope == 0.0
+        standing_feet.set_plan(draft, draft.strides, duration, cyclic)
 
 
 def _finished_clip(model: Synthesizer, draft: ClipDraft) -> ClipAnswer | QueryError:

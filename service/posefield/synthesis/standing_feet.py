@@ -16,10 +16,10 @@ from posefield.inference.onnx_runtime import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import contact_detection, measures
+from posefield.motion import measures
 from posefield.motion.contact_detection import FootContact
 from posefield.motion.measures import MeasuredMotion
-from posefield.question.motion_question import LEVEL_FLOOR, Floor
+from posefield.question.motion_question import LEVEL_FLOOR
 from posefield.question.results import FeetResult, StanceResult, round_micrometres
 from posefield.synthesis.clip_draft import ClipDraft
 from posefield.synthesis.synthesizer import Synthesizer
@@ -29,19 +29,18 @@ RATE, FEWEST, MOST = 60.0, 8, 600
 UNREACHED = "does not stand: its leg does not reach the floor"
 
 
-def plan_times(duration: float, cyclic: bool) -> Annotated[Floats, "frames"]:
-    """Return the times (G,), s, of the plan of a motion; a cycle's lack its last frame."""
+def set_plan(draft: ClipDraft, strides: Strides, duration: float, cyclic: bool) -> None:
+    """Set the times of the plan of a motion (G,), s, and the floor motion of a cycle.
+
+    The times of a cycle lack its last frame.
+    """
+    if cyclic:
+        turn = float(strides.turns[0])
+        gap = floor_plane.arc_displacement(strides.travels, strides.turns)[0]
+        start, factor = strides.starts[0], complex(np.exp(1j * turn))
+        draft.cycle = Cycle(complex(start + gap - factor * start), factor)
     steps = min(max(round(duration * RATE), FEWEST), MOST)
-    times: Floats = np.arange(float(steps + (not cyclic))) * (duration / steps)
-    return times
-
-
-def cycle_of(strides: Strides) -> Cycle:
-    """Return the floor motion from the start of a cycle to its end."""
-    turn = float(strides.turns[0])
-    gap = floor_plane.arc_displacement(strides.travels, strides.turns)[0]
-    start, factor = strides.starts[0], complex(np.exp(1j * turn))
-    return Cycle(complex(start + gap - np.exp(1j * turn) * start), factor)
+    draft.plan_times = np.arange(float(steps + (not cyclic))) * (duration / steps)
 
 
 def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
@@ -54,7 +53,8 @@ def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
     feet = [contact.joint for contact in contacts] if contacts else list(card.feet)
     placed, requests = [], []
     for draft in drafts:
-        answer, constraints = draft.answer, draft.constraints or NO_CONSTRAINTS
+        answer, ground = draft.answer, draft.question.ground
+        constraints = draft.constraints or NO_CONSTRAINTS
         measured = [measure for _, measure, _ in constraints.controls]
         moments = [target.moment for target in constraints.targets]
         exact_joints = {joint for measure in measured + moments for joint in measure.joints}
@@ -83,11 +83,13 @@ def stand(model: Synthesizer, drafts: Sequence[ClipDraft]) -> None:
                     chosen,
                     _probabilities(model, draft, chosen) if chosen else None,
                     draft.cycle,
-                    floor=draft.question.ground,
+                    floor=ground,
                 )
             )
         left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in left_out)
-        unplaced = FeetResult((), 0, 0.0, 0.0, 0.0, 0.0, 0.0, left, _sloped(draft.question.ground))
+        unplaced = FeetResult(
+            (), 0, 0.0, 0.0, 0.0, 0.0, 0.0, left, None if ground == LEVEL_FLOOR else ground
+        )
         draft.answer = replace(answer, trust=structs.replace(answer.trust, feet=unplaced))
     if not placed:
         return
@@ -120,8 +122,8 @@ def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult
     ]
     rates = [plan.rate for plan in plans]
     skates = (
-        contact_detection.mean_skate_speeds([before for before, _ in paths], rates),
-        contact_detection.mean_skate_speeds(level, rates),
+        foot_placement.mean_skate_speeds([before for before, _ in paths], rates),
+        foot_placement.mean_skate_speeds(level, rates),
     )
     drifts = foot_placement.largest_drifts(plans, [after for _, after in paths])
     return [
@@ -134,7 +136,7 @@ def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult
             round_micrometres(float((plan.lowered - plan.followed).max())),
             round_micrometres(plan.grounded),
             tuple(f"{names[plan.character.legs[leg].tip]} {UNREACHED}" for leg in plan.unreached),
-            _sloped(plan.floor),
+            None if plan.floor == LEVEL_FLOOR else plan.floor,
         )
         for plan, before, after, drift in zip(plans, *skates, drifts, strict=True)
     ]
@@ -167,11 +169,6 @@ def _swings(plan: FeetPlan) -> int:
             at_ends = [(stance.start == 0) + (stance.stop == count) for stance in steps.stances]
             swings += len(steps.stances) + 1 - sum(at_ends)
     return swings
-
-
-def _sloped(floor: Floor) -> Floor | None:
-    """Return the floor of an answer; None for the level on which motions are captured."""
-    return None if floor == LEVEL_FLOOR else floor
 
 
 def _probabilities(

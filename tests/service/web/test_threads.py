@@ -10,7 +10,7 @@ from anyio import CapacityLimiter
 
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancelled
-from posefield.http import worker_threads
+from posefield.http import batching
 
 
 class Work:
@@ -57,7 +57,7 @@ class Failing(Work):
 def test_cancelled_work_stops_and_leaves_nothing_in_the_log_unless_it_fails(kind, lines, caplog):
     async def scene():
         work = kind()
-        task = asyncio.create_task(worker_threads.run_in_thread(work))
+        task = asyncio.create_task(batching.run_in_thread(work))
         await begun(work)
         task.cancel()
         await cancelled(task)
@@ -73,9 +73,9 @@ def test_cancelled_work_stops_and_leaves_nothing_in_the_log_unless_it_fails(kind
 def test_a_place_is_held_until_work_that_does_not_look_has_ended(times):
     async def scene():
         places, work, next_one = CapacityLimiter(1), Work(looks=False, seconds=0.3), Work()
-        task = asyncio.create_task(worker_threads.run_in_thread(work, limiter=places))
+        task = asyncio.create_task(batching.run_in_thread(work, limiter=places))
         await begun(work)
-        waiting = asyncio.create_task(worker_threads.run_in_thread(next_one, limiter=places))
+        waiting = asyncio.create_task(batching.run_in_thread(next_one, limiter=places))
         for _ in range(times):
             task.cancel()
             await asyncio.sleep(0.01)
