@@ -29,7 +29,7 @@ install: $(ENV) ## install into .venv what the lock file names
 
 # Node comes with the environment; packages are those of the lock file.
 NODE := clients/node_modules/.installed
-$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json clients/runtime/package.json | $(ENV)
+$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json clients/runtime/package.json clients/page/package.json | $(ENV)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --prefix clients --silent --no-audit --no-fund
 	@touch $@
 
@@ -40,6 +40,11 @@ node: $(NODE) ## install into clients/node_modules what its lock file names
 PAGE := service/posefield/http/pages/viewer/index.html
 $(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
+
+# Files that `posefield page` copies beside models, for any static host.
+MODEL_PAGE := service/posefield/http/pages/model/index.html
+$(MODEL_PAGE): $(NODE) $(shell find clients/page/src clients/runtime/src clients/viewer/src -type f) clients/page/index.html clients/page/vite.config.ts clients/tsconfig.base.json
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/page --silent
 
 # The service's answer to `/docs`: Swagger UI as its package holds it, within one file of HTML.
 DOCS := service/posefield/http/pages/docs/index.html
@@ -53,7 +58,7 @@ $(DOCS): $(NODE) clients/docs/index.html service/posefield/__init__.py
 		-e 's/@VERSION@/$(VERSION)/' clients/docs/index.html > $@
 
 .PHONY: page
-page: $(PAGE) $(DOCS) ## build the pages that the service shows at / and /docs
+page: $(PAGE) $(DOCS) $(MODEL_PAGE) ## build the pages that the service shows, and that of `posefield page`
 
 $(SAMPLE)/recipe.toml: | $(ENV)
 	$(BIN)/posefield sample reaching --output $(SAMPLE)
@@ -86,7 +91,7 @@ addon: $(ENV) ## the Blender add-on as an archive to install, in build
 
 # Types are checked beside the tests: neither alone keeps two processors busy.
 .PHONY: test
-test: $(PAGE) $(DOCS) ## lint, types, layers, unit tests, the contract in process: some minutes
+test: $(PAGE) $(DOCS) $(MODEL_PAGE) ## lint, types, layers, unit tests, the contract in process: some minutes
 	$(MAKE) --no-print-directory -j2 lint types typescript unit
 
 .PHONY: lint
@@ -102,6 +107,7 @@ lint: $(ENV)
 docs: $(ENV) ## build the documentation in build/site
 	$(BIN)/python docs/generate.py --check
 	$(BIN)/zensical build --config-file mkdocs.yml --strict --clean
+	test ! -e $(MODEL_PAGE) || $(BIN)/posefield page $(notdir $(basename $(wildcard $(SHIPPED)/*.onnx))) -o build/site/live
 
 .PHONY: types
 types: $(ENV)
@@ -112,11 +118,11 @@ typescript: $(PAGE) ## check types, style and tests of the TypeScript client and
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run check --prefix clients --silent
 
 .PHONY: unit
-unit: $(PAGE) $(DOCS)
+unit: $(PAGE) $(DOCS) $(MODEL_PAGE)
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not system" --durations=15
 
 .PHONY: test-system
-test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, stores, clusters, browsers, Blender, the image
+test-system: $(PAGE) $(DOCS) $(MODEL_PAGE) ## all that starts processes: services, exports, stores, clusters, browsers, Blender, the image
 	$(BIN)/python -m pytest -n auto --dist worksteal -m system --durations=25
 	$(BIN)/python tests/interop/run.py
 
@@ -138,7 +144,7 @@ fuzz: $(PAGE) $(DOCS) ## send requests drawn from the contract and mutate motion
 
 # Everything installable: all distributions of the workspace as wheels and sdists.
 .PHONY: wheels
-wheels: $(PAGE) $(DOCS) ## build wheels and sdists of posefield, posefield-train and posefield-client in dist
+wheels: $(PAGE) $(DOCS) $(MODEL_PAGE) ## build wheels and sdists of posefield, posefield-train and posefield-client in dist
 	rm -rf dist
 	for name in posefield posefield-train posefield-client; do $(BIN)/uv build --quiet --package $$name --out-dir dist; done
 
@@ -161,7 +167,7 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-older .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer service/posefield/http/pages/model clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-older .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # Every family is held out take by take; finished folds are kept, so that a run that was stopped goes on.
 EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop hdm05_squat bandai_raise_hand

@@ -12,6 +12,8 @@ export interface Control {
   readonly minimum: number;
   readonly maximum: number;
   readonly default: number;
+  /** Quantity of the motion by which the control is measured. */
+  readonly measure?: { readonly quantity: string };
 }
 
 export interface LabelSet {

@@ -17,9 +17,9 @@ import { findLegs, LimbPoses, quaternionAt } from "./limbs.ts";
 import { type Controls, type Model, type Options, type Poses, range } from "./model.ts";
 import type { Point } from "./session.ts";
 import type { Grid } from "./stances.ts";
+import { cycleOf, lineOf, relativeRoot, type Stride } from "./strides.ts";
 import {
   arcFactor,
-  type Complex,
   clamp,
   direction,
   multiply,
@@ -57,13 +57,6 @@ export interface Clip extends Poses {
   readonly stances: readonly Stance[];
 }
 
-/** The cycle of a motion, or its straight line: way along the arc, turn, and start of the root. */
-interface Stride {
-  readonly way: Complex;
-  readonly turned: number;
-  readonly start: Complex;
-}
-
 export async function clip(model: Model, controls: Controls, options: ClipOptions): Promise<Clip> {
   const { card, session } = model;
   const point = model.point(controls, options);
@@ -89,7 +82,9 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
   const frames = times.length;
   const rotations = Float64Array.from(outputs.rotations.subarray(0, 4 * joints * frames));
   const roots = Float64Array.from(outputs.root_position.subarray(0, 3 * frames));
-  const stride = strideOf(card, outputs, frames + count);
+  const stride = cyclic
+    ? cycleOf(outputs, frames + count + 1, whole)
+    : lineOf(outputs.root_position, frames + count, whole);
   let stances: Stance[] = [];
   if (stands) {
     const bones = outputs.bone_offsets;
@@ -118,7 +113,7 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
     placeFeet(plan, poses, times, rotations, roots);
     stances = stancesOf(plan);
   }
-  if (inPlace) removeTravel(stride, times, whole, rotations, roots);
+  if (inPlace) removeTravel(stride, times, rotations, roots);
   const closing = options.loop
     ? closingPose(inPlace || card.root !== "travelling" ? null : stride, rotations, roots, joints)
     : { rotations: [], roots: [] };
@@ -128,7 +123,7 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
     parents: card.skeleton.parents,
     frames: frames + Number(!!options.loop),
     rate,
-    times: options.loop ? [...times, duration] : times,
+    times: Float64Array.from(options.loop ? [...times, duration] : times),
     rotations: Float32Array.from([...rotations, ...closing.rotations]),
     rootPosition: Float32Array.from([...roots, ...closing.roots]),
     boneOffsets: outputs.bone_offsets,
@@ -147,28 +142,6 @@ function wantsStandingFeet(card: ModelCard, { feet }: ClipOptions): boolean {
   if (feet === "stand" && !able)
     throw new InvalidField("feet", "'stand', but this model knows no contacts of feet that travel");
   return feet === undefined ? able : feet === "stand";
-}
-
-function strideOf(
-  card: ModelCard,
-  outputs: Record<"root_position" | "travel", Float32Array>,
-  begin: number,
-): Stride {
-  const [first, last] = [begin, begin + 1].map(
-    (index): Complex => [outputs.root_position[3 * index + 2]!, outputs.root_position[3 * index]!],
-  ) as [Complex, Complex];
-  if (!card.cyclic)
-    return { way: [last[0] - first[0], last[1] - first[1]], turned: 0, start: first };
-  const [left, ahead, turned] = outputs.travel.subarray(3 * (begin + 1)) as unknown as [
-    number,
-    number,
-    number,
-  ];
-  const [re, im] = arcFactor(turned);
-  const size = re ** 2 + im ** 2;
-  const way = product([ahead, left], [re / size, -im / size]);
-  // A cycle without its travel ends at its start.
-  return { way, turned, start: [last[0] - ahead, last[1] - left] };
 }
 
 function gridOf(
@@ -280,24 +253,16 @@ async function timeOfFrame(model: Model, point: Point, whole: number, frame: num
 
 /** Put poses into the frame that travels along the way, placed at the start of the clip. */
 function removeTravel(
-  { way, turned, start }: Stride,
+  stride: Stride,
   times: readonly number[],
-  whole: number,
   rotations: Float64Array,
   roots: Float64Array,
 ): void {
   const joints = rotations.length / (4 * times.length);
   for (const [frame, time] of times.entries()) {
-    const phase = time / whole;
-    const gone = product([phase * way[0], phase * way[1]], arcFactor(phase * turned));
-    const root: Complex = [
-      roots[3 * frame + 2]! - start[0] - gone[0],
-      roots[3 * frame]! - start[1] - gone[1],
-    ];
-    const [z, x] = product(root, direction(-phase * turned));
-    roots[3 * frame] = start[1] + x;
-    roots[3 * frame + 2] = start[0] + z;
-    const heading = turn([0, 1, 0], -phase * turned);
+    const { root, heading } = relativeRoot(stride, time / stride.duration, roots, frame);
+    const [z, x] = stride.start;
+    roots.set([x + root[0], root[1], z + root[2]], 3 * frame);
     rotations.set(multiply(heading, quaternionAt(rotations, frame * joints)), 4 * frame * joints);
   }
 }

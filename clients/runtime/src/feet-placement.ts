@@ -13,6 +13,7 @@ import {
   conjugate,
   multiply,
   norm,
+  type Quaternion,
   rotate,
   scale,
   subtract,
@@ -42,7 +43,8 @@ export function placeFeet(
       const ball = anchored(grid, foot, at, path);
       const lowest = foot.toeHeight - ball[1];
       const place = (joint: number) => 4 * (frame * joints + joint);
-      const turns = placeLeg(poses, foot.limb, frame, shift, ball, lowest, bends[index]!);
+      const bend = bends[index]!;
+      const turns = placeLeg(poses, foot.limb, frame, shift, ball, { lowest, bend });
       for (const [joint, turn] of turns) rotations.set(turn, place(joint));
     }
     roots[3 * frame + 1]! -= lowered;
@@ -52,7 +54,8 @@ export function placeFeet(
 /**
  * Local rotations of the joints of a leg, by joint, whose ball comes to a place.
  *
- * shift: of the root, m. lowest: of the end of the toes above the ball, m.
+ * shift: of the root, m. lowest: of the end of the toes above the ball, m. bend: of `meanBend`.
+ * spin: turn of the foot before it is placed.
  */
 export function placeLeg(
   poses: LimbPoses,
@@ -60,29 +63,29 @@ export function placeLeg(
   frame: number,
   shift: Vector,
   ball: Vector,
-  lowest: number,
-  bend: Vector,
-) {
+  { lowest, bend, spin }: { lowest: number; bend: Vector; spin?: Quaternion },
+): Map<number, Quaternion> {
   let arm = poses.between(leg.lower, leg.tip, frame);
+  if (spin) arm = rotate(spin, arm);
   const offset = subtract(add(poses.position(leg.upper, frame), shift), ball);
   const chord = legChord(poses, leg, frame, norm(add(offset, arm)));
-  const hasFoot = leg.tip !== leg.lower;
   // The heel is lifted where the leg would be stretched.
-  const lift = hasFoot ? heelTurn(offset, arm, chord) : null;
+  const lift = leg.tip === leg.lower ? null : heelTurn(offset, arm, chord);
+  const foot = lift && spin ? multiply(lift, spin) : (lift ?? spin);
   if (lift) arm = rotate(lift, arm);
   const chain = scale(add(offset, arm), -1);
   const end = scale(chain, chord / Math.max(norm(chain), 1e-9));
   const turns = solve(poses, leg, frame, end, bend);
   const orientation = poses.orientation(leg.lower, frame);
-  const ankle = lift ? multiply(lift, orientation) : orientation;
-  const lower = lift ? multiply(turns.lower, multiply(conjugate(orientation), ankle)) : turns.lower;
+  const ankle = foot ? multiply(foot, orientation) : orientation;
+  const lower = multiply(turns.lower, multiply(conjugate(orientation), ankle));
   const placed = new Map([
     [leg.upper, turns.upper],
     [leg.middle, turns.middle],
-    [leg.lower, lower],
+    [leg.lower, foot ? lower : turns.lower],
   ]);
-  if (lift && leg.toe) {
-    const tip = multiply(lift, poses.orientation(leg.tip, frame));
+  if (foot && leg.toe) {
+    const tip = multiply(foot, poses.orientation(leg.tip, frame));
     const bent = multiply(toeBend(rotate(tip, leg.toe), lowest), tip);
     placed.set(leg.tip, multiply(conjugate(ankle), bent));
   }

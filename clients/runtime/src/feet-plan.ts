@@ -23,7 +23,7 @@ import {
   type Run,
   shortened,
 } from "./stances.ts";
-import { legChord, reachWithoutHeel } from "./two-bone.ts";
+import { firmReach, legChord } from "./two-bone.ts";
 import { add, clamp, norm, rotate, subtract, type Vector } from "./vectors.ts";
 
 export interface Leg {
@@ -131,11 +131,17 @@ function toeDrop(poses: LimbPoses, { tip, toe }: Limb, down: readonly Run[], gri
 }
 
 /** Lowering of the pelvis that a leg needs, m, with its heel lifted; infinite out of reach. */
-function need(poses: LimbPoses, leg: Limb, frame: number, ball: Vector, sunk: number): number {
+export function need(
+  poses: LimbPoses,
+  leg: Limb,
+  frame: number,
+  ball: Vector,
+  sunk: number,
+): number {
   let arm = poses.between(leg.lower, leg.tip, frame);
   const hip = subtract(poses.position(leg.upper, frame), [0, sunk, 0]);
   let reach: number;
-  if (leg.tip === leg.lower) reach = reachWithoutHeel(poses, leg, frame);
+  if (leg.tip === leg.lower) reach = firmReach(poses, leg, frame);
   else {
     const offset = subtract(hip, ball);
     // A micrometre of slack, so that rounding lifts no heel.

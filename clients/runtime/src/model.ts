@@ -6,6 +6,7 @@ import { type Clip, type ClipOptions, clip } from "./clip.ts";
 import { DURATION_FACTOR } from "./constants.ts";
 import { InvalidField, ModelError, OutsideSamples } from "./errors.ts";
 import { type Onnxruntime, type Point, Session } from "./session.ts";
+import { Walkers } from "./walker.ts";
 
 /** Values of all controls, such as `model.defaults` with some changed. */
 export type Controls = Readonly<Record<string, number>>;
@@ -30,7 +31,7 @@ export interface LoadOptions {
 export interface Poses {
   readonly names: readonly string[];
   readonly parents: readonly number[];
-  readonly times: readonly number[];
+  readonly times: Float64Array;
   /** Of each pose and joint. */
   readonly rotations: Float32Array;
   readonly rootPosition: Float32Array;
@@ -111,7 +112,7 @@ export class Model {
     return {
       names: skeleton.names,
       parents: skeleton.parents,
-      times,
+      times: Float64Array.from(times),
       rotations: outputs.rotations,
       rootPosition: outputs.root_position,
       boneOffsets: outputs.bone_offsets,
@@ -124,6 +125,11 @@ export class Model {
   /** A clip; its feet stand, where the model travels and knows their contacts. */
   clip(controls: Controls, options: ClipOptions = {}): Promise<Clip> {
     return clip(this, controls, options);
+  }
+
+  /** Walkers that are steered, of a walk. */
+  walkers(count: number, options: Options = {}): Promise<Walkers> {
+    return Walkers.of(this, count, options);
   }
 
   /** Shortest and longest plausible duration, s. */

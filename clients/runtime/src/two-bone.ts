@@ -51,7 +51,7 @@ export function distances(poses: LimbPoses, limb: Limb): [number, number] {
 }
 
 /** Distance, m, up to which the end of a limb follows its target exactly. */
-function firmReach(poses: LimbPoses, limb: Limb, frame: number): number {
+export function firmReach(poses: LimbPoses, limb: Limb, frame: number): number {
   const length = distances(poses, limb)[1];
   return Math.max(norm(poses.between(limb.upper, limb.lower, frame)), REACH * length - SOFTNESS);
 }
@@ -74,11 +74,6 @@ export function legChord(poses: LimbPoses, leg: Limb, frame: number, distance: n
     chord += press * Math.tanh(Math.max(-more, 0) / press);
   }
   return Math.max(chord, 1.001 * shortest + 1e-6);
-}
-
-/** Reach of a leg whose heel cannot be lifted, m: of one without a foot. */
-export function reachWithoutHeel(poses: LimbPoses, leg: Limb, frame: number): number {
-  return firmReach(poses, leg, frame);
 }
 
 /** The mean bend of a limb over poses, about an axis of its upper bone. */

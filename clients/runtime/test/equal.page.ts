@@ -86,6 +86,26 @@ test("a pose and a clip take little more of the processor than in the service", 
   assert.ok(ratios.clip > 0 && ratios.clip < CLIP_RATIO, `clip: ${ratios.clip}`);
 });
 
+test("a frame of walkers takes little of the processor", async (context) => {
+  const session = await page.context().newCDPSession(page);
+  await session.send("Performance.enable", { timeDomain: "threadTicks" });
+  for (const [walkers, limit] of [
+    [1, 2],
+    [200, 16],
+  ] as const) {
+    const run = (count: number) =>
+      page.evaluate((task) => posefield.walk("models/cmu_walk.onnx", task.walkers, task.count), {
+        ...{ walkers, count },
+      });
+    await run(60);
+    const begin = await cpu(session);
+    await run(120);
+    const milliseconds = (1e3 * ((await cpu(session)) - begin)) / 120;
+    context.diagnostic(`${walkers} walkers: ${milliseconds.toFixed(2)} ms of CPU a frame`);
+    assert.ok(milliseconds > 0 && milliseconds < limit, `${walkers}: ${milliseconds} ms`);
+  }
+});
+
 /** CPU seconds of the page's thread. */
 async function cpu(session: CDPSession): Promise<number> {
   const { metrics } = await session.send("Performance.getMetrics");

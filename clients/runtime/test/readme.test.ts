@@ -20,6 +20,7 @@ test("the examples of the README run", () => {
     writeFileSync(`${folder}/readme.mjs`, blocks.join("\n"));
     const said = execFileSync(process.execPath, ["readme.mjs"], { cwd: folder, encoding: "utf8" });
     assert.match(said, /^31 joints in two poses, sigma 0\.0\d+ m$/m);
+    assert.match(said, /^at -?0\.\d, 0\.\d m, 1\.2 m\/s$/m);
     assert.match(said, /^\d\d frames, [234] stances of feet that stand$/m);
   } finally {
     rmSync(folder, { recursive: true });

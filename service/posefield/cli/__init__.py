@@ -20,6 +20,7 @@ from posefield.cli import (
     command_clip,
     command_export,
     command_models,
+    command_page,
     command_perform,
     command_serve,
 )
@@ -180,6 +181,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
         ASK,
         ["bake walk.onnx --grid speed=0.6:1.8:5 --grid turn=-20:20:5 -o walk_space"],
     ),
+    "page": (command_page.page, ASK, ["page walk.onnx -o site"]),
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
     "mcp": (command_serve.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),
     "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),

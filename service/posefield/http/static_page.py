@@ -45,6 +45,8 @@ class StaticPage:
 _PAGES = Path(__file__).with_name("pages")
 VIEWER = _PAGES / "viewer/index.html"
 DOCS = _PAGES / "docs/index.html"
+MODEL_PAGE = _PAGES / "model/index.html"
+"""Page that computes with its models; `posefield page` copies its folder."""
 PROBLEMS = _PAGES / "problems.html"
 NO_SOURCE = "'none'"
 """Sources of a Content-Security-Policy that allow nothing."""

@@ -1,9 +1,10 @@
 /** Page in which the answers of the run time are compared and timed. */
 
-import { load, type Model } from "../../src/index.ts";
+import { load, type Model, type Walkers } from "../../src/index.ts";
 import { differences as compare, type Differences, type ModelAnswers } from "../answers.ts";
 
 const models = new Map<string, Model>();
+const crowds = new Map<number, Walkers>();
 
 export async function differences(url: string, answers: ModelAnswers): Promise<Differences> {
   const content = await (await fetch(url)).arrayBuffer();
@@ -19,4 +20,15 @@ export async function repeat(url: string, kind: "pose" | "clip", fps: number, co
     else await model.clip(model.defaults, { fps });
 }
 
-Object.assign(globalThis, { posefield: { differences, repeat } });
+/** Move walkers on some times, each at a speed and a turn of its own. */
+export async function walk(url: string, walkers: number, count: number): Promise<void> {
+  const model = models.get(url) ?? (await load(url));
+  models.set(url, model);
+  const crowd = crowds.get(walkers) ?? (await model.walkers(walkers));
+  crowds.set(walkers, crowd);
+  for (let index = 0; index < walkers; index++)
+    crowd.steer(index, { speed: 0.6 + index / walkers, turn: Math.sin(index) });
+  for (let frame = 0; frame < count; frame++) await crowd.step(1 / 60);
+}
+
+Object.assign(globalThis, { posefield: { differences, repeat, walk } });

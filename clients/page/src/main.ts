@@ -1,0 +1,105 @@
+/** A page that computes with its model: sliders, a clip, walkers that are steered, a download. */
+
+import "./page.css";
+
+import type { ModelCard } from "@posefield/client";
+import { load, type Model, RuntimeFault } from "@posefield/runtime";
+import * as characters from "../../viewer/src/character.ts";
+import { Scene } from "../../viewer/src/scene.ts";
+import * as theme from "../../viewer/src/theme.ts";
+import { ClipView } from "./clip-view.ts";
+import { glb, save } from "./download.ts";
+import { Panel } from "./panel.ts";
+import { WalkView } from "./walk-view.ts";
+
+/** A model of the folder, and its skin. */
+interface Entry {
+  readonly name: string;
+  readonly model: string;
+  readonly character: string;
+  /** Root of the skin at rest, m. */
+  readonly root: readonly [number, number, number];
+}
+
+/** A way to show a model, until it is disposed. */
+export interface View {
+  readonly ready: Promise<void>;
+  change(): void;
+  dispose(): void;
+}
+
+const ort = import("onnxruntime-web/wasm").then((build) => {
+  build.env.wasm.numThreads = 1;
+  // WebAssembly takes longest: a first session, which is refused, loads it beside the models.
+  build.InferenceSession.create(new Uint8Array(0)).catch(() => {});
+  return build;
+});
+theme.start();
+const told = document.querySelector<HTMLElement>("#told")!;
+const scene = new Scene(document.querySelector<HTMLElement>("#stage")!);
+const form = document.querySelector<HTMLFormElement>("#panel")!;
+form.addEventListener("submit", (event) => event.preventDefault());
+
+function tell(fault: unknown): void {
+  told.textContent = fault instanceof RuntimeFault ? fault.message : String(fault);
+}
+
+async function open(entries: readonly Entry[], entry: Entry): Promise<void> {
+  const [model, skin] = await Promise.all([
+    ort.then((build) => load(entry.model, { ort: build })),
+    bytes(entry.character),
+  ]);
+  const character = characters.read(skin);
+  const { skeleton } = model.card;
+  const standing = { ...skeleton, offsets: [entry.root, ...skeleton.offsets.slice(1)] };
+  const card = { ...model.card, skeleton: standing } as unknown as ModelCard;
+  let view: View | null = null;
+  const panel = new Panel(form, model, entries, entry, {
+    change: () => view?.change(),
+    show: () => show(),
+    open: (name) => {
+      view?.dispose();
+      location.hash = name;
+      const next = entries.find((one) => one.name === name)!;
+      open(entries, next).catch(tell);
+    },
+    download: () => exported(model, panel, card, character).catch(tell),
+  });
+  const show = () => {
+    view?.dispose();
+    const walks = panel.state.view === "walk";
+    const stage = { scene, model, card, character, panel, tell };
+    view = walks ? new WalkView(stage) : new ClipView(stage);
+    view.ready.then(() => {
+      told.textContent = walks
+        ? "Arrow keys or W A D walk and turn, Shift walks slowly; click the ground to walk there."
+        : `${model.card.description}`;
+      performance.mark("moving");
+    }, tell);
+  };
+  show();
+}
+
+async function exported(
+  model: Model,
+  panel: Panel,
+  card: ModelCard,
+  character: characters.Character,
+) {
+  const clip = await model.clip(panel.state.controls, { ...panel.options, fps: 60 });
+  save(await glb(card, clip, character), `${model.card.name}.glb`);
+}
+
+async function bytes(url: string): Promise<Uint8Array<ArrayBuffer>> {
+  const answer = await fetch(url);
+  if (!answer.ok) throw new Error(`${url}: status ${answer.status}`);
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
+async function start(): Promise<void> {
+  const entries = JSON.parse(new TextDecoder().decode(await bytes("models.json"))) as Entry[];
+  const name = decodeURIComponent(location.hash.slice(1));
+  await open(entries, entries.find((entry) => entry.name === name) ?? entries[0]!);
+}
+
+start().catch(tell);

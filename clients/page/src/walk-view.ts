@@ -1,0 +1,132 @@
+/** Walkers that are steered by keys, a pad or a click on the ground; a crowd walks by itself. */
+
+import type { Walkers } from "@posefield/runtime";
+import { Plane, Raycaster, Vector2, Vector3 } from "three";
+import { Figure } from "../../viewer/src/figure.ts";
+import { NOWHERE } from "../../viewer/src/playback.ts";
+import type { Stage } from "./clip-view.ts";
+import type { View } from "./main.ts";
+
+const KEYS: Readonly<Record<string, readonly [ahead: number, left: number]>> = {
+  ...{ ArrowUp: [1, 0], KeyW: [1, 0], ArrowLeft: [0, 1], KeyA: [0, 1] },
+  ...{ ArrowRight: [0, -1], KeyD: [0, -1], ShiftLeft: [0.6, 0] },
+};
+/** Rate of turning, rad/s. */
+const TURN = 1.6;
+/** Walkers from which on all are sticks; metres between those of a crowd. */
+const [MANY, APART] = [12, 1.4];
+
+export class WalkView implements View {
+  readonly ready: Promise<void>;
+  readonly #stage: Stage;
+  readonly #end = new AbortController();
+  readonly #held = new Set<string>();
+  #walkers: Walkers | null = null;
+  #figures: readonly Figure[] = [];
+  #goals: (readonly [number, number] | null)[] = [];
+  #computes = false;
+
+  constructor(stage: Stage) {
+    this.#stage = stage;
+    this.ready = this.#begin();
+    const { signal } = this.#end;
+    addEventListener("keydown", (event) => this.#key(event, true), { signal });
+    addEventListener("keyup", (event) => this.#key(event, false), { signal });
+    const canvas = stage.scene.renderer.domElement;
+    canvas.addEventListener("click", (event) => this.#click(event), { signal });
+  }
+
+  change(): void {}
+
+  dispose(): void {
+    this.#end.abort();
+    for (const figure of this.#figures) figure.dispose();
+  }
+
+  async #begin(): Promise<void> {
+    const { scene, model, card, character, panel } = this.#stage;
+    const { count, body } = panel.state;
+    const walkers = await model.walkers(count, panel.options);
+    this.#figures = Array.from({ length: count }, (_, index) => {
+      const side = Math.ceil(Math.sqrt(count));
+      const place = [index % side, Math.floor(index / side)].map((step) => step * APART);
+      walkers.put(index, [place[0]!, place[1]!], 0);
+      const figure = new Figure(card, character, false);
+      figure.wear(count > MANY ? "stick" : body);
+      scene.root.add(figure.group);
+      return figure;
+    });
+    this.#goals = Array.from({ length: count }, () => null);
+    this.#walkers = walkers;
+    this.#show();
+    scene.frame(count > 1 ? 2 : 1);
+    scene.add((seconds) => this.#step(seconds), this.#end.signal);
+  }
+
+  /** Steer, and move all walkers on; a frame that comes too soon is left out. */
+  #step(seconds: number): boolean {
+    const walkers = this.#walkers!;
+    if (this.#computes) return true;
+    this.#computes = true;
+    this.#steer(walkers);
+    walkers
+      .step(seconds)
+      .then(() => this.#show(), this.#stage.tell)
+      .finally(() => {
+        this.#computes = false;
+      });
+    return true;
+  }
+
+  #steer(walkers: Walkers): void {
+    const { speed = walkers.speeds[1] } = this.#stage.panel.state.controls;
+    const keys = [...this.#held].map((code) => KEYS[code]!);
+    for (const [index, goal] of this.#goals.entries()) {
+      if (index > 0 && !goal) this.#goals[index] = this.#somewhere();
+      if (index === 0 && keys.length) this.#goals[0] = null;
+      if (goal && walkers.steerTo(index, goal, speed) < 0.4) this.#goals[index] = null;
+    }
+    if (this.#goals[0]) return;
+    const [ahead, left] = [0, 1].map((axis) =>
+      keys.reduce((sum, key) => sum + key[axis as 0 | 1], 0),
+    );
+    walkers.steer(0, { speed: ahead! * speed, turn: left! * TURN });
+  }
+
+  /** A place for a walker of a crowd to go to. */
+  #somewhere(): readonly [number, number] {
+    const wide = APART * Math.sqrt(this.#goals.length);
+    return [wide * (2 * Math.random() - 1), wide * (2 * Math.random() - 1)];
+  }
+
+  #show(): void {
+    const { poses } = this.#walkers!;
+    const joints = poses.names.length;
+    for (const [index, figure] of this.#figures.entries())
+      figure.show({
+        rotations: poses.rotations.subarray(4 * joints * index, 4 * joints * (index + 1)),
+        root: poses.rootPosition.subarray(3 * index, 3 * index + 3),
+        offsets: poses.boneOffsets,
+        carried: NOWHERE,
+      });
+    this.#stage.scene.follow(poses.rootPosition[0]!, poses.rootPosition[2]!);
+  }
+
+  #key(event: KeyboardEvent, down: boolean): void {
+    if (!(event.code in KEYS) || event.target instanceof HTMLInputElement) return;
+    if (event.target instanceof HTMLSelectElement) return;
+    event.preventDefault();
+    if (down) this.#held.add(event.code);
+    else this.#held.delete(event.code);
+  }
+
+  #click({ offsetX, offsetY, target }: MouseEvent): void {
+    const { camera } = this.#stage.scene;
+    const { clientWidth, clientHeight } = target as HTMLElement;
+    const at = new Vector2((2 * offsetX) / clientWidth - 1, 1 - (2 * offsetY) / clientHeight);
+    const ray = new Raycaster();
+    ray.setFromCamera(at, camera);
+    const place = ray.ray.intersectPlane(new Plane(new Vector3(0, 1, 0), 0), new Vector3());
+    if (place) this.#goals[0] = [place.x, place.z];
+  }
+}

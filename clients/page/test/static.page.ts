@@ -1,0 +1,125 @@
+/** The page of `posefield page` from a static host: it moves soon, is steered, and loads nothing else. */
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { createReadStream, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { createServer, type Server } from "node:http";
+import type { AddressInfo } from "node:net";
+import { tmpdir } from "node:os";
+import { extname } from "node:path";
+import { after, before, test } from "node:test";
+
+import type { Browser, Page } from "playwright-core";
+
+import { browser } from "../../viewer/test/harness.ts";
+
+const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "posefield";
+const TYPES: Record<string, string> = {
+  ...{ ".html": "text/html", ".js": "text/javascript", ".css": "text/css" },
+  ...{ ".wasm": "application/wasm", ".json": "application/json" },
+};
+/** Time until a character moves, with WebAssembly in the browser's cache, ms. */
+const SOON = 1500;
+const folder = mkdtempSync(`${tmpdir()}/posefield-page-`);
+
+let chromium: Browser;
+let server: Server;
+let page: Page;
+let address: string;
+const faults: string[] = [];
+const requests: string[] = [];
+before(async () => {
+  execFileSync(COMMAND, ["page", "cmu_walk", "hdm05_kick", "-o", `${folder}/any/where`]);
+  server = createServer((request, response) => {
+    const path = new URL(request.url!, "http://host").pathname.replace(/\/$/, "/index.html");
+    response.setHeader("content-type", TYPES[extname(path)] ?? "application/octet-stream");
+    response.setHeader("cache-control", "max-age=600");
+    createReadStream(folder + path)
+      .on("error", () => response.writeHead(404).end())
+      .pipe(response);
+  });
+  await new Promise<void>((ready) => server.listen(0, "127.0.0.1", ready));
+  address = `http://127.0.0.1:${(server.address() as AddressInfo).port}/any/where/`;
+  chromium = await browser();
+  page = await chromium.newPage({ viewport: { width: 900, height: 560 } });
+  page.on("pageerror", (fault) => faults.push(String(fault)));
+  page.on("console", (line) => {
+    if (line.type() === "error") faults.push(line.text());
+  });
+  page.on("request", (request) => requests.push(request.url()));
+  await moving();
+});
+after(async () => {
+  await chromium.close();
+  server.close();
+  rmSync(folder, { recursive: true });
+});
+
+/** Milliseconds from the navigation until a character moves. */
+async function moving(): Promise<number> {
+  await page.goto("about:blank");
+  await page.goto(address);
+  await page.waitForFunction(() => performance.getEntriesByName("moving").length > 0);
+  return page.evaluate(() => performance.getEntriesByName("moving")[0]!.startTime);
+}
+
+async function pictures(name: string): Promise<Buffer> {
+  const path = process.env["POSEFIELD_PICTURES"];
+  return page.screenshot(path ? { path: `${path}/${name}.png` } : {});
+}
+
+test("a character moves soon", async (context) => {
+  const times: number[] = [];
+  for (let load = 0; load < 5; load++) times.push(await moving());
+  times.sort((a, b) => a - b);
+  context.diagnostic(`first moving character after ${times.map(Math.round).join(", ")} ms`);
+  assert.ok(times[0]! < SOON, `${times[0]} ms`);
+  const before = await pictures("clip");
+  await page.waitForTimeout(200);
+  assert.ok(!before.equals(await pictures("clip-later")));
+});
+
+test("a slider changes the motion", async () => {
+  const slider = page.locator("input[type=range]").first();
+  const before = await slider.evaluate((input: HTMLInputElement) => input.value);
+  await slider.focus();
+  for (let times = 0; times < 20; times++) await page.keyboard.press("ArrowRight");
+  assert.notEqual(await slider.evaluate((input: HTMLInputElement) => input.value), before);
+});
+
+test("a clip is saved as binary glTF with a skin and an animation", async () => {
+  const saved = page.waitForEvent("download");
+  await page.getByRole("button", { name: "Download GLB" }).click();
+  const content = readFileSync(await (await saved).path());
+  assert.equal(content.toString("latin1", 0, 4), "glTF");
+  const document = JSON.parse(content.toString("utf8", 20, 20 + content.readUInt32LE(12)));
+  assert.equal(document.animations.length, 1);
+  assert.equal(document.skins[0].joints.length, 31);
+});
+
+test("a walker goes where keys send it, and a crowd walks", async (context) => {
+  await page.getByLabel("View").selectOption("walk");
+  await page.locator("#told", { hasText: "Arrow keys" }).waitFor();
+  await page.getByLabel("View").blur();
+  await page.keyboard.down("ArrowUp");
+  for (const name of ["walk-1", "walk-2", "walk-3", "walk-4"]) {
+    await page.waitForTimeout(350);
+    await pictures(name);
+  }
+  await page.keyboard.up("ArrowUp");
+  await page.waitForTimeout(1200);
+  const still = await pictures("walk-stopped");
+  assert.ok(still.length > 10_000);
+  await page.locator("input[type=range]").last().fill("40");
+  await page.waitForTimeout(1500);
+  await pictures("crowd");
+  context.diagnostic(`${requests.length} requests`);
+});
+
+test("nothing is loaded from elsewhere, and nothing goes wrong", () => {
+  const others = requests.filter(
+    (url) => !url.startsWith(address) && !/^(data|blob|about):/.test(url),
+  );
+  assert.deepEqual(others, []);
+  assert.deepEqual(faults, []);
+});
