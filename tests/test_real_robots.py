@@ -210,6 +210,10 @@ def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(model)
         ReferenceModel(model_registry.file_or_shipped(Path("cmu_walk")))
 
 
+# JAX warns of the process that tries a file, which is another program.
+@pytest.mark.filterwarnings(
+    "ignore:os.fork:RuntimeWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
 def test_torch_and_jax_agree_with_numpy_and_pass_gradients(model):
     """Need torch and JAX, which are not among the project's packages: five gigabytes."""
     torch, jax = pytest.importorskip("torch"), pytest.importorskip("jax")
