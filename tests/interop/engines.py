@@ -1,6 +1,6 @@
 """Comparison of the same model file in other inference engines with onnxruntime's results.
 
-OpenVINO and onnxruntime-web (on Node) run in their own processes.
+OpenVINO, tract and onnxruntime-web (on Node) run in their own processes.
 """
 
 import json
@@ -19,7 +19,7 @@ from posefield.inference.session import Session
 
 HERE = Path(__file__).parent
 VENV = environment.ROOT / ".venv-engines"
-PACKAGES = ("openvino==2026.4.1",)
+PACKAGES = ("openvino==2026.4.1", "tract==0.23.9")
 WEB = environment.ROOT / "build/web"
 WEB_PACKAGES = ("onnxruntime-web@1.23.0",)
 # Engines sum in another order, and sigma is the root of a difference: metres, seconds and parts of
@@ -42,7 +42,7 @@ def faults(node: Path, npm: Path) -> list[str]:
         asked = question["controls"], question["time"]
         expected = dict(zip(OUTPUTS, model.session.run(*asked, *OUTPUTS), strict=True))
         other = dict(zip(OUTPUTS, model.session.run(*asked, *OUTPUTS, level=1), strict=True))
-        found = {"openvino": _openvino(python, folder)}
+        found = {name: _python(python, folder, name) for name in ("openvino", "tract")}
         found["onnxruntime-web"] = _web(node, web, folder, question)
         return [*_compared(found, expected, other)]
 
@@ -77,10 +77,10 @@ def _question(session: Session) -> dict[str, np.ndarray]:
     return {"controls": points, "time": times.astype(np.float32)}
 
 
-def _openvino(python: Path, folder: Path) -> Tensors:
-    result = folder / "openvino.npz"
+def _python(python: Path, folder: Path, engine: str) -> Tensors:
+    result = folder / f"{engine}.npz"
     model, question = folder / "reaching.onnx", folder / "question.npz"
-    _call(python, HERE / "openvino_read.py", model, question, result)
+    _call(python, HERE / f"{engine}_read.py", model, question, result)
     return _loaded(result)
 
 

@@ -7,7 +7,7 @@ number of frames, and if a deliberately damaged or known unsupported file passes
 pass the Khronos validator without errors and warnings, and the contract must pass Redocly. Then it
 builds and queries the image, and checks a cache before the service, the model in other engines, the
 page in a browser, glTF files in Godot and the Blender add-on. `--others` runs what CI does not: the
-add-on in the older Blender.
+add-on in the older Blender, and the Rust example, whose build takes minutes.
 """
 
 import json
@@ -35,6 +35,7 @@ import godot
 import lint
 import numpy as np
 import page
+import rust
 import slow_clients
 from compare import Characters, Row, compare
 
@@ -78,7 +79,7 @@ def khronos(node: Path, folder: Path) -> list[Row]:
 def main() -> int:
     """Exit code: 1 if a row is not as it should be or a part has a fault."""
     if sys.argv[1:] == ["--others"]:
-        return _print_faults(addon=lambda: addon.faults(environment.OLDER))
+        return _print_faults(addon=lambda: addon.faults(environment.OLDER), rust=rust.faults)
     python, node = environment.prepare()
     # Two threads would train the same models twice.
     page.models()
