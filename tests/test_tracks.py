@@ -249,7 +249,10 @@ def test_people_that_overlap_are_told(walk):
     meet = [Route(np.array([[0.0, z], [0.0, -z]]), 1.0) for z in (-3.0, 3.0)]
     tracks = route_tracks.tracks_of_routes(walk.gait, meet, 5.0)
     facts = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks).facts
-    assert facts["overlaps"]["pairs"] == 1
+    seconds = [pytest.approx(2.7, abs=0.15)]
+    assert facts["overlaps"] == {"pairs": 1, "first": [0], "second": [1], "seconds": seconds}
+    (warning,) = [line for line in facts["warnings"] if "nearer" in line]
+    assert "nearer than 0.5 m: 1, the first at 2." in warning and warning.endswith("s (0 and 1)")
     apart = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks[:1]).facts
     assert apart["overlaps"]["pairs"] == 0
 

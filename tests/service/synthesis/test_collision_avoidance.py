@@ -1,13 +1,10 @@
 """Tests of crowds that keep their distances."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from posefield.inference import session
 from posefield.locomotion import collision_avoidance, gait, walking_crowd
-from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
@@ -64,26 +61,6 @@ def test_neighbours_begin_at_different_phases(own):
     gaps = np.abs(drawn.phases[:, None] - drawn.phases)[beside]
     assert np.minimum(gaps, 1.0 - gaps).min() >= 0.1 - 1e-9
     assert np.histogram(drawn.phases, 5, (0.0, 1.0))[0].min() >= 15
-
-
-def test_routes_are_kept_and_told_where_they_cross(model, own):
-    across = [
-        Route(np.array([[0.0, -3.0], [0.0, 3.0]]), 1.0),
-        Route(np.array([[-3.0, 0.0], [3.0, 0.0]]), 1.0),
-        Route(np.array([[9.0, -3.0], [9.0, 3.0]]), 1.0),
-    ]
-    order = CrowdOrder(count=3, routes=across, seconds=4.0)
-    made = walking_feet.build_crowd(model, own, order)
-    assert made.facts["overlaps"] == {
-        "pairs": 1,
-        "first": [0],
-        "second": [1],
-        "seconds": [pytest.approx(2.7, abs=0.11)],
-    }
-    (warning,) = made.facts["warnings"]
-    assert warning.endswith("nearer than 0.5 m: 1, the first at 2.7 s (0 and 1)")
-    alone = walking_feet.build_crowd(model, own, replace(order, count=2, routes=across[1:]))
-    assert alone.facts["overlaps"] == {"pairs": 0} and "warnings" not in alone.facts
 
 
 def test_overlaps_of_shared_motions_are_told(model, own):
