@@ -132,6 +132,24 @@ def crowd(
     skip_bad: Annotated[
         bool, typer.Option(help="leave out, and name, people whose trajectory is unusable")
     ] = False,
+    people_per_file: Annotated[
+        int | None,
+        typer.Option(
+            help="write trajectories of any length in parts of so many people, to a folder that is "
+            "named as the output without its ending; the same command resumes",
+            metavar="N",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="number of processes that make parts; default: 1")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="make parts on the workers of this Dask scheduler, which share the folder",
+            metavar="tcp://HOST:PORT",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Write a walking crowd to a file.
@@ -141,6 +159,18 @@ def crowd(
     from posefield.cli import crowd_files
     from posefield.locomotion import walking_crowd
 
+    if people_per_file is not None:
+        if trajectories is None or paths or count is not None:
+            raise InvalidField("people_per_file", "expected with trajectories alone")
+        reading = TrackReading(heading_unit, y_down)
+        job = crowd_files.parts_job(
+            model, trajectories, output, people_per_file, question, reading, skip_bad
+        )
+        manifest = crowd_files.write_parts(job, workers, scheduler)
+        typer.echo(as_json(manifest) if json else crowd_files.parts_text(manifest, job.folder))
+        return
+    if workers is not None or scheduler is not None:
+        raise InvalidField("workers", "given without people_per_file, expected only with it")
     given_paths = paths or trajectories
     if given_paths and count is not None:
         raise InvalidField("count", f"{count}, expected none: every path has one character")

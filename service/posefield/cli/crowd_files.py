@@ -2,6 +2,7 @@
 
 import codecs
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,11 @@ from typing import Any
 import numpy as np
 import orjson
 
-from posefield.common.errors import FileError
+from posefield.batch import process_pool, track_parts
+from posefield.batch.track_parts import PartsJob
+from posefield.common.errors import FileError, InvalidField
 from posefield.common.units import Floats
+from posefield.console.options import open_model
 from posefield.console.progress import ProgressBar
 from posefield.encode import crowd_formats
 from posefield.locomotion import gait, locomotion_plan, walking_crowd
@@ -23,6 +27,7 @@ from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_crowd
 from posefield.tracks.track import TrackSet
+from posefield.tracks.track_files import TrackReading
 
 
 def write_crowd(
@@ -65,6 +70,56 @@ def write_crowd(
         **_track_facts(crowd, tracks),
         **feet.facts(),
     }
+
+
+def parts_job(
+    model: Path,
+    tracks: Path,
+    output: Path,
+    people: int,
+    question: WalkQuestion,
+    reading: TrackReading,
+    skip_bad: bool,
+) -> PartsJob:
+    """Return the job of a crowd in parts, in a folder named as the output without its ending."""
+    ending = crowd_formats.ending_of(output, question)
+    folder = output.with_name(output.name.removesuffix(f".{ending}"))
+    identity = open_model(model).identity
+    return PartsJob(model, identity, tracks, folder, ending, people, question, reading, skip_bad)
+
+
+def write_parts(job: PartsJob, workers: int | None, scheduler: str | None) -> dict[str, Any]:
+    """Write the parts of a crowd by processes or on a Dask cluster; return their manifest.
+
+    Raises InvalidField for both or for no process, and as `track_parts.write` does.
+    """
+    if scheduler is not None and workers is not None:
+        raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
+    if workers is not None and workers < 1:
+        raise InvalidField("workers", f"{workers}, expected 1 or more")
+    resumes = "finished parts are kept, and the same command resumes"
+    local = nullcontext(process_pool.runner(workers or 1, resumes))
+    chosen = local if scheduler is None else process_pool.cluster_runner(scheduler)
+    with chosen as runner, ExitStack() as bars:
+        bar: list[ProgressBar] = []
+
+        def begin(count: int) -> None:
+            bar.append(bars.enter_context(ProgressBar("parts", count)))
+
+        return track_parts.write(job, runner, begin, lambda count: bar[0].advance(count))
+
+
+def parts_text(manifest: dict[str, Any], folder: Path) -> str:
+    """Return the report of a crowd in parts as text."""
+    records = manifest["parts"]
+    size = sum(record["bytes"] for record in records)
+    worst = max(record["path_error_cm"]["worst"] for record in records)
+    lines = [
+        f"{folder}: {manifest['people']} people in {len(records)} files, {size / 1e6:.1f} MB",
+        f"smoothed paths are {worst:.1f} cm away from their tracks at most",
+    ]
+    lines += [f"person {person!r} left out: {why}" for person, why in manifest["skipped"].items()]
+    return "\n".join(lines + [line for record in records for line in record["warnings"]])
 
 
 def _track_facts(crowd: CrowdClip, tracks: TrackSet | None) -> dict[str, Any]:

@@ -118,15 +118,23 @@ class TrackCrowd:
 
 
 def find_people(
-    model: Synthesizer, gait: Gait, order: CrowdOrder, tracks: Sequence[Track]
+    model: Synthesizer,
+    gait: Gait,
+    order: CrowdOrder,
+    tracks: Sequence[Track],
+    begin: float | None = None,
 ) -> TrackCrowd:
-    """Return the people of tracks. order: frame rate, labels, takes, feet and seed.
+    """Return the people of tracks.
+
+    order: frame rate, labels, takes, feet and seed. begin: time of the first frame, s; that of the
+    first sample by default.
 
     Raises InvalidField for tracks that are too long or all too short.
     """
     walking_crowd.frame_count(1, 1.0, order.fps, order.seed)
     gait = gait.with_labels(order.labels)
-    begin = min(float(track.times[0]) for track in tracks)
+    if begin is None:
+        begin = min(float(track.times[0]) for track in tracks)
     people, skipped = [], {}
     poses = sum((track.times[-1] - track.times[0]) * order.fps + 1.0 for track in tracks)
     if poses > MAX_POSES:
@@ -153,13 +161,17 @@ def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
 
 
 def build_crowd(
-    model: Synthesizer, gait: Gait, order: CrowdOrder, tracks: Sequence[Track]
+    model: Synthesizer,
+    gait: Gait,
+    order: CrowdOrder,
+    tracks: Sequence[Track],
+    begin: float | None = None,
 ) -> CrowdClip:
     """Return the crowd of people on tracks, on one clock; they are hidden outside of their tracks.
 
-    Raises InvalidField as `find_people` does.
+    begin: as of `find_people`. Raises InvalidField as `find_people` does.
     """
-    crowd = find_people(model, gait, order, tracks)
+    crowd = find_people(model, gait, order, tracks, begin)
     card = crowd.gait.session.card
     people, counts = crowd.people, [len(person.path) for person in crowd.people]
     first = np.array([person.path.first for person in people])

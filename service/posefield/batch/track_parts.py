@@ -1,0 +1,223 @@
+"""Crowds of tracks longer than memory: a file for each group of people, in a folder.
+
+A file of tracks is read once, block by block, and its rows are sorted into a spool file for each
+part. A part is then made from its own rows alone, on the clock of all, by any process. So memory
+does not grow with the number of people, and a part has the same bytes whichever process makes it.
+
+Beside each part is a record of what it was made from. A run makes the parts whose record differs or
+is missing, so the same command resumes after a kill.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import orjson
+from msgspec import structs
+
+from posefield import __version__
+from posefield.batch.job import VERSIONED_PACKAGES
+from posefield.batch.process_pool import Runner, run_here
+from posefield.common import atomic_files
+from posefield.common.errors import FileError, InvalidField
+from posefield.encode import crowd_formats
+from posefield.inference import session
+from posefield.locomotion import walking_crowd
+from posefield.model_file import checked_file
+from posefield.question.walk_question import WalkQuestion
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.tracks import track, track_crowd, track_files
+from posefield.tracks.track import MAX_PEOPLE, TrackRows
+from posefield.tracks.track_files import TrackReading
+
+MANIFEST = "manifest.json"
+ROW = np.dtype(
+    [("person", "<i4"), ("line", "<i8"), ("time", "<f8"), ("point", "<c16"), ("heading", "<f8")]
+)
+"""Row of a spool file; a heading is infinite where there is none."""
+
+
+@dataclass(frozen=True)
+class PartsJob:
+    """Crowd of a file of tracks in parts.
+
+    model, tracks: files. identity: of the model (name@contenthash). people: of each part. folder,
+    ending: of the parts. question, reading: as of a crowd in one file. skip_bad: whether unusable
+    tracks are left out and told.
+    """
+
+    model: Path
+    identity: str
+    tracks: Path
+    folder: Path
+    ending: str
+    people: int
+    question: WalkQuestion
+    reading: TrackReading
+    skip_bad: bool = False
+
+    def __post_init__(self) -> None:
+        if self.people < 1:
+            raise InvalidField("people_per_file", f"{self.people}, expected 1 person or more")
+
+
+@dataclass(frozen=True)
+class TrackShard:
+    """Rows of the people of one part.
+
+    index: of the part. spool: file of its rows. begin: time of the first frame of all parts, s.
+    names: ids of its people, in their order.
+    """
+
+    index: int
+    spool: Path
+    begin: float
+    names: tuple[str, ...]
+
+
+@dataclass
+class _Spools:
+    """Spool files of the parts. numbers: of the people, by id. begin: first time of all, s."""
+
+    job: PartsJob
+    folder: Path
+    numbers: dict[str, int] = field(default_factory=dict)
+    begin: float = np.inf
+
+    def add(self, block: TrackRows) -> None:
+        """Sort the rows of a block into the files of their parts."""
+        for person in dict.fromkeys(block.people):
+            self.numbers.setdefault(person, len(self.numbers))
+        if len(self.numbers) > MAX_PEOPLE:
+            raise FileError(self.job.tracks, f"more than {MAX_PEOPLE} people, expected fewer")
+        rows = np.empty(len(block.people), ROW)
+        rows["person"] = [self.numbers[person] for person in block.people]
+        rows["line"], rows["time"], rows["point"] = block.lines, block.times, block.points
+        rows["heading"] = np.inf if block.headings is None else block.headings
+        finite = block.times[np.isfinite(block.times)]
+        self.begin = min(self.begin, float(finite.min())) if len(finite) else self.begin
+        indices = rows["person"] // self.job.people
+        for index in np.unique(indices).tolist():
+            with self.file(index).open("ab") as file:
+                file.write(rows[indices == index].tobytes())
+
+    def file(self, index: int) -> Path:
+        """Return the spool file of a part."""
+        return self.folder / f"{index:05}.rows"
+
+    def shards(self) -> Iterator[TrackShard]:
+        """Yield the rows of the parts."""
+        names, size = list(self.numbers), self.job.people
+        for index, first in enumerate(range(0, len(names), size)):
+            yield TrackShard(
+                index, self.file(index), self.begin, tuple(names[first : first + size])
+            )
+
+
+def write(
+    job: PartsJob,
+    runner: Runner = run_here,
+    begin: Callable[[int], None] = lambda count: None,
+    advance: Callable[[int], None] = lambda count: None,
+) -> dict[str, Any]:
+    """Write the parts of a crowd and a manifest, and return it as plain values.
+
+    begin, advance: called with the number of parts, and of parts that are finished. Raises
+    FileError and InvalidField as `track.group` and `crowd_formats.write` do; WorkerDied.
+    """
+    walking_crowd.from_question(job.question)
+    job.folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=job.folder, prefix=".spool.") as name:
+        spools = _Spools(job, Path(name))
+        for block in track_files.row_blocks(job.tracks, job.reading):
+            spools.add(block)
+        if not spools.numbers:
+            raise FileError(job.tracks, "no person in it, expected one or more")
+        shards = list(spools.shards())
+        begin(len(shards))
+        records = []
+        tasks = ((job, shard) for shard in shards)
+        for record in runner(write_part, tasks, lambda: False):
+            records.append(record)
+            advance(1)
+    records.sort(key=lambda record: record["part"])
+    manifest = {
+        "people": len(spools.numbers),
+        "begin": spools.begin,
+        "fps": job.question.fps,
+        "skipped": {person: why for record in records for person, why in record["skipped"].items()},
+        "parts": records,
+    }
+    content = orjson.dumps(manifest, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    atomic_files.write(content, job.folder / MANIFEST)
+    return manifest
+
+
+def write_part(task: tuple[PartsJob, TrackShard]) -> dict[str, Any]:
+    """Write one part unless it is there, and return its record."""
+    job, shard = task
+    path = job.folder / f"{shard.index:05}.{job.ending}"
+    record_path = job.folder / f"{shard.index:05}.json"
+    rows = np.fromfile(shard.spool, ROW)
+    digest = _digest(job, shard, rows)
+    if path.is_file() and record_path.is_file():
+        record: dict[str, Any] = orjson.loads(record_path.read_bytes())
+        if record["made_from"] == digest and record["bytes"] == path.stat().st_size:
+            return record
+    rows["person"] -= shard.index * job.people
+    rows = rows[np.argsort(rows["person"], kind="stable")]
+    names = np.array(shard.names, dtype=object)[rows["person"]].tolist()
+    headings = None if np.isinf(rows["heading"]).any() else rows["heading"]
+    block = TrackRows(names, rows["time"], rows["point"], headings, rows["line"])
+    tracks = track.group([block], job.tracks, job.skip_bad)
+    model = _open(job.model, job.identity)
+    question = structs.replace(job.question, count=len(tracks.tracks))
+    order = walking_crowd.from_question(question)
+    crowd = track_crowd.build_crowd(model, model.gait, order, tracks.tracks, shard.begin)
+    crowd_formats.write(crowd, path, question, model.session.card.roles)
+    record = {
+        "part": shard.index,
+        "file": path.name,
+        "bytes": path.stat().st_size,
+        "people": crowd.facts["people"],
+        "frames": crowd.frames,
+        "path_error_cm": crowd.facts["path_error_cm"],
+        "warnings": crowd.facts["warnings"],
+        "skipped": {**tracks.skipped, **crowd.facts["skipped"]},
+        "made_from": digest,
+    }
+    atomic_files.write(orjson.dumps(record), record_path)
+    return record
+
+
+@lru_cache(maxsize=1)
+def _open(path: Path, identity: str) -> Synthesizer:
+    """Return a model, which a process opens once; FileError if its file has changed."""
+    content = checked_file.read(path)
+    name, _, digest = identity.partition("@")
+    if checked_file.digest(content) != digest:
+        raise FileError(path, "changed while parts were written, expected the same model")
+    return Synthesizer(name, session.open_bytes(content, identity))
+
+
+def _digest(job: PartsJob, shard: TrackShard, rows: npt.NDArray[Any]) -> str:
+    """Return the digest of all that determines the bytes of a part."""
+    facts = {
+        "model": job.identity,
+        "ending": job.ending,
+        "question": structs.asdict(job.question),
+        "skip_bad": job.skip_bad,
+        "begin": shard.begin,
+        "names": shard.names,
+        "versions": [__version__, *map(version, VERSIONED_PACKAGES)],
+    }
+    hashed = hashlib.sha256(orjson.dumps(facts, option=orjson.OPT_SORT_KEYS))
+    hashed.update(rows.tobytes())
+    return hashed.hexdigest()

@@ -1,0 +1,103 @@
+"""Crowds in parts: the same people and bytes whatever makes them, and whenever it was stopped."""
+
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+COUNT, SIZE = 7, 3
+NAMES = ["00000.bones.npz", "00001.bones.npz", "00002.bones.npz"]
+
+
+def table(path, seconds=3.0, jump=()):
+    """Write people who start one after the other, and walk along arcs."""
+    rows = ["time,id,x,y"]
+    for step in np.arange(0.0, seconds + 0.5 * COUNT, 0.5):
+        for person in range(COUNT):
+            moment = step - 0.5 * person
+            if 0.0 <= moment <= seconds:
+                x = 30.0 * (person in jump and moment > 1.0) + 1.2 * moment
+                rows.append(f"{step:g},p{person},{x:g},{2.0 * person + 0.1 * moment**2:g}")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def command(tracks, output, *words):
+    options = ["--trajectories", str(tracks), "--people-per-file", str(SIZE), "--take", "index"]
+    words = ["crowd", "cmu_walk", *options, "-o", str(output), "--json", *words]
+    return [sys.executable, "-m", "posefield", *words]
+
+
+def run(*words):
+    done = subprocess.run(command(*words), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def contents(folder):
+    return {file.name: file.read_bytes() for file in sorted(folder.iterdir()) if file.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a run that nobody stopped, and its report."""
+    folder = tmp_path_factory.mktemp("whole")
+    report = run(table(folder / "tracks.csv"), folder / "people.bones.npz")
+    return folder / "people", report
+
+
+@pytest.mark.system
+def test_parts_hold_the_people_of_one_crowd_on_one_clock(whole, tmp_path):
+    folder, report = whole
+    assert [part["file"] for part in report["parts"]] == NAMES
+    assert [name for part in report["parts"] for name in part["people"]] == [
+        f"p{person}" for person in range(COUNT)
+    ]
+    tracks = table(tmp_path / "tracks.csv")
+    words = command(tracks, tmp_path / "all.bones.npz")
+    del words[words.index("--people-per-file") : words.index("--people-per-file") + 2]
+    subprocess.run(words, check=True, capture_output=True)
+    with np.load(tmp_path / "all.bones.npz") as one:
+        parts = [dict(np.load(folder / name)) for name in NAMES]
+        for name in ("time", "positions", "velocities"):
+            joined = np.concatenate([part[name] for part in parts])
+            # People who are made together are made in longer arrays, which round differently.
+            np.testing.assert_allclose(joined, one[name], atol=1e-3)
+
+
+@pytest.mark.system
+def test_a_run_that_was_killed_resumes_with_the_same_bytes(whole, tmp_path):
+    folder, _ = whole
+    tracks, output = table(tmp_path / "tracks.csv"), tmp_path / "people.bones.npz"
+    with subprocess.Popen(command(tracks, output), stdout=subprocess.PIPE) as running:
+        limit = time.monotonic() + 60.0
+        while not (tmp_path / "people" / "00000.json").exists() and time.monotonic() < limit:
+            time.sleep(0.02)
+        running.kill()
+    begun = contents(tmp_path / "people")
+    assert "manifest.json" not in begun
+    made = (tmp_path / "people" / NAMES[0]).stat().st_mtime_ns
+    run(tracks, output, "--workers", "2")
+    assert contents(tmp_path / "people") == contents(folder)
+    assert (tmp_path / "people" / NAMES[0]).stat().st_mtime_ns == made
+    # A damaged part is made again.
+    (tmp_path / "people" / NAMES[1]).write_bytes(b"")
+    run(tracks, output)
+    assert contents(tmp_path / "people") == contents(folder)
+    manifest = json.loads((folder / "manifest.json").read_bytes())
+    assert len({part["made_from"] for part in manifest["parts"]}) == len(NAMES)
+
+
+@pytest.mark.system
+def test_unusable_people_are_refused_or_named(tmp_path):
+    tracks = table(tmp_path / "tracks.csv", jump=(4,))
+    failed = subprocess.run(
+        command(tracks, tmp_path / "a.osi"), capture_output=True, text=True, check=False
+    )
+    assert failed.returncode == 3
+    assert "person 'p4': jumps" in failed.stderr
+    report = run(tracks, tmp_path / "a.osi", "--skip-bad")
+    assert list(report["skipped"]) == ["p4"]
