@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pxr import Usd, UsdGeom
 
 import posefield
 from posefield.common.errors import FileError, InvalidField
+from posefield.encode import crowd_writer
 from posefield.locomotion import floor_plane
 from posefield.locomotion.locomotion_plan import Route
 from posefield.locomotion.walking_crowd import CrowdOrder
@@ -289,3 +291,20 @@ def test_slow_and_fast_samples_are_followed(walk, rate):
     crowd = track_crowd.find_people(walk, walk.gait, CrowdOrder(1), (person,))
     assert crowd.frames == 181
     assert crowd.people[0].path.errors.max() < 1e-6
+
+
+def test_people_are_hidden_outside_of_their_tracks(walk, tmp_path):
+    late = of_arrays("late", np.array([1.0, 2.0]), np.array([[5.0, 0.0], [6.0, 0.0]]))
+    whole = of_arrays("whole", np.array([0.0, 3.0]), np.array([[0.0, 0.0], [3.0, 0.0]]))
+    crowd = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), (whole, late))
+    crowd_writer.write(crowd, tmp_path / "street.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "street.usda"))
+    seen = [
+        [
+            frame
+            for frame in range(crowd.frames)
+            if UsdGeom.Imageable(prim).ComputeVisibility(frame) == "inherited"
+        ]
+        for prim in stage.GetPrimAtPath("/Crowd/Characters").GetChildren()
+    ]
+    assert seen == [[*range(91)], [*range(30, 61)]]
