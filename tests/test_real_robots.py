@@ -1,6 +1,8 @@
 """Tests of the doctor on reference motions of other programs."""
 
 import json
+import subprocess
+import sys
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -210,36 +212,70 @@ def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(model)
         ReferenceModel(model_registry.file_or_shipped(Path("cmu_walk")))
 
 
-# JAX warns of the process that tries a file, which is another program.
-@pytest.mark.filterwarnings(
-    "ignore:os.fork:RuntimeWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
-)
-def test_torch_and_jax_agree_with_numpy_and_pass_gradients(model):
-    """Need torch and JAX, which are not among the project's packages: five gigabytes."""
-    torch, jax = pytest.importorskip("torch"), pytest.importorskip("jax")
-    from posefield.reference import jax as in_jax
+def single_precision_inputs(model):
+    """Return commands and phases that single precision holds exactly."""
+    commands = mixed_commands(posefield.load(model).synthesizer.session.card, 5)
+    phase = np.linspace(-0.3, 1.9, len(commands))
+    return commands.astype("f4").astype(float), phase.astype("f4").astype(float)
+
+
+def assert_agree(answer, expected):
+    for name, values, right in zip(expected._fields, answer, expected, strict=True):
+        speed = name.endswith(("velocities", "rates"))
+        np.testing.assert_allclose(values, right, atol=2e-4 if speed else 1e-5, err_msg=name)
+
+
+# JAX warns of each process that is forked beside it, so it has a process of its own.
+IN_JAX = """
+import sys
+import numpy as np
+import jax
+from posefield.reference.jax import ReferenceMotion
+
+motion, inputs = ReferenceMotion(sys.argv[1]), np.load(sys.argv[2])
+commands, phase = inputs["commands"].astype("f4"), inputs["phase"].astype("f4")
+plan = motion.plan(commands)
+answer = motion.sample(plan, phase)
+slopes = jax.jacfwd(lambda at: motion.sample(plan, at).joint_positions.sum(0))(phase)
+np.savez(sys.argv[3], slopes=slopes, **answer._asdict())
+"""
+
+
+def test_jax_agrees_with_numpy_and_passes_gradients(model, tmp_path):
+    evaluator, (commands, phase) = numpy_evaluator(model), single_precision_inputs(model)
+    plan = evaluator.plan(commands)
+    expected = evaluator.sample(plan, phase)
+    np.savez(tmp_path / "inputs.npz", commands=commands, phase=phase)
+    words = [sys.executable, "-W", "ignore", "-c", IN_JAX, model]
+    files = [tmp_path / "inputs.npz", tmp_path / "answers.npz"]
+    subprocess.run([*words, *files], check=True)
+    answers = np.load(files[1])
+    assert_agree([answers[name] for name in expected._fields], expected)
+    # Angles are linear in the phase between frames.
+    step = 1e-6
+    ahead, back = (evaluator.sample(plan, phase + way).joint_positions for way in (step, -step))
+    slopes = np.transpose(ahead - back) / (2.0 * step)
+    np.testing.assert_allclose(answers["slopes"], slopes, rtol=1e-3, atol=1e-3)
+    assert np.abs(slopes).max() > 1.0
+    with pytest.raises(AssertionError):
+        assert_agree(evaluator.sample(plan, phase + 1e-3), expected)
+
+
+def test_torch_agrees_with_numpy_and_passes_gradients(model):
+    """Needs torch, which is larger than all packages of the project together."""
+    torch = pytest.importorskip("torch")
     from posefield.reference import torch as in_torch
 
-    evaluator = numpy_evaluator(model)
-    commands = mixed_commands(posefield.load(model).synthesizer.session.card, 5)
-    commands = commands.astype(np.float32).astype(float)
-    phase = np.linspace(-0.3, 1.9, len(commands))
-    expected = evaluator.sample(evaluator.plan(commands), phase)
+    evaluator, (commands, phase) = numpy_evaluator(model), single_precision_inputs(model)
     torch_motion = in_torch.ReferenceMotion(model)
     moving = torch.tensor(commands, dtype=torch.float32)
-    answers = [
-        torch_motion.sample(moving, torch.tensor(phase)),
-        in_jax.ReferenceMotion(model).sample(commands.astype("f4"), phase.astype("f4")),
-    ]
+    answer = torch_motion.sample(moving, torch.tensor(phase))
+    assert_agree(answer, evaluator.sample(evaluator.plan(commands), phase))
     # Commands that change are planned again, and only they.
     changed = moving.flip(0)
     changed[0] = moving[0]
     again = torch_motion.sample(changed, torch.tensor(phase))
-    fresh = evaluator.sample(evaluator.plan(changed.double().numpy()), phase)
-    for answer, truth in [*((answer, expected) for answer in answers), (again, fresh)]:
-        for name, values, right in zip(truth._fields, answer, truth, strict=True):
-            speed = name.endswith(("velocities", "rates"))
-            np.testing.assert_allclose(values, right, atol=2e-4 if speed else 1e-5, err_msg=name)
+    assert_agree(again, evaluator.sample(evaluator.plan(changed.double().numpy()), phase))
     double = in_torch.ReferenceMotion(model, dtype=torch.float64)
     inputs = [torch.tensor(values[:3], requires_grad=True) for values in (commands, phase)]
 
@@ -248,7 +284,6 @@ def test_torch_and_jax_agree_with_numpy_and_pass_gradients(model):
         return torch.cat([answer.joint_positions, answer.base_rotations, answer.sigmas], -1)
 
     assert torch.autograd.gradcheck(outputs, inputs, atol=1e-4)
-    assert jax.devices()
 
 
 def test_gaits_left_out_are_predicted_better_than_a_lookup_does(biped):
