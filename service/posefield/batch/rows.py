@@ -302,7 +302,7 @@ def _grid_steps(text: str) -> list[str]:
     try:
         start, stop, steps = map(text_decoding.parse_number, text.split(":"))
     except ValueError as fault:
-        raise ValueError(f"{text!r}, expected START:STOP:COUNT") from fault
+        raise ValueError(f"{text!r}, expected START:STOP:COUNT, numbers as 0.5") from fault
     if not steps.is_integer() or not 2 <= steps <= MAX_STEPS:
         raise ValueError(f"{text!r}, expected START:STOP:COUNT with a COUNT of 2 to {MAX_STEPS}")
     return [repr(value) for value in np.linspace(start, stop, int(steps)).tolist()]
