@@ -7,6 +7,7 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import document_pages
 import numpy as np
 import pytest
 
@@ -284,6 +285,11 @@ def test_torch_agrees_with_numpy_and_passes_gradients(model):
         return torch.cat([answer.joint_positions, answer.base_rotations, answer.sigmas], -1)
 
     assert torch.autograd.gradcheck(outputs, inputs, atol=1e-4)
+    guide = (document_pages.DOCS / "guide/robots.md").read_text()
+    (loop,) = (block.text for block in document_pages.blocks(guide) if block.language == "py")
+    names = {"joints": torch.zeros(4096, len(double.hinges))}
+    exec(loop.replace("model.onnx", str(model)).replace("range(1000)", "range(2)"), names)
+    assert names["reward"].shape == (4096,)
 
 
 def test_gaits_left_out_are_predicted_better_than_a_lookup_does(biped):

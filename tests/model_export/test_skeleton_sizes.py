@@ -54,7 +54,8 @@ def test_a_skeleton_of_any_size_trains_and_is_written(tmp_path, joints):
     wanted = trained.examples[3].clip.positions()
     assert np.abs(answer.clip.positions()[-1] - wanted[-1]).max() < 0.05
     for encoder in CLIP_ENCODERS.values():
-        assert len(encoder.encode(answer)) > 500
+        if not encoder.is_humanoid:
+            assert len(encoder.encode(answer)) > 500
 
 
 def test_a_family_of_one_control_and_no_performers_has_a_report(tmp_path):
