@@ -25,7 +25,7 @@ def test_routes_and_operations_are_the_same_set(spec, app):
     }
     assert len({path.partition(".{")[0] for path in spec["paths"]}) > 10
     # HEAD is answered wherever GET is, and the contract says so in its introduction.
-    paths = app.service.routes.paths
+    paths = app.routes.paths
     served = {(m, path.template) for path in paths for m in path.routes if m != "HEAD"}
     assert served == agreed
 

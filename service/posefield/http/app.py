@@ -16,8 +16,8 @@ from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.operations import FORMATS, OPERATIONS
 from posefield.http.readiness import Readiness
 from posefield.http.request import HeadLimits, Service
-from posefield.http.request_cycle import App
-from posefield.http.routing import Handler, Route, RouteTree
+from posefield.http.request_cycle import App, RouteTree
+from posefield.http.routing import Handler, Route
 from posefield.http.telemetry import LogBuffer
 from posefield.registry.model_registry import FixedRegistry, ModelRegistry
 
@@ -67,12 +67,12 @@ def build_app(
     origins = responses.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
     characters = _characters(settings)
     hosts = request.host_names(settings.hosts, f"{PREFIX}HOSTS")
+    routes = RouteTree(
+        route
+        for operation in agreed.operations
+        for route in _routes(operation, handlers[operation.id])
+    )
     service = Service(
-        RouteTree(
-            route
-            for operation in agreed.operations
-            for route in _routes(operation, handlers[operation.id])
-        ),
         HeadLimits(settings.url_limit, settings.head_limit, hosts),
         Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models,
         settings,
@@ -83,7 +83,7 @@ def build_app(
         log,
         characters,
     )
-    return App(service, lifespan)
+    return App(service, routes, lifespan)
 
 
 def _characters(settings: Settings) -> CharacterFolder:

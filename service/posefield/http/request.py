@@ -39,7 +39,7 @@ from posefield.http.api.problems import (
 from posefield.http.api.settings import Settings
 from posefield.http.batching import ClipBatcher, PoseBatcher
 from posefield.http.readiness import Readiness
-from posefield.http.routing import Route, RouteTree
+from posefield.http.routing import Route
 from posefield.http.static_page import StaticPage
 from posefield.http.telemetry import LogBuffer
 from posefield.question import json_decoding, text_decoding
@@ -270,7 +270,6 @@ class Service:
     None for none. code: digest for entity tags. open: number of open requests.
     """
 
-    routes: RouteTree
     head_limits: HeadLimits
     readiness: Readiness
     settings: Settings

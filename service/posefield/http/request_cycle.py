@@ -9,8 +9,9 @@ not read, and revalidation before it, so that a 304 costs no work.
 import logging
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass, field
 from typing import Any
 
 from starlette.requests import ClientDisconnect
@@ -25,7 +26,7 @@ from posefield.http.access.api_keys import EVERYONE
 from posefield.http.api import problems
 from posefield.http.api.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestError
 from posefield.http.request import Service, ServiceRequest
-from posefield.http.routing import PathRoutes, Route, RouteTree
+from posefield.http.routing import PathRoutes, Route
 
 faults = logging.getLogger(__name__)
 
@@ -37,14 +38,18 @@ class App:
     """ASGI application. lifespan: context of the server's background tasks."""
 
     def __init__(
-        self, service: Service, lifespan: Callable[[Service], AbstractAsyncContextManager[None]]
+        self,
+        service: Service,
+        routes: "RouteTree",
+        lifespan: Callable[[Service], AbstractAsyncContextManager[None]],
     ) -> None:
         self.service = service
+        self.routes = routes
         self._lifespan = lifespan
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "http":
-            await handle(ServiceRequest(self.service, scope, receive, send))
+            await handle(self.routes, ServiceRequest(self.service, scope, receive, send))
         elif scope["type"] == "lifespan":
             await receive()
             async with self._lifespan(self.service):
@@ -53,12 +58,12 @@ class App:
             await send({"type": "lifespan.shutdown.complete"})
 
 
-async def handle(request: ServiceRequest) -> None:
+async def handle(routes: "RouteTree", request: ServiceRequest) -> None:
     """Send the response to a request, or that of its error, and record it."""
     service = request.service
     service.open += 1
     try:
-        await send_response(request, await respond(request))
+        await send_response(request, await respond(routes, request))
     except ClientDisconnect:
         faults.info("request %s: the client went away", request.identity)
     except Exception:
@@ -75,12 +80,12 @@ async def handle(request: ServiceRequest) -> None:
         record(request)
 
 
-async def respond(request: ServiceRequest) -> Response:
+async def respond(routes: "RouteTree", request: ServiceRequest) -> Response:
     """Return the response of an operation, or that of an error."""
     service, scope = request.service, request.scope
     try:
         service.head_limits.check(scope)
-        path = find_path(service.routes, scope)
+        path = find_path(routes, scope)
         request.route = route = path.routes.get(scope["method"])
         if route is None:
             return other_method(request, path)
@@ -99,7 +104,7 @@ async def respond(request: ServiceRequest) -> Response:
         return problems.query_error_response(request, error)
 
 
-def find_path(routes: RouteTree, scope: Scope) -> PathRoutes:
+def find_path(routes: "RouteTree", scope: Scope) -> PathRoutes:
     """Return the operations of a path, by method, and set the path's parameters.
 
     Raises UnknownFormat, and RequestError 404 for a path that is not in the contract.
@@ -258,3 +263,76 @@ def _log_line(request: ServiceRequest, operation: str, duration: float) -> dict[
         "bytes": request.size,
         "milliseconds": round(duration * 1e3, 3),
     }
+
+
+@dataclass
+class _TreeNode:
+    """Node of the tree.
+
+    fixed: children by segment. parameter: child of a path parameter, and `name` the parameter's
+    name. routes: of the path that ends here.
+    """
+
+    fixed: dict[str, "_TreeNode"] = field(default_factory=dict)
+    parameter: "_TreeNode | None" = None
+    name: str = ""
+    routes: PathRoutes | None = None
+
+
+class RouteTree:
+    """Routing table: a tree of path segments, with one look-up per segment.
+
+    A path that ends in `{format}` has one entry per format, so that its look-up is as fast. paths:
+    routes of each path.
+    """
+
+    def __init__(self, routes: Iterable[Route]) -> None:
+        self._root = _TreeNode()
+        by_path: dict[str, dict[str, Route]] = {}
+        self._formats: dict[str, dict[str, None]] = {}
+        for route in routes:
+            by_path.setdefault(route.path, {})[route.operation.method] = route
+            if route.format:
+                stem = route.path.removesuffix(f".{route.format}")
+                self._formats.setdefault(stem, {})[route.format] = None
+        self.paths = [_path_routes(*item) for item in by_path.items()]
+        for path in self.paths:
+            node = self._root
+            for segment in path.template.split("/"):
+                node = _child_node(node, segment)
+            node.routes = path
+
+    def find(self, path: str) -> tuple[PathRoutes, dict[str, str]] | None:
+        """Return the routes of a path and its non-empty path parameters; None if unknown."""
+        node, values = self._root, {}
+        for segment in path.split("/"):
+            child = node.fixed.get(segment)
+            if child is None and segment and node.parameter is not None:
+                values[node.name] = segment
+                child = node.parameter
+            if child is None:
+                return None
+            node = child
+        return (node.routes, values) if node.routes else None
+
+    def other_formats(self, path: str) -> tuple[str, Iterable[str]] | None:
+        """Return the unknown format that a path ends in and the known formats of that path."""
+        unknown = path.rpartition("/")[2].partition(".")[2]
+        stem = self.find(path.removesuffix(f".{unknown}"))
+        formats = self._formats.get(stem[0].template) if stem else None
+        return (unknown, formats) if unknown and formats else None
+
+
+def _child_node(node: _TreeNode, segment: str) -> _TreeNode:
+    if not segment.startswith("{"):
+        return node.fixed.setdefault(segment, _TreeNode())
+    if node.parameter is None:
+        node.parameter, node.name = _TreeNode(), segment.strip("{}")
+    if node.name != segment.strip("{}"):
+        raise ValueError(f"{segment} and {{{node.name}}} at one place of the contract's paths")
+    return node.parameter
+
+
+def _path_routes(path: str, routes: dict[str, Route]) -> PathRoutes:
+    methods = {**routes, "HEAD": routes["GET"]} if "GET" in routes else routes
+    return PathRoutes(path, methods, ", ".join(sorted({*methods, "OPTIONS"})))
