@@ -32,11 +32,11 @@ REQUESTS = {
     "performance": ("POST", "/v1/performances.usdc", b"", json.dumps(SCRIPT).encode()),
 }
 CEILINGS = {
-    "plain clip": (27, 156, 13),
-    "standing feet": (45, 320, 31),
+    "plain clip": (27, 156, 11),
+    "standing feet": (45, 320, 18),
     "pose": (19, 58, 5),
-    "crowd": (42, 355, 37),
-    "performance": (54, 419, 49),
+    "crowd": (42, 355, 26),
+    "performance": (54, 419, 37),
 }
 """Most modules, functions and classes of each request."""
 TIMED = {"DeadlineTimer._check", "set_open_requests"}

@@ -7,7 +7,7 @@ the same bytes in every batch.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -68,8 +68,7 @@ class FrameGroups:
         return smallest
 
 
-@dataclass(frozen=True)
-class FrameRows:
+class FrameRows(NamedTuple):
     """Grids of R rows. rates: (R,), frames a second. cyclic: whether each row repeats (R,)."""
 
     groups: FrameGroups

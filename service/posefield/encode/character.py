@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -200,8 +200,7 @@ def _mesh(skeleton: Skeleton, kind: BodyKind) -> SkinnedMesh | None:
     return (mannequin(skeleton) if kind == "mannequin" else None) or bones_body(skeleton)
 
 
-@dataclass(frozen=True)
-class RestPose:
+class RestPose(NamedTuple):
     """M characters of one rig in the rest pose.
 
     offsets: from the parents (M, J, 3), m. points: of their body meshes (M, P, 3), m, without

@@ -40,8 +40,7 @@ class LayerPattern(NamedTuple):
     facts: bool
 
 
-@dataclass(frozen=True)
-class LayerContent:
+class LayerContent(NamedTuple):
     """Content of a layer: samples of attributes, values by name, and facts.
 
     No number is -0: it counts as equal to 0, and equal samples are stored once.
@@ -175,7 +174,7 @@ def _is_verified(candidate: CrateTemplate, builder: LayerBuilder, pattern: Layer
     return all(
         layers.crate_text(candidate.write(builder.rate, content))
         == builder.layer(content).ExportToString()
-        for content in (single_frame, replace(single_frame, samples=random_rows))
+        for content in (single_frame, single_frame._replace(samples=random_rows))
     )
 
 

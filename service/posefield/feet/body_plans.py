@@ -7,8 +7,7 @@ element.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -40,8 +39,7 @@ FootPaths = Annotated[Floats, "foot_frames 3"]
 """Points of all feet (K N, 3), foot after foot."""
 
 
-@dataclass(frozen=True)
-class _Bodies:
+class _Bodies(NamedTuple):
     """Motions (M,) of characters with the same limbs, whose frames (N,) lie one after another.
 
     poses: of the limbs. rows: grids of the motions. planes, tilts: of the floors of the frames, as
@@ -103,8 +101,7 @@ def _plan_alike(requests: Sequence[PlanRequest]) -> list[FeetPlan]:
         fixed = np.array([request.character.fixed for request in requests])
         grounded = np.where(fixed, 0.0, lowered)
     lowered = np.tile(grounded, len(legs))
-    feet = replace(
-        feet,
+    feet = feet._replace(
         heights=feet.heights - lowered[feet.rows.groups.group],
         height=feet.height + np.clip(above - lowered, -SUNK, UNEVEN),
         flat_pitch=ball_path.flat_pitches(feet.arms, down, feet.rows),

@@ -4,8 +4,7 @@ Motions with the same limbs are placed at once; each has the same bytes as if it
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -176,8 +175,7 @@ height of the end of the toes above that joint (N,), m, None without toes.
 """
 
 
-@dataclass(frozen=True)
-class _Placing:
+class _Placing(NamedTuple):
     """Poses of motions with the same limbs, and where their plans are evaluated.
 
     poses: of the limbs, at N frames of the groups. at_frames: fractional frames (N,) of the grids

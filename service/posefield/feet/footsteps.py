@@ -8,7 +8,7 @@ frames.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Annotated, TypeVar
+from typing import Annotated, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -78,8 +78,7 @@ def tilted(planes: Annotated[Floats, "frames 3"], tilts: Turns, vectors: Points)
     return np.where(np.asarray(sloped)[:, None], quat.rotate(tilts, vectors), vectors)
 
 
-@dataclass(frozen=True)
-class Led:
+class Led(NamedTuple):
     """Frames in which parts of a character stay as the motion has them.
 
     feet: whether each foot of the legs is exactly on its predicted path (K, F). limbs: share (N, F)
@@ -178,8 +177,7 @@ class Character:
     hinges: tuple[Hinge, ...] = ()
 
 
-@dataclass(frozen=True)
-class Footsteps:
+class Footsteps(NamedTuple):
     """Places and frames at which one foot stands.
 
     stances: frames. anchors: places (S, 3), m, of the ball of a flat foot, in the coordinates of
@@ -192,8 +190,7 @@ class Footsteps:
     flats: Annotated[Indices, "stances"]
 
 
-@dataclass(frozen=True)
-class FeetPlan:
+class FeetPlan(NamedTuple):
     """Plan of the feet over the frames of a grid.
 
     rate: of the grid, frames a second. cycle: as of the motion. steps: of each leg. changes: of the
@@ -220,8 +217,7 @@ class FeetPlan:
     unreached: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
-class PlanRequest:
+class PlanRequest(NamedTuple):
     """A motion at equal steps of time, whose feet are planned.
 
     rotations: (F, J, 4). roots: (F, 3), m. rate: frames a second. contacts: statistics of each

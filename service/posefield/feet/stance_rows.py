@@ -6,7 +6,6 @@ beyond the last. Stances of a row depend on no other row.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -49,8 +48,7 @@ class Cycle(NamedTuple):
 NO_CYCLE = Cycle(0.0, 1.0)
 
 
-@dataclass(frozen=True)
-class Runs:
+class Runs(NamedTuple):
     """Runs of frames, row by row and in order: frames `begins` to `ends`, exclusive."""
 
     rows: PerRun
@@ -91,7 +89,7 @@ class Runs:
     def of_rows(self, rows: Annotated[Indices, "chosen"]) -> "Runs":
         """Return the runs of some rows, in order, which are counted anew."""
         selected = self.select(np.isin(self.rows, rows))
-        return replace(selected, rows=np.searchsorted(rows, selected.rows))
+        return selected._replace(rows=np.searchsorted(rows, selected.rows))
 
     def by_row(self, rows: int) -> list[tuple[range, ...]]:
         """Return the frames of the runs of each of R rows; they may lie after a cycle."""
@@ -102,8 +100,7 @@ class Runs:
         return [tuple(row_intervals) for row_intervals in by_row]
 
 
-@dataclass(frozen=True)
-class FootRows:
+class FootRows(NamedTuple):
     """Feet: predicted paths, and how captured feet contact and swing.
 
     floor: (N,), over the floor. heights: (N,), m. height, swing, longest_swing, clearance: (R,), as
@@ -131,7 +128,7 @@ class FootRows:
         selected = {name: getattr(self, name)[frames] for name in FRAME_FIELDS}
         names = ("height", "swing", "longest_swing", "clearance", "ways", "factors", "flat_pitch")
         selected |= {name: getattr(self, name)[rows] for name in names}
-        return replace(self, rows=self.rows.select(rows), **selected)
+        return self._replace(rows=self.rows.select(rows), **selected)
 
     def contact(self, row: int) -> FootContact:
         """Return the statistics of one row's contacts."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -142,8 +142,7 @@ def shape_rows(
 BASE_MEMORY, COPIES_PER_LEVEL = 1 << 20, 24
 
 
-@dataclass(frozen=True)
-class PredictionState:
+class PredictionState(NamedTuple):
     """Intermediate values of the graph from which the poses of one question are computed.
 
     coefficients: sample coefficients (r3,). frames: canonical frames (S,) of the question's times.

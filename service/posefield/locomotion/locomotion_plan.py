@@ -279,7 +279,7 @@ def _measure_strides(
     frames = controls.shape[:2]
     labels = stride.RowLabels(gait.labels.weights, np.repeat(combinations, frames[1]))
     cycles = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
-    return Strides(*(value.reshape(frames) for value in vars(cycles).values()))
+    return Strides._make(value.reshape(frames) for value in cycles)
 
 
 def _increments(paces: Numbers, rate: float) -> Numbers:

@@ -7,7 +7,7 @@ frame the last pose of a cycle equals its first, and the sway about the arc is p
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ ROWS_PER_CALL = 1000
 """Most rows of a call of the graph."""
 
 
-@dataclass(frozen=True)
-class Strides:
+class Strides(NamedTuple):
     """One cycle each of B characters, or of N characters in F frames (N, F).
 
     durations: (B,), s. travels: (B,), along the arc, m, in the character's own axes. turns:
@@ -166,7 +165,7 @@ def root_places(
     doubled = strides(session, controls[twice], labels[twice], level)
     count = len(phases)
     rows, times = np.repeat(np.arange(len(controls)), count), np.tile(phases, len(controls))
-    cycles = Strides(*(value[::2][rows] for value in vars(doubled).values()))
+    cycles = Strides._make(value[::2][rows] for value in doubled)
     at = (times * cycles.durations)[:, None]
     (roots,) = _run_batches(session, controls[rows], at, labels[rows], level, "root_position")
     return _relative_places(cycles, times, roots[:, 0]).reshape(-1, count)

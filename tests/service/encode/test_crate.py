@@ -51,7 +51,7 @@ def content(seed=0, frames=7, joints=5, **said):
 
 
 def changed(made, **samples):
-    return replace(made, samples=made.samples | samples)
+    return made._replace(samples=made.samples | samples)
 
 
 def template(author, made):
@@ -86,7 +86,7 @@ def test_layers_of_all_lengths_rates_and_facts_share_a_template():
     first = template(Plain(), content(1))
     assert template(Plain(24.0), content(2, frames=90, more=["x"])) is first
     assert template(Plain(), content(1, joints=6)) is not first
-    assert template(Plain(), replace(content(1), facts={})) is not first
+    assert template(Plain(), content(1)._replace(facts={})) is not first
 
 
 def test_a_layer_has_the_same_bytes_whatever_was_written_before():

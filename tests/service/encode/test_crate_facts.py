@@ -2,7 +2,6 @@
 
 import math
 import struct
-from dataclasses import replace
 from enum import StrEnum
 from types import MappingProxyType
 
@@ -44,21 +43,21 @@ CASES = [
 
 @pytest.mark.parametrize("facts", CASES, ids=[next(iter(facts)) for facts in CASES])
 def test_facts_are_read_as_those_that_usd_writes(facts):
-    made = replace(content(1), facts=facts)
+    made = content(1)._replace(facts=facts)
     found = layers.crate_text(crate_template.usdc(Plain(), made))
     assert found == built(Plain(), made)
-    other = replace(made, facts={**facts, "another": 0.1})
+    other = made._replace(facts={**facts, "another": 0.1})
     assert layers.crate_text(crate_template.usdc(Plain(), other)) != found
 
 
 def test_values_that_are_read_where_they_lie_are_aligned():
     for length in range(8):
-        made = replace(content(1), facts={"a": "x" * length, "b": [0.1] * 3, "c": 0.1 + length})
+        made = content(1)._replace(facts={"a": "x" * length, "b": [0.1] * 3, "c": 0.1 + length})
         found = crate_template.usdc(Plain(), made)
         assert found.index(struct.pack("<Qddd", 3, 0.1, 0.1, 0.1)) % 8 == 0
 
 
 def test_a_text_with_the_end_of_a_token_is_an_error():
-    made = replace(content(1), facts={"a": "x\0y"})
+    made = content(1)._replace(facts={"a": "x\0y"})
     with pytest.raises(ValueError, match="a fact with the character NUL, expected text without"):
         crate_template.usdc(Plain(), made)

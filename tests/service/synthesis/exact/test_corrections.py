@@ -117,7 +117,7 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
     # there is time for it.
     state = reaching.held.state
     uncertain = replace(
-        reaching.held, state=replace(state, sigma=100.0 / reachability.MAX_DEVIATIONS * state.sigma)
+        reaching.held, state=state._replace(sigma=100.0 / reachability.MAX_DEVIATIONS * state.sigma)
     )
     jerked = reaching.solve(uncertain, aims)
     assert (roughness(reaching, jerked) > 2.5 * before) == (apart > 0.0)
