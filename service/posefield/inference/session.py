@@ -90,8 +90,11 @@ class AnswerBounds:
         low, high = self._inside
         return np.asarray(((controls < low) | (controls > high)).any(axis=1))
 
-    def limit(self, controls: PointControls | SinglePoints) -> PointControls | SinglePoints:
-        """Return the controls (B, d) at which the answer is computed; inside the limits the same.
+    def limit(
+        self,
+        controls: Annotated[Floats, "*points controls"] | Annotated[Singles, "*points controls"],
+    ) -> Annotated[Floats, "*points controls"] | Annotated[Singles, "*points controls"]:
+        """Return the controls (..., d) at which the answer is computed; inside the limits the same.
 
         Keeps the type of the numbers.
         """

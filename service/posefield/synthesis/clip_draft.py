@@ -160,7 +160,7 @@ class ClipDraft:
             frame = np.array([event.share * (card.frames - 1)])
             moments += model.solver.times(self.validated, motion, frame).tolist()
         # Less than half a frame before the end, the first pose is the only one.
-        if (duration - max(self.question.start, 0.0)) * self.rate > 0.5:
+        if (duration - max(check_number("start", self.question.start), 0.0)) * self.rate > 0.5:
             moments.append(duration)
         return moments
 
