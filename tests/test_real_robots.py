@@ -10,6 +10,7 @@ from pathlib import Path
 import document_pages
 import numpy as np
 import pytest
+from serving import POSEFIELD
 
 import posefield
 from posefield.common.errors import InvalidField, ModelError, MotionFileError
@@ -23,6 +24,7 @@ from posefield_train.robots import doctor, robot_file
 from posefield_train.source import ingest, recipe
 
 pytestmark = pytest.mark.system
+TRACKER = Path(__file__).parents[1] / "examples/track_in_mujoco.py"
 
 # Format by the folder of the file, and a part of its name; None for a file that is refused.
 FORMATS = {
@@ -311,6 +313,42 @@ def test_gaits_left_out_are_predicted_better_than_a_lookup_does(biped):
     error, lookup = (np.degrees(np.sqrt(np.mean(np.square(each)))) for each in (errors, lookups))
     assert error < 0.7
     assert lookup > 1.7 * error
+
+
+def test_four_commands_lead_from_gaits_to_a_robot_that_tracks_them(biped, tmp_path):
+    """0.6 degrees off, no torque cut off. Controls: no stiffness, and legs that are exchanged."""
+    folder = biped[1]
+    rows = (folder / "clips.csv").read_text().splitlines()
+    (folder / "few.csv").write_text("\n".join(rows[:31]) + "\n")
+    few = (folder / "recipe.toml").read_text().replace("clips.csv", "few.csv")
+    (folder / "few.toml").write_text(few)
+    gaits = [folder / "gaits" / f"{index}.json" for index in range(3)]
+    robot, model = folder / "go_bdx.xml", tmp_path / "few.onnx"
+
+    def output(*words):
+        done = subprocess.run([*map(str, words)], check=True, capture_output=True, text=True)
+        return done.stdout
+
+    told = json.loads(output(POSEFIELD, "doctor", *gaits, "--robot", robot, "--json"))
+    assert len(told["motions"]) == len(gaits)
+    output(POSEFIELD, "train", folder / "few.toml", "-o", model)
+    grid = ["--grid", "forward=0.1", "--grid", "left=0", "--grid", "turning=0.1", "--fps", 50]
+    references = tmp_path / "references"
+    output(POSEFIELD, "export", model, *grid, "--format", "mjlab.npz", "-o", references)
+    motion = next(references.rglob("*.mjlab.npz"))
+    track = [sys.executable, TRACKER, robot]
+    tracked = json.loads(output(*track, motion))
+    assert tracked["error_degrees"] < 1.0
+    assert tracked["saturated_share"] == 0.0
+    assert 0.2 < tracked["largest_torque_share"] < 0.8
+    limp = json.loads(output(*track, motion, "--stiffness", 0))
+    assert limp["error_degrees"] > 10.0
+    numbers = dict(np.load(motion))
+    exchanged = np.r_[11:16, 5:11, 0:5]
+    numbers |= {name: numbers[name][:, exchanged] for name in ("joint_pos", "joint_vel")}
+    np.savez(tmp_path / "exchanged.npz", **numbers)
+    wrong = json.loads(output(*track, tmp_path / "exchanged.npz"))
+    assert wrong["saturated_share"] > 0.01
 
 
 def predicted_angles(trained, made, commands):
