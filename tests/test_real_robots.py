@@ -192,6 +192,9 @@ def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(model)
         reference = evaluator.sample(one, np.minimum(phase, 1.0 - 1e-12))
         np.testing.assert_allclose(reference.joint_positions, motion.angles, atol=1e-5)
         np.testing.assert_allclose(reference.base_positions, motion.base_path, atol=1e-5)
+        low, high = card.robot.ranges.T
+        assert np.all(reference.joint_positions > low - 1e-6)
+        assert np.all(reference.joint_positions < high + 1e-6)
         signs = np.sign(np.sum(reference.base_rotations * motion.base_rotations, axis=-1))
         rotations = signs[:, None] * reference.base_rotations
         np.testing.assert_allclose(rotations, motion.base_rotations, atol=1e-5)
