@@ -19,8 +19,13 @@ CASES = [
     for name, each in OPERATIONS.items()
     for form in each.formats or [None]
     if form not in ROBOT_ENCODERS
-    # The family of the example of a performance has legs alone, and avatars need a whole body.
-    if (name, form) != ("queryPerformanceInFormat", "vrma")
+    # The family of these examples has legs alone, and avatars and simulators need a whole body.
+    if (name, form)
+    not in {
+        ("queryPerformanceInFormat", "vrma"),
+        ("queryTracksInFormat", "osi"),
+        ("queryTracksInFormat", "carla.npz"),
+    }
 ]
 """Operation and format; None where the path names none. Reference motions are of robots' models."""
 

@@ -207,9 +207,13 @@ def narrowed(spec, card):
     which segments follow one another no schema can say: such questions are left out."""
     narrow = copy.deepcopy(spec)
     for path in [*narrow["paths"]]:
-        if path.split("/")[-1].partition(".")[0] in ("crowd", "clips", "sigma", "batch") or (
-            "performances" in path
-        ):
+        if path.split("/")[-1].partition(".")[0] in (
+            "crowd",
+            "tracks",
+            "clips",
+            "sigma",
+            "batch",
+        ) or ("performances" in path):
             del narrow["paths"][path]
     schemas, parameters = (narrow["components"][part] for part in ("schemas", "parameters"))
     # Reference motions are of models of robots.

@@ -526,3 +526,30 @@ class Model:
         name = "getCrowdInFormat"
         call = partial(questions.get, name, self.name, words)
         return Saving(self.client, Files(call, name, questions.about(self.name, words)))
+
+    def tracks(
+        self,
+        /,
+        tracks: Sequence[Mapping[str, Any]],
+        *,
+        skip_bad: bool | None = None,
+        fps: float | None = None,
+        seed: int | None = None,
+        labels: Labels | None = None,
+        level: int | None = None,
+        feet: FeetMode = None,
+        take: int | Literal["index"] | None = None,
+        variety: float | None = None,
+        detail: bool | None = None,
+        instancing: Literal["references", "scenegraph", "flatten"] | None = None,
+        body: Body = None,
+    ) -> "Saving":
+        """Return people who follow tracks: each has an id, times (s), and positions (m).
+
+        Positions are east and north; headings, if there are any, are angles from east, rad.
+        """
+        words = questions.question(locals())
+        name = "queryTracksInFormat"
+        call = partial(questions.post, name, self.name, words)
+        about = f"{self.name!r}, {len(tracks)} tracks"
+        return Saving(self.client, Files(call, name, about))

@@ -316,6 +316,32 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/models/{model}/tracks.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description Model name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Query people who follow tracks, in a format
+         * @description Each person is where its track is at each time, and walks, turns or stands there; before and after its track it is hidden. The response has the bytes that `posefield crowd --trajectories` writes. Requires a cyclic model whose root travels at several speeds. What no walker can do is told in warnings, at most 20 and the number of the others. Since 5.2.0.
+         */
+        post: operations["queryTracksInFormat"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/models/{model}/why": {
         parameters: {
             query?: never;
@@ -2216,6 +2242,141 @@ export interface components {
             height: number;
         };
         /**
+         * @description Places of one person over time, as columns of equal lengths.
+         * @example {
+         *       "id": "anna",
+         *       "times": [
+         *         0,
+         *         1,
+         *         2
+         *       ],
+         *       "positions": [
+         *         [
+         *           0,
+         *           0
+         *         ],
+         *         [
+         *           1.2,
+         *           0
+         *         ],
+         *         [
+         *           2.4,
+         *           0.1
+         *         ]
+         *       ],
+         *       "headings": [
+         *         0,
+         *         0,
+         *         0.1
+         *       ]
+         *     }
+         */
+        Track: {
+            /** @description Id of the person, from which height, labels and take follow. */
+            id: string;
+            /** @description Times in seconds, ascending. */
+            times: number[];
+            /** @description East and north, in metres: in USD, X and -Z. */
+            positions: [
+                number,
+                number
+            ][];
+            /**
+             * @description Angles from east against the clock in radians; null for the way of travel.
+             * @default null
+             */
+            headings: number[] | null;
+        };
+        /**
+         * @description Request for people who follow tracks. The world is that of simulators: x east, y north. The
+         *     clock begins at the first sample of all. A track that cannot be walked (times that do not
+         *     ascend, jumps) is an error with a pointer to its sample.
+         * @example {
+         *       "tracks": [
+         *         {
+         *           "id": "anna",
+         *           "times": [
+         *             0,
+         *             1,
+         *             2
+         *           ],
+         *           "positions": [
+         *             [
+         *               0,
+         *               0
+         *             ],
+         *             [
+         *               1.2,
+         *               0
+         *             ],
+         *             [
+         *               2.4,
+         *               0.1
+         *             ]
+         *           ]
+         *         }
+         *       ]
+         *     }
+         */
+        TracksQuestion: {
+            /** @description Tracks, one for each person. */
+            tracks: components["schemas"]["Track"][];
+            /**
+             * @description Whether people with unusable tracks are left out, and told in warnings.
+             * @default false
+             */
+            skip_bad: boolean;
+            /**
+             * @description Frame rate in frames a second.
+             * @default 30
+             */
+            fps: number;
+            /**
+             * @description Seed of all random numbers.
+             * @default 0
+             */
+            seed: number;
+            labels?: components["schemas"]["Labels"];
+            /**
+             * @description Level of detail; null for the finest.
+             * @default null
+             */
+            level: number | null;
+            /**
+             * @description Whether feet stand where they contact the ground.
+             * @default null
+             * @enum {string|null}
+             */
+            feet: "stand" | "as_predicted" | null;
+            /**
+             * @description Seed of another take; with `index` each id has its own.
+             * @default 0
+             */
+            take: number | "index";
+            /**
+             * @description Size of the deviations of takes.
+             * @default 0.7
+             */
+            variety: number;
+            /**
+             * @description Whether details are added, sampled by the takes.
+             * @default false
+             */
+            detail: boolean;
+            /**
+             * @description Sharing of data in USD.
+             * @default references
+             * @enum {string}
+             */
+            instancing: "references" | "scenegraph" | "flatten";
+            /**
+             * @description Body in USD; other formats refuse it.
+             * @default null
+             * @enum {string|null}
+             */
+            body: "none" | "mannequin" | "bones" | null;
+        };
+        /**
          * @description Request for one pose of each of many characters. All lists have the same length, the number
          *     of characters, and the same order. A scalar applies to all characters. Without a list there
          *     is one character. The poses are the model's predictions; constraints do not apply to crowds.
@@ -2465,6 +2626,26 @@ export interface components {
                 "model/vnd.usdc": string;
                 "model/vnd.usda": string;
                 "model/vnd.usdz+zip": string;
+            };
+        };
+        /** @description The people on their tracks. */
+        TrackedCrowd: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                Vary: components["headers"]["Vary"];
+                "Content-Disposition": components["headers"]["Disposition"];
+                "Posefield-Model": components["headers"]["Model"];
+                "Posefield-Warning": components["headers"]["Warning"];
+                [name: string]: unknown;
+            };
+            content: {
+                "model/vnd.usda": string;
+                "model/vnd.usdc": string;
+                "model/vnd.usdz+zip": string;
+                "application/x-npz": string;
+                "application/vnd.apache.arrow.stream": string;
+                "application/vnd.asam.osi": string;
             };
         };
         /** @description The poses. Default format: Arrow stream. */
@@ -2948,6 +3129,11 @@ export interface components {
          */
         walkFormat: "usda" | "usdc" | "usdz";
         /**
+         * @description USD; NumPy arrays or an Arrow stream of joints or bones; an OSI trace; or a table of bones for CARLA.
+         * @example usdc
+         */
+        tracksFormat: "usda" | "usdc" | "usdz" | "npz" | "bones.npz" | "arrow" | "osi" | "carla.npz";
+        /**
          * @description A zip or tar archive.
          * @example zip
          */
@@ -3159,6 +3345,12 @@ export interface components {
         CrowdQuestion: {
             content: {
                 "application/json": components["schemas"]["CrowdQuestion"];
+            };
+        };
+        /** @description Default limits: 32 MiB, 100,000 people, 36,000 frames from the first sample of all to the last, and 500,000 poses: people times frames. */
+        TracksQuestion: {
+            content: {
+                "application/json": components["schemas"]["TracksQuestion"];
             };
         };
         /** @description Default limits: 8 MiB, 10,000 clips, 1,000,000 frames in all, and a total target cost of 2,000. A target costs 1, or 4 if the clip omits controls. */
@@ -4269,6 +4461,42 @@ export interface operations {
             503: components["responses"]["Overloaded"];
         };
     };
+    queryTracksInFormat: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description Model name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+                /**
+                 * @description USD; NumPy arrays or an Arrow stream of joints or bones; an OSI trace; or a table of bones for CARLA.
+                 * @example usdc
+                 */
+                format: components["parameters"]["tracksFormat"];
+            };
+            cookie?: never;
+        };
+        requestBody: components["requestBodies"]["TracksQuestion"];
+        responses: {
+            200: components["responses"]["TrackedCrowd"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
+            415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
+            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
     getWhy: {
         parameters: {
             query?: {
@@ -5180,6 +5408,9 @@ export const MEDIA_TYPES = {
   "asap.pkl": "application/octet-stream",
   "awd.json": "text/plain",
   "amp.txt": "text/plain",
+  "bones.npz": "application/x-npz",
+  "osi": "application/vnd.asam.osi",
+  "carla.npz": "application/x-npz",
   "zip": "application/zip",
   "tar": "application/x-tar"
 } as const;

@@ -118,8 +118,9 @@ def parts_text(manifest: dict[str, Any], folder: Path) -> str:
         f"{folder}: {manifest['people']} people in {len(records)} files, {size / 1e6:.1f} MB",
         f"smoothed paths are {worst:.1f} cm away from their tracks at most",
     ]
-    lines += [f"person {person!r} left out: {why}" for person, why in manifest["skipped"].items()]
-    return "\n".join(lines + [line for record in records for line in record["warnings"]])
+    skipped = track_crowd.left_out(manifest["skipped"])
+    warnings = [line for record in records for line in record["warnings"]]
+    return "\n".join(lines + track_crowd.shorten(skipped) + track_crowd.shorten(warnings))
 
 
 def _track_facts(crowd: CrowdClip, tracks: TrackSet | None) -> dict[str, Any]:
@@ -235,10 +236,8 @@ def report_text(facts: dict[str, Any]) -> str:
             f"smoothed paths are {errors['mean']:.1f} cm away from their tracks in the mean and "
             f"{errors['worst']:.1f} cm at most"
         )
-    lines += [
-        f"person {person!r} left out: {why}" for person, why in facts.get("skipped", {}).items()
-    ]
-    return "\n".join([*lines, *facts["warnings"]])
+    lines += track_crowd.shorten(track_crowd.left_out(facts.get("skipped", {})))
+    return "\n".join([*lines, *track_crowd.shorten(facts["warnings"])])
 
 
 def _take_text(take: dict[str, Any], motions: int) -> str:

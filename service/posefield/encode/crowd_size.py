@@ -59,6 +59,17 @@ def file_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     return max(binary, text) + (counts.characters if flat else 1) * rest
 
 
+# Bytes of a joint of a pose in tables of bones and OSI traces, and of the rest of a pose in them.
+BONE_SIZES = {"npz": JOINT, "bones.npz": 56, "arrow": 56, "osi": 400, "carla.npz": 56}
+POSE_SIZE = 800
+
+
+def table_size_bound(counts: CrowdCounts, ending: str) -> int:
+    """Return an upper bound of the bytes of a crowd in a format besides USD."""
+    pose = POSE_SIZE + WEIGHT * counts.curves + BONE_SIZES[ending] * counts.joints
+    return MOTION * counts.characters + counts.frames * counts.characters * pose
+
+
 def layer_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of the largest layer of a crowd."""
     if ending == "usdz" and not flat:

@@ -98,7 +98,7 @@ def of_body(content: bytes, largest: float) -> CrowdQuestion:
     largest: maximum number of characters. Raises FormError for a malformed body, InvalidField for
     invalid values and RequestError 413 for too many values.
     """
-    _check_values(content, largest)
+    check_values(content, largest)
     body = bodies.decode_question(CrowdBody, content)
     count = _count(body, largest)
     performers, performer = _distinct(body.performer, count)
@@ -120,7 +120,7 @@ def of_body(content: bytes, largest: float) -> CrowdQuestion:
     )
 
 
-def _check_values(content: bytes, largest: float) -> None:
+def check_values(content: bytes, largest: float) -> None:
     """Raise RequestError for more values than a valid body has: decoded, each takes 32 bytes."""
     count, limit = content.count(b","), VALUES * max(largest, FEWEST)
     if count > limit:

@@ -22,6 +22,7 @@ from posefield.http.motion_operations import CLIP_FILES, CLIP_FORMATS, answer_cl
 from posefield.http.performance_operations import PERFORMANCE_FORMATS, answer_performance
 from posefield.http.request import ServiceRequest
 from posefield.http.routing import Handler
+from posefield.http.track_operations import TRACK_FORMATS, answer_tracks
 from posefield.model_file import model_card
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.synthesis import trust
@@ -141,6 +142,7 @@ _FORMATTED: dict[str, tuple[Handler, Mapping[str, Format]]] = {
 FORMATS = {name: formats for name, (_, formats) in _FORMATTED.items()}
 # Endings of paths, where they are more than the formats of Accept.
 FORMATS |= {"getClipInFormat": CLIP_FILES, "queryClipInFormat": CLIP_FILES}
+FORMATS |= {"queryTracksInFormat": TRACK_FORMATS}
 """Encoders of the operations that have formats, the default of Accept first."""
 PAGES = ("getContract", "getContractJson", "getDocs", "getProblems", "getViewer")
 OPERATIONS: dict[str, Handler] = {
@@ -158,5 +160,6 @@ OPERATIONS: dict[str, Handler] = {
     # The path without a format and the path with one have the same function.
     **{name: answer for name, (answer, _) in _FORMATTED.items()},
     **{f"{name}InFormat": answer for name, (answer, _) in _FORMATTED.items()},
+    "queryTracksInFormat": answer_tracks,
 }
 """Function of each operationId."""

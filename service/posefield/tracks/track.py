@@ -8,7 +8,7 @@ a quarter turn more. `floor_points` and `floor_headings` are the only places whe
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -69,6 +69,14 @@ class Track:
         return np.abs(np.diff(self.points)) / np.diff(self.times)
 
 
+class TrackProblem(NamedTuple):
+    """First sample of a track that cannot be used, why, and the column that is at fault."""
+
+    sample: int
+    message: str
+    column: str = "positions"
+
+
 @dataclass(frozen=True)
 class TrackSet:
     """Tracks of a file. skipped: reason by id of the people who were left out."""
@@ -106,7 +114,7 @@ def of_arrays(
     track = Track(person, times, floor_points(*points.T), turned)
     problem = find_problem(track)
     if problem is not None:
-        raise InvalidField(f"tracks/{person}/{problem[0]}", problem[1])
+        raise InvalidField(f"tracks/{person}/{problem.sample}", problem.message)
     return track
 
 
@@ -136,13 +144,16 @@ def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> Tr
         if problem is None:
             tracks.append(track)
         elif skip_bad:
-            line = track.lines[problem[0]]
-            skipped[person] = f"line {line}: {problem[1]}"
+            line = track.lines[problem.sample]
+            skipped[person] = f"line {line}: {problem.message}"
         else:
-            raise FileError(path, f"person {person!r}: {problem[1]}", int(track.lines[problem[0]]))
+            line = int(track.lines[problem.sample])
+            raise FileError(path, f"person {person!r}: {problem.message}", line)
     if not tracks:
         raise FileError(path, f"all {len(skipped)} people are unusable, expected one or more")
-    _check_mirror(tracks, path)
+    mirrored = find_mirror(tracks)
+    if mirrored is not None:
+        raise FileError(path, mirrored)
     return TrackSet(tuple(tracks), skipped)
 
 
@@ -157,42 +168,48 @@ def _joined(person: str, pieces: Sequence[tuple[TrackRows, Indices]]) -> Track:
     return Track(person, times, points, headings, lines)
 
 
-def find_problem(track: Track) -> tuple[int, str] | None:
-    """Return the first sample of a track that cannot be used, and a sentence; None if all can."""
+def find_problem(track: Track) -> TrackProblem | None:
+    """Return what makes a track unusable; None if nothing does."""
     columns = [track.times, track.points.real, track.points.imag]
     columns += [] if track.headings is None else [track.headings]
     finite = np.isfinite(columns).all(axis=0)
     if not finite.all():
-        return int(np.argmin(finite)), "a value that is no number, expected finite ones"
+        at = int(np.argmin(finite))
+        return TrackProblem(at, "a value that is no number, expected finite ones")
     far = np.maximum(np.abs(track.points.real), np.abs(track.points.imag))
     if far.max() > MAX_COORDINATE:
         at = int(np.argmax(far))
-        return at, f"{far[at]:g} m from the origin, expected at most {MAX_COORDINATE:g} m"
+        text = f"{far[at]:g} m from the origin, expected at most {MAX_COORDINATE:g} m"
+        return TrackProblem(at, text)
     if np.abs(track.times).max() > MAX_SECONDS:
         at = int(np.argmax(np.abs(track.times)))
-        return at, f"time {track.times[at]:g} s, expected at most {MAX_SECONDS:g} s"
+        text = f"time {track.times[at]:g} s, expected at most {MAX_SECONDS:g} s"
+        return TrackProblem(at, text, "times")
     if len(track) < 2:
-        return 0, "one sample, expected two or more"
+        return TrackProblem(0, "one sample, expected two or more", "times")
     steps = np.diff(track.times)
     if steps.min() <= 0.0:
         at = int(np.argmax(steps <= 0.0)) + 1
         time, before = track.times[at], track.times[at - 1]
         if steps[at - 1] == 0.0:
-            return at, f"twice at time {time:g} s, expected one sample at a time"
-        return at, f"time goes back from {before:g} s to {time:g} s, expected ascending times"
+            text = f"twice at time {time:g} s, expected one sample at a time"
+        else:
+            text = f"time goes back from {before:g} s to {time:g} s, expected ascending times"
+        return TrackProblem(at, text, "times")
     ways = np.abs(np.diff(track.points))
     jumps = (ways > JUMP) & (ways > FASTEST * steps)
     if jumps.any():
         at = int(np.argmax(jumps))
-        return at + 1, (
+        return TrackProblem(
+            at + 1,
             f"jumps {ways[at]:.2f} m in {steps[at]:g} s at {track.times[at + 1]:g} s, expected at "
-            f"most {FASTEST:g} m/s"
+            f"most {FASTEST:g} m/s",
         )
     return None
 
 
-def _check_mirror(tracks: Sequence[Track], path: Path) -> None:
-    """Raise FileError where headings agree with travel only if y points down."""
+def find_mirror(tracks: Sequence[Track]) -> str | None:
+    """Return a sentence where headings agree with travel only if y points down, else None."""
     straight, mirrored = [np.zeros(0, complex)], [np.zeros(0, complex)]
     for track in tracks:
         if track.headings is None:
@@ -208,9 +225,9 @@ def _check_mirror(tracks: Sequence[Track], path: Path) -> None:
         for pairs in (straight, mirrored)
     )
     if opposite > MIRRORED and agreement < FOLLOWED:
-        raise FileError(
-            path,
+        return (
             f"headings agree with the mirrored direction of travel ({opposite:.2f}) and not with "
             f"the direction itself ({agreement:.2f}), expected y north and angles from east "
-            "against the clock: is y down?",
+            "against the clock: is y down?"
         )
+    return None

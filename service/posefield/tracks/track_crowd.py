@@ -1,7 +1,7 @@
 """Crowds of people who walk along tracks."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -30,6 +30,8 @@ MOST_SPEED = 2.2
 """Speed up to which people walk, m/s; beyond it their feet slide, which is told."""
 FAR, ASIDE = 0.08, np.radians(45.0)
 """Distance from a track, m, and angle from a given heading, rad, that are told."""
+MOST_LINES = 20
+"""Lines about people that a terminal and the headers of a response show."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,7 @@ def find_people(
     if poses > MAX_POSES:
         raise InvalidField("trajectories", f"{poses:.3g} poses, expected {MAX_POSES} at most")
     for track in tracks:
+        cancellation.check()
         path = track_path.follow(track, begin, order.fps)
         if path is None:
             skipped[track.person] = f"shorter than two frames at {order.fps:g} frames a second"
@@ -237,6 +240,17 @@ def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
             *overlaps.get("warnings", ()),
         ],
     }
+
+
+def left_out(skipped: Mapping[str, str]) -> list[str]:
+    """Return a line for each person who was left out, with the reason."""
+    return [f"person {person!r} left out: {why}" for person, why in skipped.items()]
+
+
+def shorten(lines: Sequence[str]) -> list[str]:
+    """Return the first lines about people, and how many more there are."""
+    more = len(lines) - MOST_LINES
+    return [*lines[:MOST_LINES], *([f"and {more} more"] if more > 0 else [])]
 
 
 def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:

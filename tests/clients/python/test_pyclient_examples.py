@@ -70,6 +70,7 @@ CALLS = {
     ("getCrowdInFormat", "usda"): asking("crowd_walk"),
     ("queryCrowdInFormat", "arrow"): asking("crowd"),
     ("queryCrowdInFormat", "msgpack"): lambda client, r: asking("crowd")(client, r).numbers,
+    ("queryTracksInFormat", "usdc"): asking("tracks"),
     ("queryClipsInFormat", "zip"): asking("clips"),
     ("queryPerformance", None): lambda client, r: client.plan(r["body"]),
     ("queryPerformanceInFormat", "glb"): lambda client, r: client.performance(r["body"]),
