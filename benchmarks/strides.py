@@ -33,8 +33,9 @@ from posefield.question import json_decoding
 from posefield.question.motion_question import ClipQuestion, FeetMode
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.registry import model_registry
-from posefield.synthesis import clips, walking_feet
+from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.tracks import route_tracks, track_crowd
 from posefield_train.source import ingest, recipe
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -87,8 +88,11 @@ def performance(model: Synthesizer, speed: float, feet: FeetMode) -> Clip:
 def walker(model: Synthesizer, speed: float, feet: FeetMode) -> Clip:
     """Return a walker of a crowd on a straight route, without its ends."""
     route = Route(np.array([[0.0, 0.0], [0.0, SECONDS * speed + 3.0]]), speed)
-    order = CrowdOrder(count=1, routes=[route], seconds=SECONDS, fps=RATE, feet=feet)
-    (batch,) = walking_feet.build_crowd(model, gait.fit_gait(model.session), order).batches
+    # This seed draws a performer of middle size.
+    order = CrowdOrder(count=1, seconds=SECONDS, fps=RATE, seed=3, feet=feet)
+    fitted = gait.fit_gait(model.session)
+    tracks = route_tracks.tracks_of_routes(fitted, [route], SECONDS)
+    (batch,) = track_crowd.build_crowd(model, fitted, order, tracks).batches
     whole = Clip(
         model.session.card.skeleton,
         batch.rotations[0].astype(float),

@@ -61,7 +61,7 @@ def test_bvh_says_that_it_carries_no_curves_and_what_does(face, ask):
     found = face("GET", f"/v1/models/face/clip.bvh?{QUERY}")
     (said,) = warnings(found)
     assert said.startswith("bvh files carry no curves: 11 are left out (jawOpen, ")
-    assert said.endswith("usda, usdc, usdz, json, glb, npz, arrow, msgpack have them")
+    assert said.endswith("usda, usdc, usdz, json, glb, vrma, npz, arrow, msgpack have them")
     for other in ("usdc", "glb", "json", "npz"):
         assert warnings(face("GET", f"/v1/models/face/clip.{other}?{QUERY}")) == []
     # A model without curves has none to leave out.

@@ -34,7 +34,17 @@ def alone(script):
     return {key: value for key, value in script.items() if key != "name"}
 
 
-@pytest.mark.parametrize("extension", CLIP_ENCODERS)
+# Files of avatars need a whole body, and these walkers are legs alone.
+BODIES = [name for name, encoder in CLIP_ENCODERS.items() if not encoder.is_humanoid]
+
+
+def test_bodies_that_a_format_cannot_move_are_refused(ask):
+    answer = ask("POST", f"{BATCH}.zip", json=asked("vrma", SCRIPTS))
+    assert answer.status_code == 422
+    assert "expected a body with all humanoid bones of VRM" in answer.json()["detail"]
+
+
+@pytest.mark.parametrize("extension", BODIES)
 def test_each_file_is_what_its_own_path_answers(extension, ask):
     answer = ask("POST", f"{BATCH}.zip", json=asked(extension, SCRIPTS))
     assert answer.status_code == 200, answer.text

@@ -12,14 +12,15 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.console.options import Json, open_model
 from posefield.console.output import as_json
 from posefield.encode import glb
-from posefield.http.static_page import MODEL_PAGE
 from posefield.registry import model_registry
 
 LIST = "models.json"
 
 
 def page(
-    models: Annotated[list[Path], typer.Argument(help="model files, or names of shipped models")],
+    models: Annotated[
+        list[Path], typer.Argument(help="model files, or names of shipped models", metavar="MODEL")
+    ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="new folder, or that of an earlier page")
     ],
@@ -30,6 +31,9 @@ def page(
     It has sliders, a clip, walkers that are steered and a download, and loads nothing from
     elsewhere. Browsers open it through http or https, not from a file.
     """
+    # Its server is needed by few commands.
+    from posefield.http.static_page import MODEL_PAGE
+
     if not MODEL_PAGE.exists():
         raise FileError(MODEL_PAGE, "is missing: build it with make page")
     if output.exists() and any(output.iterdir()) and not (output / LIST).exists():

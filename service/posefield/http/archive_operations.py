@@ -191,7 +191,7 @@ def _planned(
     seconds, limit = 0.0, settings.performances_seconds
     for index, (name, question) in enumerate(zip(names, questions, strict=True)):
         cancellation.check()
-        with _element("scripts", index):
+        with _element("scripts", index, "format"):
             encoder.convention(question.unit, question.up, question.body)
             script = resolve_script(question, library.find)
             encoder.check_body(script.character.skeleton, script.character.roles)
