@@ -308,3 +308,22 @@ def test_people_are_hidden_outside_of_their_tracks(walk, tmp_path):
         for prim in stage.GetPrimAtPath("/Crowd/Characters").GetChildren()
     ]
     assert seen == [[*range(91)], [*range(30, 61)]]
+
+
+def test_few_people_of_a_long_clock_are_in_memory_at_once(walk):
+    def people(begin):
+        times, points = begin + np.array([0.0, 1.0]), np.array([[0.0, 0.0], [1.0, 0.0]])
+        return of_arrays(f"from {begin}", times, points)
+
+    order = CrowdOrder(4)
+    tracks = [people(begin) for begin in (0.0, 0.0, 1.0, 300.0)]
+    batches = list(track_crowd.build_crowd(walk, walk.gait, order, tracks).batches)
+    assert [batch.rotations.shape[:2] for batch in batches] == [(1, 9031)] * 4
+    assert [len(batch.feet.skate) for batch in batches] == [1] * 4
+    short = list(track_crowd.build_crowd(walk, walk.gait, order, tracks[:3]).batches)
+    assert [len(batch) for batch in short] == [3]
+    for index, batch in enumerate(batches[:3]):
+        assert np.array_equal(batch.rotations[0, :61], short[0].rotations[index])
+        assert np.array_equal(batch.bone_offsets[0], short[0].bone_offsets[index])
+    with pytest.raises(InvalidField, match="27000000031 frames from the first sample"):
+        track_crowd.find_people(walk, walk.gait, order, [tracks[0], people(9e8)])

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +14,7 @@ from posefield.locomotion import collision_avoidance, floor_plane, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH, CrowdOrder
-from posefield.motion.clip import CrowdClip, Motions, Placement
+from posefield.motion.clip import CrowdClip, Motions, Placement, StandingFeet
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_path, track_plan
@@ -30,6 +30,8 @@ MOST_SPEED = 2.2
 """Speed up to which people walk, m/s; beyond it their feet slide, which is told."""
 FAR, ASIDE = 0.08, np.radians(45.0)
 """Distance from a track, m, and angle from a given heading, rad, that are told."""
+MOST_FRAMES = 1_000_000
+"""Frames of a crowd's clock: nine hours at 30 frames a second, 0.4 GB a person."""
 MOST_LINES = 20
 """Lines about people that a terminal and the headers of a response show."""
 
@@ -151,6 +153,9 @@ def find_people(
     if not people:
         raise InvalidField("trajectories", "all shorter than two frames, expected longer ones")
     frames = max(person.path.first + len(person.path) for person in people)
+    if frames > MOST_FRAMES:
+        span = f"{frames} frames from the first sample to the last"
+        raise InvalidField("trajectories", f"{span}, expected {MOST_FRAMES} at most")
     return TrackCrowd(model, gait, order, tuple(people), begin, frames, skipped)
 
 
@@ -182,7 +187,7 @@ def build_crowd(
 
     def batches() -> Iterator[Motions]:
         for group, _, motions in crowd.batches():
-            yield _on_clock(crowd, group, motions)
+            yield from _on_clock(crowd, group, motions)
 
     points = np.array([person.path.points[0] for person in people])
     return CrowdClip(
@@ -198,21 +203,28 @@ def build_crowd(
     )
 
 
-def _on_clock(crowd: TrackCrowd, people: Sequence[Person], motions: Motions) -> Motions:
-    """Return motions in the frames of the shared clock: before and after, a person keeps still."""
-    rows = [
-        np.clip(np.arange(crowd.frames) - person.path.first, 0, len(person.path) - 1)
-        for person in people
-    ]
-    index = np.arange(len(people))[:, None], np.stack(rows)
-    curves = None if motions.curves is None else motions.curves[index]
-    return replace(
-        motions,
-        rotations=motions.rotations[index],
-        root_position=motions.root_position[index],
-        levels=motions.levels[index],
-        curves=curves,
-    )
+def _on_clock(crowd: TrackCrowd, people: Sequence[Person], motions: Motions) -> Iterator[Motions]:
+    """Yield motions in the frames of the shared clock: before and after, a person keeps still.
+
+    They are fewer at a time than those made together, as the clock may be much longer.
+    """
+    size = max(1, POSES_PER_BATCH // crowd.frames)
+    for begin in range(0, len(people), size):
+        rows = [
+            np.clip(np.arange(crowd.frames) - person.path.first, 0, len(person.path) - 1)
+            for person in people[begin : begin + size]
+        ]
+        some = np.arange(begin, begin + len(rows))
+        index = some[:, None], np.stack(rows)
+        feet = motions.feet
+        yield Motions(
+            motions.rotations[index],
+            motions.root_position[index],
+            motions.bone_offsets[some],
+            motions.levels[index],
+            None if motions.curves is None else motions.curves[index],
+            feet and StandingFeet(*(getattr(feet, fact.name)[some] for fact in fields(feet))),
+        )
 
 
 def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
