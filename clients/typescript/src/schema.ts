@@ -2277,10 +2277,7 @@ export interface components {
             /** @description Times in seconds, ascending. */
             times: number[];
             /** @description East and north, in metres: in USD, X and -Z. */
-            positions: [
-                number,
-                number
-            ][];
+            positions: number[][];
             /**
              * @description Angles from east against the clock in radians; null for the way of travel.
              * @default null
