@@ -291,10 +291,12 @@ def test_torch_agrees_with_numpy_and_passes_gradients(model):
 
     assert torch.autograd.gradcheck(outputs, inputs, atol=1e-4)
     guide = (document_pages.DOCS / "guide/robots.md").read_text()
-    (loop,) = (block.text for block in document_pages.blocks(guide) if block.language == "py")
+    loop, line = (b.text for b in document_pages.blocks(guide) if b.language == "py")
     names = {"joints": torch.zeros(4096, len(double.hinges))}
     exec(loop.replace("model.onnx", str(model)).replace("range(1000)", "range(2)"), names)
     assert names["reward"].shape == (4096,)
+    exec(line, names)
+    assert names["joints"].shape == (4096, len(double.hinges))
 
 
 def test_gaits_left_out_are_predicted_better_than_a_lookup_does(biped):
