@@ -14,7 +14,7 @@ DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 
 BUDGETS = {
     "service/posefield": 50_100,
-    "model_export/posefield_train": 28_300,
+    "model_export/posefield_train": 27_800,
     "clients/python": 2_160,
     "clients/blender": 1_280,
     "clients/viewer/src": 8_190,
@@ -31,7 +31,7 @@ VAGUE = set(
 MOST_VAGUE = 0.004
 """Share of the bindings of what ships whose names say nothing of the thing."""
 GENERATED = {"generated.py", "client.py", "schema.ts", "constants.ts"}
-MOST_TESTS = 0.735
+MOST_TESTS = 0.725
 """Lines of Python under tests for each line that ships."""
 
 
