@@ -43,7 +43,7 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The folder of a run that nobody stopped, and its report."""
+    """Folder of an uninterrupted run, and its report."""
     folder = tmp_path_factory.mktemp("whole")
     report = run(table(folder / "tracks.csv"), folder / "people.bones.npz")
     return folder / "people", report

@@ -181,7 +181,7 @@ def test_too_many_people_are_refused(tmp_path):
 
 
 def test_people_start_stand_and_turn_along_their_tracks(walk, tmp_path):
-    """The pelvis keeps to the track; standing feet stand; nobody is below the floor."""
+    """The pelvis is on the track, standing feet do not move, and no foot is below the floor."""
     corner = [(t, 1.2 * t, 0.0) for t in range(5)] + [(t, 4.8, 0.0) for t in range(5, 8)]
     corner += [(t, 4.8, 1.2 * (t - 7)) for t in range(8, 12)]
     rows = "".join(f"{t},a,{x},{y}\n" for t, x, y in corner)

@@ -24,7 +24,7 @@ CLOSE = 1e-5
 
 
 def faults() -> list[str]:
-    """Return the faults of the example, a line each; a note is printed where there is no cargo."""
+    """Return the faults of the example, one per line; without cargo print a note."""
     cargo = shutil.which("cargo")
     if cargo is None:
         print("SKIPPED: the Rust example, because there is no cargo")

@@ -39,7 +39,7 @@ def write_crowd(
 ) -> dict[str, Any]:
     """Write a crowd to a file, and return its report as plain values.
 
-    tracks: that its people follow; None for random paths or the routes of the order.
+    tracks: that its people follow; None for random paths.
 
     Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
     written.

@@ -1,4 +1,4 @@
-"""Limbs of two bones: found in a skeleton, and turned so that their ends come to targets.
+"""Limbs of two bones: choose them in a skeleton, and turn them so that their ends reach targets.
 
 A limb turns about its upper joint towards its target and bends in the plane in which it bent before
 (law of cosines). Where the limits of its middle joint are known, this bends about its hinge alone,

@@ -40,10 +40,6 @@ LIBRARIES = ("backports.zstd", "msgspec", "nanoarrow", "numpy", "onnxruntime", "
 """Libraries whose versions can affect the bytes of a response."""
 
 
-class NotModified(Exception):
-    """The client's cached response is current (304)."""
-
-
 def code_digest() -> bytes:
     """Return a digest of the sources, the library versions and the machine type.
 
@@ -63,7 +59,7 @@ def code_digest() -> bytes:
 
 
 def entity_tag(*inputs: bytes, coding: str | None = None) -> str:
-    """Return the strong entity tag of a response that depends only on `parts`.
+    """Return the strong entity tag of a response that depends only on `inputs`.
 
     coding: content coding of the response, if any.
     """
