@@ -10,8 +10,8 @@ from rows import Row
 
 from posefield.locomotion import walking_crowd
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion.clip import Motions
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -45,7 +45,7 @@ def _walk_rows(name: str, gait: Gait) -> list[Row]:
 
 
 def _motions(gait: Gait, feet: str) -> list[Motions]:
-    order = CrowdOrder(count=COUNT, seconds=SECONDS, fps=RATE, feet=feet)
+    order = WalkQuestion(count=COUNT, seconds=SECONDS, fps=RATE, feet=feet)
     model = Synthesizer("walk", gait.session)
     return list(walking_feet.build_crowd(model, gait, order).batches)
 

@@ -25,13 +25,13 @@ from posefield.feet import ball_path, body_plans, footsteps
 from posefield.feet.limbs import Limb
 from posefield.locomotion import gait
 from posefield.locomotion.locomotion_plan import Route
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion.clip import Clip
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
 from posefield.question.motion_question import ClipQuestion, FeetMode
 from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
@@ -89,7 +89,7 @@ def walker(model: Synthesizer, speed: float, feet: FeetMode) -> Clip:
     """Return a walker of a crowd on a straight route, without its ends."""
     route = Route(np.array([[0.0, 0.0], [0.0, SECONDS * speed + 3.0]]), speed)
     # This seed draws a performer of middle size.
-    order = CrowdOrder(count=1, seconds=SECONDS, fps=RATE, seed=3, feet=feet)
+    order = WalkQuestion(count=1, seconds=SECONDS, fps=RATE, seed=3, feet=feet)
     fitted = gait.fit_gait(model.session)
     tracks = route_tracks.tracks_of_routes(fitted, [route], SECONDS)
     (batch,) = track_crowd.build_crowd(model, fitted, order, tracks).batches

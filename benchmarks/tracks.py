@@ -19,10 +19,10 @@ from rows import Row, record, table
 
 from posefield.common.errors import MotionError
 from posefield.locomotion import floor_plane, walking_crowd
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.model import load, perform
 from posefield.model_file.model_card import mean_accelerations
 from posefield.motion import quat, skeleton
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track, track_crowd
@@ -106,7 +106,7 @@ def walk(model: Synthesizer) -> list[Walked]:
     people, kinds = [], cases()
     for name, (times, points, angles) in kinds.items():
         people += [track.of_arrays(f"{name}#{i}", times, points, angles) for i in range(COPIES)]
-    order = CrowdOrder(len(people), fps=RATE)
+    order = WalkQuestion(count=len(people), fps=RATE)
     crowd = track_crowd.find_people(model, model.gait, order, people)
     card, done = crowd.gait.session.card, []
     for group, plan, motions in crowd.batches():

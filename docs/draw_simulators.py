@@ -11,8 +11,8 @@ from PIL import Image, ImageDraw
 import posefield
 from posefield.encode import bone_motion, character
 from posefield.encode.skinned_mesh import FULL_WEIGHT, triangles, vertex_normals
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import quat
+from posefield.question.walk_question import WalkQuestion
 from posefield.tracks import track_crowd, track_files
 
 DOCS = Path(__file__).parent
@@ -28,7 +28,7 @@ class Street:
     def __init__(self, tracks, eye, middle, lens):
         walker = posefield.load("cmu_walk").synthesizer
         people = track_files.read_tracks(DATA / tracks, skip_bad=True).tracks
-        order = CrowdOrder(len(people), 1.0, fps=15.0, take="index")
+        order = WalkQuestion(count=len(people), seconds=1.0, fps=15.0, take="index")
         crowd = track_crowd.build_crowd(walker, walker.gait, order, people)
         self.motions = list(bone_motion.character_motions(crowd))
         self.begin, self.rate, self.lens = crowd.facts["begin"], crowd.rate, lens

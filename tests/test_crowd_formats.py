@@ -13,7 +13,6 @@ from osi_utilities.tracefile.readers.single import SingleTraceReader
 import posefield
 from posefield.common.errors import InvalidField, UnknownFormat
 from posefield.encode import bone_motion, bone_tables, crowd_formats, osi_trace
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import quat
 from posefield.question.walk_question import WalkQuestion
 from posefield.tracks import track, track_crowd
@@ -45,7 +44,9 @@ def crowd(model):
     ]
 
     def build():
-        return track_crowd.build_crowd(model, model.gait, CrowdOrder(2, 1.0, fps=FPS), tracks)
+        return track_crowd.build_crowd(
+            model, model.gait, WalkQuestion(count=2, seconds=1.0, fps=FPS), tracks
+        )
 
     return build
 

@@ -13,8 +13,8 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.encode import crowd_writer
 from posefield.locomotion import floor_plane
 from posefield.locomotion.locomotion_plan import Route
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
+from posefield.question.walk_question import WalkQuestion
 from posefield.tracks import route_tracks, track_crowd, track_files
 from posefield.tracks.track import MAX_PEOPLE, of_arrays
 from posefield.tracks.track_files import TrackReading
@@ -188,7 +188,7 @@ def test_people_start_stand_and_turn_along_their_tracks(walk, tmp_path):
     late = "".join(f"{t},b,0,{3 + 0.8 * t}\n" for t in range(4, 9))
     file = write(tmp_path, "street.csv", HEAD + rows + late)
     tracks = track_files.read_tracks(file).tracks
-    crowd = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks)
+    crowd = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=2), tracks)
     motions = {}
     first = 0
     for batch in crowd.batches:
@@ -250,12 +250,12 @@ def test_a_route_that_cannot_be_walked_is_refused_by_number(walk, waypoints, spe
 def test_people_that_overlap_are_told(walk):
     meet = [Route(np.array([[0.0, z], [0.0, -z]]), 1.0) for z in (-3.0, 3.0)]
     tracks = route_tracks.tracks_of_routes(walk.gait, meet, 5.0)
-    facts = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks).facts
+    facts = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=2), tracks).facts
     seconds = [pytest.approx(2.7, abs=0.15)]
     assert facts["overlaps"] == {"pairs": 1, "first": [0], "second": [1], "seconds": seconds}
     (warning,) = [line for line in facts["warnings"] if "nearer" in line]
     assert "nearer than 0.5 m: 1, the first at 2." in warning and warning.endswith("s (0 and 1)")
-    apart = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), tracks[:1]).facts
+    apart = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=2), tracks[:1]).facts
     assert apart["overlaps"]["pairs"] == 0
 
 
@@ -264,7 +264,7 @@ def test_a_person_has_the_same_bytes_alone_and_in_a_crowd(walk):
     tracks = route_tracks.tracks_of_routes(walk.gait, routes, 4.0)
     short = replace(tracks[1], times=tracks[1].times[:150], points=tracks[1].points[:150])
     crowd = (tracks[0], short, *tracks[1:])
-    order = CrowdOrder(len(crowd), take="index")
+    order = WalkQuestion(count=len(crowd), take="index")
     together = motions_by_person(walk, order, crowd)
     assert len(together) == 3
     for track in (tracks[0], tracks[2]):
@@ -288,7 +288,7 @@ def test_slow_and_fast_samples_are_followed(walk, rate):
     times = np.arange(0.0, 6.0 + 1e-9, 1.0 / rate)
     points = np.column_stack([1.2 * times, np.zeros(len(times))])
     person = of_arrays("a", times, points)
-    crowd = track_crowd.find_people(walk, walk.gait, CrowdOrder(1), (person,))
+    crowd = track_crowd.find_people(walk, walk.gait, WalkQuestion(count=1), (person,))
     assert crowd.frames == 181
     assert crowd.people[0].path.errors.max() < 1e-6
 
@@ -296,7 +296,7 @@ def test_slow_and_fast_samples_are_followed(walk, rate):
 def test_people_are_hidden_outside_of_their_tracks(walk, tmp_path):
     late = of_arrays("late", np.array([1.0, 2.0]), np.array([[5.0, 0.0], [6.0, 0.0]]))
     whole = of_arrays("whole", np.array([0.0, 3.0]), np.array([[0.0, 0.0], [3.0, 0.0]]))
-    crowd = track_crowd.build_crowd(walk, walk.gait, CrowdOrder(2), (whole, late))
+    crowd = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=2), (whole, late))
     crowd_writer.write(crowd, tmp_path / "street.usda")
     stage = Usd.Stage.Open(str(tmp_path / "street.usda"))
     seen = [
@@ -315,7 +315,7 @@ def test_few_people_of_a_long_clock_are_in_memory_at_once(walk):
         times, points = begin + np.array([0.0, 1.0]), np.array([[0.0, 0.0], [1.0, 0.0]])
         return of_arrays(f"from {begin}", times, points)
 
-    order = CrowdOrder(4)
+    order = WalkQuestion(count=4)
     tracks = [people(begin) for begin in (0.0, 0.0, 1.0, 300.0)]
     batches = list(track_crowd.build_crowd(walk, walk.gait, order, tracks).batches)
     assert [batch.rotations.shape[:2] for batch in batches] == [(1, 9031)] * 4

@@ -21,7 +21,6 @@ from posefield.common.errors import FileError, ModelError
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import crowd_formats, formats
 from posefield.encode.formats import encoder_for
-from posefield.locomotion import walking_crowd
 from posefield.performance import composition
 from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
@@ -119,8 +118,7 @@ class Crowd:
         """
         path, question = Path(path), self.question
         crowd_formats.ending_of(path, question)
-        order = walking_crowd.from_question(question)
-        crowd = walking_feet.build_crowd(self.synthesizer, self.synthesizer.gait, order)
+        crowd = walking_feet.build_crowd(self.synthesizer, self.synthesizer.gait, question)
         crowd_formats.write(crowd, path, question, self.synthesizer.session.card.roles)
         return crowd.facts
 

@@ -36,7 +36,7 @@ from posefield.performance.script import Script, resolve_script
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
 from posefield.question.performance_question import CrowdStageQuestion, PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
-from posefield.question.walk_question import WalkQuestion
+from posefield.question.walk_question import DEFAULT_PIXELS, WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
 
@@ -59,10 +59,12 @@ def from_question(
     models: tuple[Path, ...], path: Path, stage: CrowdStageQuestion
 ) -> PerformanceCrowd:
     """Return a crowd with the stage of a question; InvalidField as for walking crowds."""
-    order = walking_crowd.from_question(WalkQuestion(**structs.asdict(stage)))
+    question = WalkQuestion(**structs.asdict(stage))
+    camera, pixels = walking_crowd.camera_of(question), question.pixels
     view = None
-    if order.camera is not None:
-        view = LevelCriteria(order.camera, order.pixels, budget=None, previous=None)
+    if camera is not None:
+        pixels = DEFAULT_PIXELS if pixels is None else pixels
+        view = LevelCriteria(camera, pixels, budget=None, previous=None)
     return PerformanceCrowd(models, path, view, stage.instancing, stage.body or DEFAULT_BODY)
 
 

@@ -29,7 +29,6 @@ from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
 from posefield.encode import crowd_formats
 from posefield.inference import session
-from posefield.locomotion import walking_crowd
 from posefield.model_file import checked_file
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
@@ -132,7 +131,6 @@ def write(
     begin, advance: called with the number of parts, and of parts that are finished. Raises
     FileError and InvalidField as `track.group` and `crowd_formats.write` do; WorkerDied.
     """
-    walking_crowd.from_question(job.question)
     job.folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=job.folder, prefix=".spool.") as name:
         spools = _Spools(job, Path(name))
@@ -179,8 +177,7 @@ def write_part(task: tuple[PartsJob, TrackShard]) -> dict[str, Any]:
     tracks = track.group([block], job.tracks, job.skip_bad)
     model = _open(job.model, job.identity)
     question = structs.replace(job.question, count=len(tracks.tracks))
-    order = walking_crowd.from_question(question)
-    crowd = track_crowd.build_crowd(model, model.gait, order, tracks.tracks, shard.begin)
+    crowd = track_crowd.build_crowd(model, model.gait, question, tracks.tracks, shard.begin)
     crowd_formats.write(crowd, path, question, model.session.card.roles)
     record = {
         "part": shard.index,

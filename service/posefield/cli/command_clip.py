@@ -157,7 +157,6 @@ def crowd(
     Each character walks on its own path at its own varying speed, or follows a trajectory.
     """
     from posefield.cli import crowd_files
-    from posefield.locomotion import walking_crowd
 
     if people_per_file is not None:
         if trajectories is None or paths or count is not None:
@@ -188,6 +187,5 @@ def crowd(
         question = structs.replace(question, count=len(routes))
         followed = route_tracks.tracks_of_routes(opened.gait, routes, question.seconds)
         tracks = TrackSet(followed, {})
-    order = walking_crowd.from_question(question)
-    facts = crowd_files.write_crowd(opened, order, question, output, tracks)
+    facts = crowd_files.write_crowd(opened, question, output, tracks)
     typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

@@ -20,7 +20,6 @@ from posefield.encode import crowd_formats
 from posefield.locomotion import gait, locomotion_plan, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import Route
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
@@ -32,7 +31,6 @@ from posefield.tracks.track_files import TrackReading
 
 def write_crowd(
     model: Synthesizer,
-    order: CrowdOrder,
     question: WalkQuestion,
     output: Path,
     tracks: TrackSet | None = None,
@@ -47,20 +45,20 @@ def write_crowd(
     crowd_formats.ending_of(output, question)
     opened = gait.fit_gait(model.session)
     if tracks is None:
-        crowd = walking_feet.build_crowd(model, opened, order)
+        crowd = walking_feet.build_crowd(model, opened, question)
     else:
-        crowd = track_crowd.build_crowd(model, opened, order, tracks.tracks)
-    feet = _FootSkateMeter(opened, order.fps)
-    watched = _with_progress(crowd, order.motions or len(crowd.motion), feet)
+        crowd = track_crowd.build_crowd(model, opened, question, tracks.tracks)
+    feet = _FootSkateMeter(opened, question.fps)
+    watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
     crowd_formats.write(watched, output, question, model.session.card.roles)
     return {
         "file": str(output),
         "model": crowd.facts["model"],
         "characters": len(crowd.motion),
-        "motions": order.motions or len(crowd.motion),
+        "motions": question.motions or len(crowd.motion),
         "frames": crowd.frames,
         "rate": crowd.rate,
-        "seed": order.seed,
+        "seed": question.seed,
         "level_shares": crowd.facts["level_shares"],
         "outside_share": crowd.facts["outside_share"],
         "feet_stand": crowd.facts.get("feet_stand"),

@@ -28,8 +28,6 @@ from posefield.http.batching import CROWD_LIMITER, run_in_thread
 from posefield.http.request import ServiceRequest, read_body
 from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.locomotion import walking_crowd
-from posefield.locomotion import walking_crowd as orders
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.clip import CrowdClip, Placement
 from posefield.question import json_decoding as bodies
@@ -231,41 +229,40 @@ def _view(body: CrowdBody) -> LevelCriteria:
     )
 
 
-def checked_order(
-    question: WalkQuestion, ending: str, card: ModelCard, settings: Settings
-) -> CrowdOrder:
-    """Return the order of a question.
+def check_size(question: WalkQuestion, ending: str, card: ModelCard, settings: Settings) -> None:
+    """Check that a crowd is within the limits of the settings.
 
     ending: extension of the format. card: of the model. Raises InvalidField for characters, poses,
     frames or bytes beyond the limits of the settings.
     """
-    order, flat = orders.from_question(question), question.instancing == "flatten"
-    if order.count > settings.crowd_limit:
-        raise InvalidField("count", f"{order.count}, expected at most {settings.crowd_limit}")
+    flat = question.instancing == "flatten"
+    if question.count > settings.crowd_limit:
+        raise InvalidField("count", f"{question.count}, expected at most {settings.crowd_limit}")
     # A flattened layer has a copy of the motion for each character.
-    copies = order.count if flat else order.motions or order.count
-    poses = walking_crowd.poses(copies, order.seconds, order.fps)
+    copies = question.count if flat else question.motions or question.count
+    poses = walking_crowd.poses(copies, question.seconds, question.fps)
     if poses > settings.crowd_poses:
         raise InvalidField(
             "count", f"{poses:.3g} poses of all motions, expected at most {settings.crowd_poses}"
         )
-    longest = walking_crowd.poses(1, order.seconds, order.fps)
+    longest = walking_crowd.poses(1, question.seconds, question.fps)
     if longest > settings.crowd_frames:
         raise InvalidField(
             "seconds", f"{longest:.6g} frames of a motion, expected at most {settings.crowd_frames}"
         )
     points = character.body_size(card.skeleton, question.body or DEFAULT_BODY)
-    motions = order.motions or order.count
-    frames = walking_crowd.frame_count(motions, order.seconds, order.fps, order.seed)
-    counts = CrowdCounts(len(card.skeleton), order.count, motions, frames, points, len(card.curves))
+    motions = question.motions or question.count
+    frames = walking_crowd.frame_count(motions, question.seconds, question.fps, question.seed)
+    counts = CrowdCounts(
+        len(card.skeleton), question.count, motions, frames, points, len(card.curves)
+    )
     size = crowd_size.file_size_bound(counts, ending, flat)
     if size > settings.output_limit:
         raise InvalidField(
             "count",
-            f"{size / 1e6:.1f} MB for {order.count} characters and {motions} motions of {frames} "
-            f"frames as {ending}, expected at most {settings.output_limit / 1e6:.1f} MB",
+            f"{size / 1e6:.1f} MB for {question.count} characters and {motions} motions of "
+            f"{frames} frames as {ending}, expected at most {settings.output_limit / 1e6:.1f} MB",
         )
-    return order
 
 
 async def answer_crowd(request: ServiceRequest) -> Response:
@@ -288,14 +285,14 @@ async def answer_walk(request: ServiceRequest) -> Response:
     """Answer with a walking crowd as USD, whose motions are computed as they are sent."""
     model, form = request.model, CROWD_FORMATS[request.format]
     question = await request.decode(WalkQuestion)
-    order = checked_order(question, form.extension, model.session.card, request.service.settings)
+    check_size(question, form.extension, model.session.card, request.service.settings)
 
     def work() -> tuple[CrowdClip, Iterator[bytes]]:
         # usd-core takes 0.12 CPU seconds to import.
         from posefield.encode import crowd_writer
 
         # The gait of a model is measured at its first use.
-        crowd = walking_feet.build_crowd(model, model.gait, order)
+        crowd = walking_feet.build_crowd(model, model.gait, question)
         body = question.body or DEFAULT_BODY
         return crowd, crowd_writer.stream(crowd, form.extension, question.instancing, body)
 

@@ -1,8 +1,8 @@
 """Crowds of walking characters: validation, plans, and motions computed on demand."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -26,11 +26,10 @@ from posefield.locomotion.stride import RelativePoses
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import contact_detection, curves, quat, skeleton
 from posefield.motion.clip import CrowdClip, Motions, Placement
-from posefield.question.motion_question import DEFAULT_VARIETY, FeetMode, LabelValue
 from posefield.question.walk_question import (
     DEFAULT_FOV,
     DEFAULT_HEIGHT,
-    WalkerTake,
+    DEFAULT_PIXELS,
     WalkQuestion,
 )
 
@@ -255,101 +254,40 @@ def mean_foot_skate(gait: Gait, rate: float) -> float:
     return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))
 
 
-MAX_CHARACTERS = 1_000_000
-"""Largest number of characters of one crowd, which may share motions."""
-DEFAULT_FPS, DEFAULT_PIXELS = 30.0, 1.0
 MOST_OVERLAPS = 20
 """Pairs of characters that overlap, the first ones, of which a crowd tells the times."""
 
 
-@dataclass(frozen=True)
-class CrowdOrder:
-    """Parameters of a walking crowd.
-
-    count: characters, each on its own path.
-    motions: number of distinct motions that the characters share, None for one each. seconds:
-    duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
-    if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
-    labels: name or weights of all characters by label set. feet: whether they stand; None where the
-    model decides. take: seed of all characters, 0 for the prediction, or "index" for a seed of its
-    own for each distinct motion. variety: size of the takes' deviations. detail: whether details
-    that no control predicts are added.
-    """
-
-    count: int
-    motions: int | None = None
-    seconds: float = 10.0
-    fps: float = DEFAULT_FPS
-    seed: int = 0
-    level: int | None = None
-    camera: Camera | None = None
-    pixels: float = DEFAULT_PIXELS
-    labels: Mapping[str, LabelValue] = field(default_factory=dict)
-    feet: FeetMode | None = None
-    take: WalkerTake = 0
-    variety: float = DEFAULT_VARIETY
-    detail: bool = False
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.count <= MAX_CHARACTERS:
-            raise InvalidField("count", f"{self.count}, expected 1 to {MAX_CHARACTERS} characters")
-        if self.level is not None and self.camera is not None:
-            raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
-        if self.motions is not None and not 1 <= self.motions <= self.count:
-            raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
-        if self.motions is not None and self.camera is not None:
-            raise InvalidField(
-                "motions", "shared by characters near and far, expected a level and no camera"
-            )
-        if not self.pixels >= 0.0:
-            raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
-
-
-def from_question(question: WalkQuestion) -> CrowdOrder:
-    """Return the order of a question."""
-    camera = None
-    if question.camera is not None:
-        fov = DEFAULT_FOV if question.fov is None else question.fov
-        height = DEFAULT_HEIGHT if question.height is None else question.height
-        camera = Camera(np.array(question.camera), fov, height)
-    return CrowdOrder(
-        count=question.count,
-        motions=question.motions,
-        seconds=question.seconds,
-        fps=question.fps,
-        seed=question.seed,
-        level=question.level,
-        camera=camera,
-        pixels=DEFAULT_PIXELS if question.pixels is None else question.pixels,
-        labels=question.labels,
-        feet=question.feet,
-        take=question.take,
-        variety=question.variety,
-        detail=question.detail,
-    )
+def camera_of(question: WalkQuestion) -> Camera | None:
+    """Return the camera of a question, which chooses the levels of detail; None without one."""
+    if question.camera is None:
+        return None
+    fov = DEFAULT_FOV if question.fov is None else question.fov
+    height = DEFAULT_HEIGHT if question.height is None else question.height
+    return Camera(np.array(question.camera), fov, height)
 
 
 def build_crowd(
-    model: NamedModel, gait: Gait, order: CrowdOrder, make: MotionMaker | None = None
+    model: NamedModel, gait: Gait, question: WalkQuestion, make: MotionMaker | None = None
 ) -> CrowdClip:
-    """Return the crowd of an order, whose motions are computed on demand.
+    """Return the crowd of a question, whose motions are computed on demand.
 
     make: computes the motions, which are as predicted by default. Raises InvalidField for
     parameters that the model or the limits do not permit.
     """
-    gait = gait.with_labels(order.labels)
-    span = order.seconds, order.fps, order.seed
-    plan = plan_random(gait, order.motions or order.count, *span)
-    levels = build_schedule(model, plan, order)
+    gait = gait.with_labels(question.labels)
+    span = question.seconds, question.fps, question.seed
+    plan = plan_random(gait, question.motions or question.count, *span)
+    levels = build_schedule(model, plan, question)
     crowd, places = crowd_of_plan(gait.session, plan, levels, make), plan.places
-    if order.motions is not None:
+    if question.motions is not None:
         # The characters reuse the motions in turn.
-        stands = collision_avoidance.initial_placement(order.count, order.seed)
+        stands = collision_avoidance.initial_placement(question.count, question.seed)
         motion = np.arange(len(stands)) % len(plan.who)
         crowd = replace(crowd, placement=stands, motion=motion)
     if not collision_avoidance.is_searchable(len(crowd.motion), plan.places.shape[1], plan.rate):
         return crowd
-    if order.motions is not None:
+    if question.motions is not None:
         places = _placed(crowd.placement, plan.relative_to_start().places[crowd.motion])
     return replace(crowd, facts={**crowd.facts, **overlap_facts(places, plan.rate)})
 
@@ -382,12 +320,16 @@ def overlap_facts(
     }
 
 
-def build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:
-    """Return the levels of detail of a plan: those of the order's camera, or one."""
-    level, coarsest = order.level or 0, len(model.session.card.levels) - 1
+def build_schedule(
+    model: NamedModel, plan: LocomotionPlan, question: WalkQuestion
+) -> LevelSchedule:
+    """Return the levels of detail of a plan: those of the question's camera, or one."""
+    level, coarsest = question.level or 0, len(model.session.card.levels) - 1
     if not 0 <= level <= coarsest:
         raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-    if order.camera is None:
+    camera = camera_of(question)
+    if camera is None:
         return locomotion_plan.constant_schedule(level, plan.phases.shape)
-    scale = locomotion_plan.scale(order.camera, plan.roots + model.rest_position, model.radius)
-    return locomotion_plan.schedule_levels(model.level_table, scale, order.pixels, order.fps)
+    scale = locomotion_plan.scale(camera, plan.roots + model.rest_position, model.radius)
+    pixels = DEFAULT_PIXELS if question.pixels is None else question.pixels
+    return locomotion_plan.schedule_levels(model.level_table, scale, pixels, question.fps)

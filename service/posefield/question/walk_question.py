@@ -12,7 +12,9 @@ from posefield.question.motion_question import DEFAULT_VARIETY, Body, FeetMode, 
 Instancing = Literal["references", "scenegraph", "flatten"]
 WalkerTake = Literal["index"] | Whole
 """Seed of all characters, or "index" for a seed of its own for each."""
-DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
+DEFAULT_FOV, DEFAULT_HEIGHT, DEFAULT_PIXELS = math.pi / 3.0, 1080.0, 1.0
+MAX_CHARACTERS = 1_000_000
+"""Largest number of characters of one crowd, which may share motions."""
 
 FieldOfView = Annotated[
     float | None,
@@ -97,3 +99,15 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             for name in ("fov", "height", "pixels"):
                 if getattr(self, name) is not None:
                     raise InvalidField(name, "given without a camera, expected only with one")
+        if not 1 <= self.count <= MAX_CHARACTERS:
+            raise InvalidField("count", f"{self.count}, expected 1 to {MAX_CHARACTERS} characters")
+        if self.level is not None and self.camera is not None:
+            raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
+        if self.motions is not None and not 1 <= self.motions <= self.count:
+            raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
+        if self.motions is not None and self.camera is not None:
+            raise InvalidField(
+                "motions", "shared by characters near and far, expected a level and no camera"
+            )
+        if self.pixels is not None and not self.pixels >= 0.0:
+            raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")

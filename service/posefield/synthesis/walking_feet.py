@@ -20,7 +20,6 @@ from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
 from posefield.locomotion.stride import RelativePoses
 from posefield.locomotion.walking_crowd import (
     POSES_PER_CALL,
-    CrowdOrder,
     MotionMaker,
     Pairs,
     PoseMaker,
@@ -30,7 +29,7 @@ from posefield.motion import hinges, skeleton
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
 from posefield.motion.contact_detection import FootContact
 from posefield.question.motion_question import MAX_TAKE
-from posefield.question.walk_question import WalkerTake
+from posefield.question.walk_question import WalkerTake, WalkQuestion
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 
 KNOT_SECONDS = 0.2
@@ -42,7 +41,7 @@ character changes its speed over seconds."""
 class WalkerTakes:
     """Takes of N distinct motions of a walking crowd.
 
-    take: as in the order. seeds (N,): 0 for the prediction. variety: size of the deviations.
+    take: as in the question. seeds (N,): 0 for the prediction. variety: size of the deviations.
     detail: whether details are added.
     """
 
@@ -75,24 +74,24 @@ class _Deviations:
         return np.asarray((1.0 - share) * first + share * second)
 
 
-def of_order(card: ModelCard, order: CrowdOrder) -> WalkerTakes | None:
-    """Return the takes of an order, or None for the prediction.
+def of_question(card: ModelCard, question: WalkQuestion) -> WalkerTakes | None:
+    """Return the takes of a question, or None for the prediction.
 
     Detail is off for a model whose file has none. Raises InvalidField for a seed or a variety out
     of range, and for a model without takes.
     """
-    take, count = order.take, order.motions or order.count
+    take, count = question.take, question.motions or question.count
     if take != "index" and not 0 <= take <= MAX_TAKE:
         raise InvalidField("take", f"{take}, expected 'index' or 0 to {MAX_TAKE}")
-    if not 0.0 <= order.variety <= 1.0:
-        raise InvalidField("variety", f"{order.variety:g}, expected 0 to 1")
+    if not 0.0 <= question.variety <= 1.0:
+        raise InvalidField("variety", f"{question.variety:g}, expected 0 to 1")
     if take:
         random_field.check_features(card.kriging, take)
-    detail = order.detail and bool(card.making.detail)
+    detail = question.detail and bool(card.making.detail)
     if not (take or detail):
         return None
     seeds = 1 + np.arange(count) if take == "index" else np.full(count, take)
-    return WalkerTakes(take, seeds, order.variety, detail)
+    return WalkerTakes(take, seeds, question.variety, detail)
 
 
 def pose_maker(
@@ -205,16 +204,16 @@ MIN_RATE = 20.0
 and a stance of one frame cannot be told from a touch."""
 
 
-def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
-    """Return the crowd of an order, whose feet stand or are as predicted.
+def build_crowd(model: Synthesizer, gait: Gait, question: WalkQuestion) -> CrowdClip:
+    """Return the crowd of a question, whose feet stand or are as predicted.
 
-    Raises InvalidField as `walking_crowd.build_crowd` and `of_order` do, and for feet
+    Raises InvalidField as `walking_crowd.build_crowd` and `of_question` do, and for feet
     that cannot stand.
     """
-    takes = of_order(model.session.card, order)
-    standing = wants_standing_feet(gait.session.card, order)
+    takes = of_question(model.session.card, question)
+    standing = wants_standing_feet(gait.session.card, question)
     make = motion_maker(model, takes, standing)
-    crowd = walking_crowd.build_crowd(model, gait, order, make)
+    crowd = walking_crowd.build_crowd(model, gait, question, make)
     facts: dict[str, Any] = {"feet_stand": standing}
     if takes is not None:
         facts["take"] = {
@@ -222,7 +221,7 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
             "variety": takes.variety,
             "detail": takes.detail,
         }
-    if order.detail and not model.session.card.making.detail:
+    if question.detail and not model.session.card.making.detail:
         facts["warnings"] = [*crowd.facts.get("warnings", ()), NO_DETAIL]
     return replace(crowd, facts={**crowd.facts, **facts})
 
@@ -242,17 +241,17 @@ def motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool) 
     return vary
 
 
-def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
+def wants_standing_feet(card: ModelCard, question: WalkQuestion) -> bool:
     """Return whether the feet of a crowd are placed.
 
     Raises InvalidField if they are asked to stand, but the model does not know their contacts, no
     leg leads to them, or the crowd has too few frames a second.
     """
-    if order.feet not in (None, "stand"):
+    if question.feet not in (None, "stand"):
         return False
-    knows_contacts, slow = bool(card.feet and foot_contacts(card)), order.fps < MIN_RATE
+    knows_contacts, slow = bool(card.feet and foot_contacts(card)), question.fps < MIN_RATE
     legs = knows_contacts and bool(choose_legs(card)[1])
-    if order.feet is None:
+    if question.feet is None:
         return legs and not slow
     if not knows_contacts:
         raise InvalidField("feet", "'stand', but this model knows no contacts of feet")
@@ -260,7 +259,7 @@ def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
         raise InvalidField("feet", "'stand', but no two bones lead to a foot of this model")
     if slow:
         raise InvalidField(
-            "feet", f"'stand' at {order.fps:g} frames a second, expected {MIN_RATE:g} or more"
+            "feet", f"'stand' at {question.fps:g} frames a second, expected {MIN_RATE:g} or more"
         )
     return True
 

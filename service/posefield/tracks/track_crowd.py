@@ -7,14 +7,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
 from posefield.locomotion import collision_avoidance, floor_plane, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH, CrowdOrder
+from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH
 from posefield.motion.clip import CrowdClip, Motions, Placement, StandingFeet
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_path, track_plan
@@ -63,7 +65,7 @@ class TrackCrowd:
 
     model: Synthesizer
     gait: Gait
-    order: CrowdOrder
+    question: WalkQuestion
     people: tuple[Person, ...]
     begin: float
     frames: int
@@ -80,22 +82,22 @@ class TrackCrowd:
         The paths have equal lengths. The plan is in the world and in the model's size; the motions
         begin at the start of their paths, and each has its person's size.
         """
-        rate, card = self.order.fps, self.gait.session.card
+        rate, card = self.question.fps, self.gait.session.card
         combinations = self.gait.labels.draw(np.array([person.number for person in people]))
         numbers = np.array([(person.phase, person.sway) for person in people])
         scales = np.array([person.scale for person in people])
         paths = [person.path for person in people]
         plan = track_plan.plan_people(self.walkers, paths, combinations, numbers, scales, rate)
-        takes = walking_feet.of_order(card, replace(self.order, count=len(people)))
+        takes = walking_feet.of_question(card, structs.replace(self.question, count=len(people)))
         if takes is not None and takes.take == "index":
             takes = replace(takes, seeds=np.array([person.take for person in people]))
         make = walking_feet.motion_maker(
-            self.model, takes, walking_feet.wants_standing_feet(card, self.order)
+            self.model, takes, walking_feet.wants_standing_feet(card, self.question)
         )
         starts = np.array([path.points[0] for path in paths]) / scales
         relative = replace(plan, places=plan.places - starts[:, None])
         world = replace(plan, places=plan.places * scales[:, None])
-        levels = walking_crowd.build_schedule(self.model, world, self.order)
+        levels = walking_crowd.build_schedule(self.model, world, self.question)
         motions = make(self.gait.session, relative, np.arange(len(people)), levels)
         size = scales.astype(np.float32)[:, None, None]
         return plan, replace(
@@ -124,39 +126,39 @@ class TrackCrowd:
 def find_people(
     model: Synthesizer,
     gait: Gait,
-    order: CrowdOrder,
+    question: WalkQuestion,
     tracks: Sequence[Track],
     begin: float | None = None,
 ) -> TrackCrowd:
     """Return the people of tracks.
 
-    order: frame rate, labels, takes, feet and seed. begin: time of the first frame, s; that of the
-    first sample by default.
+    question: of its fields, the frame rate, labels, takes, feet and seed count. begin: time of the
+    first frame, s; that of the first sample by default.
 
     Raises InvalidField for tracks that are too long or all too short.
     """
-    walking_crowd.frame_count(1, 1.0, order.fps, order.seed)
-    gait = gait.with_labels(order.labels)
+    walking_crowd.frame_count(1, 1.0, question.fps, question.seed)
+    gait = gait.with_labels(question.labels)
     if begin is None:
         begin = min(float(track.times[0]) for track in tracks)
     people, skipped = [], {}
-    poses = sum((track.times[-1] - track.times[0]) * order.fps + 1.0 for track in tracks)
+    poses = sum((track.times[-1] - track.times[0]) * question.fps + 1.0 for track in tracks)
     if poses > MAX_POSES:
         raise InvalidField("trajectories", f"{poses:.3g} poses, expected {MAX_POSES} at most")
     for track in tracks:
         cancellation.check()
-        path = track_path.follow(track, begin, order.fps)
+        path = track_path.follow(track, begin, question.fps)
         if path is None:
-            skipped[track.person] = f"shorter than two frames at {order.fps:g} frames a second"
+            skipped[track.person] = f"shorter than two frames at {question.fps:g} frames a second"
             continue
-        people.append(Person(track, path, *_draw(track.person, order.seed)))
+        people.append(Person(track, path, *_draw(track.person, question.seed)))
     if not people:
         raise InvalidField("trajectories", "all shorter than two frames, expected longer ones")
     frames = max(person.path.first + len(person.path) for person in people)
     if frames > MOST_FRAMES:
         span = f"{frames} frames from the first sample to the last"
         raise InvalidField("trajectories", f"{span}, expected {MOST_FRAMES} at most")
-    return TrackCrowd(model, gait, order, tuple(people), begin, frames, skipped)
+    return TrackCrowd(model, gait, question, tuple(people), begin, frames, skipped)
 
 
 def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
@@ -171,7 +173,7 @@ def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
 def build_crowd(
     model: Synthesizer,
     gait: Gait,
-    order: CrowdOrder,
+    question: WalkQuestion,
     tracks: Sequence[Track],
     begin: float | None = None,
 ) -> CrowdClip:
@@ -179,7 +181,7 @@ def build_crowd(
 
     begin: as of `find_people`. Raises InvalidField as `find_people` does.
     """
-    crowd = find_people(model, gait, order, tracks, begin)
+    crowd = find_people(model, gait, question, tracks, begin)
     card = crowd.gait.session.card
     people, counts = crowd.people, [len(person.path) for person in crowd.people]
     first = np.array([person.path.first for person in people])
@@ -192,7 +194,7 @@ def build_crowd(
     points = np.array([person.path.points[0] for person in people])
     return CrowdClip(
         card.skeleton,
-        order.fps,
+        question.fps,
         crowd.frames,
         Placement(floor_plane.at_height(points, np.zeros(len(points))), np.zeros(len(points))),
         np.arange(len(people)),
@@ -267,7 +269,7 @@ def shorten(lines: Sequence[str]) -> list[str]:
 
 def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:
     """Return the facts of people who overlap; none for more than can be searched."""
-    count, rate = len(crowd.people), crowd.order.fps
+    count, rate = len(crowd.people), crowd.question.fps
     if not collision_avoidance.is_searchable(count, crowd.frames, rate):
         return {}
     # Who is not there is far away from all others.
@@ -280,7 +282,7 @@ def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:
 
 def limits(crowd: TrackCrowd, person: Person) -> Iterator[str]:
     """Yield what a walker cannot do as the track does, with the time, and what it does instead."""
-    path, rate = person.path, crowd.order.fps
+    path, rate = person.path, crowd.question.fps
     speeds = np.abs(path.velocities)
     checks = [
         (speeds / MOST_SPEED, "{:.1f} m/s, faster than a walk: its feet slide", MOST_SPEED),

@@ -13,10 +13,10 @@ from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import archive_operations, crowd_operations
 from posefield.http.api.settings import Settings
 from posefield.locomotion import gait, walking_crowd
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.question import json_decoding as bodies
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion
 from posefield.question.motion_question import ClipQuestion, FileQuestion
+from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips, crowd_synthesis, walking_feet
 from posefield.synthesis.trust import grid, suggest
@@ -91,21 +91,21 @@ def crowded(model, walk):
 def planned(model, walk):
     """The plan of a crowd that walks."""
     return walking_crowd.build_crowd(
-        walk, gait.fit_gait(walk.session), CrowdOrder(count=300, seconds=10.0)
+        walk, gait.fit_gait(walk.session), WalkQuestion(count=300, seconds=10.0)
     )
 
 
 def walked(model, walk):
     """A crowd that walks, as USD."""
     made = walking_crowd.build_crowd(
-        walk, gait.fit_gait(walk.session), CrowdOrder(count=300, seconds=1.0)
+        walk, gait.fit_gait(walk.session), WalkQuestion(count=300, seconds=1.0)
     )
     return list(crowd_writer.stream(made, "usdc"))
 
 
 def stood(model, walk):
     """Motions of a crowd whose feet stand."""
-    asked = CrowdOrder(count=300, seconds=1.0, feet="stand")
+    asked = WalkQuestion(count=300, seconds=1.0, feet="stand")
     return list(walking_feet.build_crowd(walk, gait.fit_gait(walk.session), asked).batches)
 
 

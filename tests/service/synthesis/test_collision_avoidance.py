@@ -5,7 +5,7 @@ import pytest
 
 from posefield.inference import session
 from posefield.locomotion import collision_avoidance, gait, walking_crowd
-from posefield.locomotion.walking_crowd import CrowdOrder
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -64,6 +64,6 @@ def test_neighbours_begin_at_different_phases(own):
 
 
 def test_overlaps_of_shared_motions_are_told(model, own):
-    order = CrowdOrder(count=40, motions=3, seconds=10.0)
+    order = WalkQuestion(count=40, motions=3, seconds=10.0)
     found = walking_feet.build_crowd(model, own, order).facts["overlaps"]
     assert found["pairs"] > 10 and len(found["seconds"]) <= walking_crowd.MOST_OVERLAPS

@@ -11,8 +11,8 @@ from posefield.locomotion import (
     gait,
     walking_crowd,
 )
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -32,7 +32,7 @@ def own(model):
 
 def built(model, own, **asked):
     """A crowd, its facts, and its motions in one."""
-    order = CrowdOrder(**{"count": 12, "seconds": 6.0, **asked})
+    order = WalkQuestion(**{"count": 12, "seconds": 6.0, **asked})
     made = walking_feet.build_crowd(model, own, order)
     batches = list(made.batches)
     return (

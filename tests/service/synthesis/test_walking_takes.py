@@ -7,11 +7,10 @@ import pytest
 
 from posefield.feet import body_plans
 from posefield.inference import session
-from posefield.inference.level_selection import Camera
 from posefield.kriging import support
 from posefield.locomotion import floor_plane, gait, locomotion_plan, walking_crowd
-from posefield.locomotion.walking_crowd import CrowdOrder
 from posefield.motion import skeleton
+from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
@@ -53,7 +52,7 @@ def joints(card, made):
 
 def built(model, walk, **asked):
     """A crowd's facts, and its motions in one batch."""
-    order = CrowdOrder(**{"count": 8, "seconds": 3.0, **asked})
+    order = WalkQuestion(**{"count": 8, "seconds": 3.0, **asked})
     made = walking_feet.build_crowd(model, walk, order)
     (batch,) = made.batches
     return made.facts, batch
@@ -150,7 +149,7 @@ def test_feet_of_takes_stand(model, walk):
 
 
 def test_deviations_between_knots_are_those_of_the_field(model, walk):
-    order = CrowdOrder(count=6, seconds=6.0, take="index")
+    order = WalkQuestion(count=6, seconds=6.0, take="index")
     exact = _paths(model, walk, order, 0.0)
     found = _paths(model, walk, order, walking_feet.KNOT_SECONDS)
     coarse = _paths(model, walk, order, 3.0)
@@ -180,7 +179,7 @@ def test_variances_of_deviations_are_those_of_kriging(model, twins):
     assert found.var() != pytest.approx(1.5 * float(sigma) ** 2, rel=0.1)
 
 
-NEAR = Camera(np.array([-8.0, 1.7, 0.0]), 1.0472, 1080.0)
+NEAR = (-8.0, 1.7, 0.0)
 
 
 CROWDS = {
@@ -191,7 +190,7 @@ CROWDS = {
 
 
 def motions(model, walk, **asked):
-    return list(walking_feet.build_crowd(model, walk, CrowdOrder(**asked)).batches)
+    return list(walking_feet.build_crowd(model, walk, WalkQuestion(**asked)).batches)
 
 
 def skate(card, batches):
