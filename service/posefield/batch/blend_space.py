@@ -1,8 +1,9 @@
 """Blend spaces for game engines: looping clips on a grid, and what blending them costs.
 
-An engine plays the clips around a point at once, each by its weight. It keeps them in step either
-by markers, which are the times at which feet come down, or by equal shares of the cycle. `measure`
-blends as engines do, and compares poses with those of the model halfway between the grid's points.
+An engine plays the clips around a point at once, each by its weight, in step by equal shares of the
+cycle. `measure` blends in this way, and compares poses with the model's between the grid's points.
+Controls that are no axes are interpolated between the corners of the grid, as blending does: those
+that are inferred at each point jump from the typical clips of one to those of the next.
 """
 
 import hashlib
@@ -18,7 +19,7 @@ from msgspec import structs
 
 from posefield.batch import layouts, tables
 from posefield.batch.rows import Row, RowReader, parse_grid
-from posefield.batch.tables import Column, RawRow
+from posefield.batch.tables import Column, Columns, RawRow
 from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import UP, Floats, Frames, Positions, Rotations
 from posefield.motion import quat, root_bone, skeleton
@@ -58,9 +59,9 @@ class Sample:
         """Return the number of frames of a cycle."""
         return len(self.rotations) - 1
 
-    def at(self, times: Frames) -> tuple[Rotations, Positions]:
-        """Return the poses at times (S,), s, between frames as engines interpolate."""
-        frames = (times / self.duration % 1.0) * self.steps
+    def at(self, shares: Frames) -> tuple[Rotations, Positions]:
+        """Return the poses at shares (S,) of the cycle, between frames as engines interpolate."""
+        frames = (shares % 1.0) * self.steps
         before = np.minimum(frames.astype(np.int64), self.steps - 1)
         share = frames - before
         turns = quat.nlerp(self.rotations[before], self.rotations[before + 1], share)
@@ -69,59 +70,41 @@ class Sample:
 
 @dataclass(frozen=True)
 class BlendSpace:
-    """Samples at all points of a grid; the last axis varies fastest. fixed: further controls."""
+    """Samples at all points of a grid; the last axis varies fastest.
+
+    corners: all controls at the corners of the grid, in the order of samples.
+    """
 
     axes: Sequence[GridAxis]
-    fixed: Mapping[str, float]
-    samples: Sequence[Sample]
+    corners: Sequence[Mapping[str, float]]
+    samples: Sequence[Sample] = ()
 
-    @property
-    def markers(self) -> tuple[str, ...]:
-        """Return the names of the markers in the order of a cycle; none if samples differ in it."""
-        orders = [_order(sample.markers) for sample in self.samples]
-        return orders[0] if len({*orders}) == 1 else ()
+    def controls(self, point: Sequence[float]) -> dict[str, float]:
+        """Return all controls at a point of the grid."""
+        weights = _weights([axis.values[[0, -1]] for axis in self.axes], point)
+        controls = {
+            name: sum(weight * self.corners[corner][name] for corner, weight in weights.items())
+            for name in self.corners[0]
+        }
+        names = [axis.control.name for axis in self.axes]
+        return {**controls, **dict(zip(names, map(float, point), strict=True))}
 
     def weights(self, point: Sequence[float]) -> dict[int, float]:
         """Return the weight of each sample about a point of the grid, by index: bilinear."""
-        weights = {0: 1.0}
-        for axis, value in zip(self.axes, point, strict=True):
-            place = float(np.interp(value, axis.values, np.arange(len(axis.values))))
-            before = min(int(place), len(axis.values) - 2)
-            ends = {before: before + 1.0 - place, before + 1: place - before}
-            weights = {
-                index * len(axis.values) + end: weight * share
-                for (index, weight), (end, share) in product(weights.items(), ends.items())
-                if share > 0.0
-            }
-        return weights
+        return _weights([axis.values for axis in self.axes], point)
 
-    def blend(
-        self, point: Sequence[float], times: Frames, leader: Sample, synchronisation: str
-    ) -> tuple[Rotations, Positions]:
-        """Return the blended poses at times (S,), s, of a leader that the samples follow."""
+    def blend(self, point: Sequence[float], shares: Frames) -> tuple[Rotations, Positions]:
+        """Return the blended poses at shares (S,) of the cycle."""
         turns: list[Floats] = []
         shifts: list[Floats] = []
         for index, weight in self.weights(point).items():
-            sample = self.samples[index]
-            rotations, translations = sample.at(
-                self._followed(times, leader, sample, synchronisation)
-            )
+            rotations, translations = self.samples[index].at(shares)
             if turns:
                 dots = np.sum(rotations * turns[0], axis=-1, keepdims=True)
                 rotations = np.where(dots < 0.0, -rotations, rotations)
             turns.append(weight * rotations)
             shifts.append(weight * translations)
         return quat.normalize(np.sum(turns, axis=0)), np.sum(shifts, axis=0)
-
-    def _followed(
-        self, times: Frames, leader: Sample, follower: Sample, synchronisation: str
-    ) -> Frames:
-        """Return the times (S,), s, of a follower at those of its leader."""
-        if synchronisation == "phase":
-            return times / leader.duration * follower.duration
-        places, ticks = _ticks(leader, self.markers), _ticks(follower, self.markers)
-        followed: Frames = np.interp(times, places, ticks)
-        return followed
 
     def speed(self, point: Sequence[float]) -> float:
         """Return the speed of the blended root, m/s: engines blend lengths and travels."""
@@ -130,30 +113,32 @@ class BlendSpace:
         return float(ways / sum(w * self.samples[i].duration for i, w in weights))
 
 
-def _order(markers: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the names of markers by time, begun with the first in the alphabet."""
-    names = sorted(markers, key=lambda name: markers[name])
-    start = names.index(min(names)) if names else 0
-    return (*names[start:], *names[:start])
-
-
-def _ticks(sample: Sample, names: Sequence[str]) -> Annotated[Floats, "ticks"]:
-    """Return the times, s, of markers in this order over the cycles before, at and after one."""
-    times = np.array([sample.markers[name] for name in names])
-    later = times + sample.duration * (times < times[0])
-    return np.concatenate([later + cycle * sample.duration for cycle in (-1, 0, 1)])
+def _weights(axes: Sequence[Floats], point: Sequence[float]) -> dict[int, float]:
+    """Return the weights of the points of a grid, by index, that interpolate at a point."""
+    weights = {0: 1.0}
+    for values, value in zip(axes, point, strict=True):
+        place = float(np.interp(value, values, np.arange(len(values))))
+        before = min(int(place), len(values) - 2)
+        ends = {before: before + 1.0 - place, before + 1: place - before}
+        weights = {
+            index * len(values) + end: weight * share
+            for (index, weight), (end, share) in product(weights.items(), ends.items())
+            if share > 0.0
+        }
+    return weights
 
 
 def open_grid(
     model: Synthesizer, source: RowReader, grid: Sequence[str]
-) -> tuple[list[GridAxis], dict[str, float], RowReader]:
-    """Return the axes of a blend space, its fixed controls, and the rows named by their places.
+) -> tuple[BlendSpace, RowReader]:
+    """Return a blend space without samples, and their rows, which are named by their places.
 
     grid: texts of which the source was opened. Raises InvalidField for what engines cannot blend.
     """
     card = model.session.card
     controls = {control.name: control for control in card.controls}
-    columns = parse_grid(grid, tables.table_columns(card))
+    table = tables.table_columns(card)
+    columns = parse_grid(grid, table)
     axes, fixed = [], {}
     for column, texts in columns:
         if column.group != "controls":
@@ -171,20 +156,29 @@ def open_grid(
     count = int(np.prod([len(axis.values) for axis in axes]))
     if count > MOST_SAMPLES:
         raise InvalidField("grid", f"{count} clips, expected at most {MOST_SAMPLES}")
+    names = [axis.control.name for axis in axes]
+    corners = []
+    for ends in product(*(axis.values[[0, -1]].tolist() for axis in axes)):
+        corner = {**fixed, **dict(zip(names, ends, strict=True))}
+        question = structs.replace(source.question, controls=corner)
+        corners.append({**model.question(question).controls, **corner})
+    space = BlendSpace(axes, corners)
     digest = hashlib.sha256(f"blend space {source.digest}".encode()).hexdigest()
-    raw = partial(_rows_by_place, source, [column for column, _ in columns])
-    return axes, fixed, replace(source, raw=raw, has_names=True, digest=digest)
+    raw = partial(_rows_by_place, source, space, table)
+    return space, replace(source, raw=raw, has_names=True, digest=digest)
 
 
-def _rows_by_place(source: RowReader, columns: Sequence[Column]) -> Iterator[RawRow]:
+def _rows_by_place(source: RowReader, space: BlendSpace, columns: Columns) -> Iterator[RawRow]:
     """Yield the rows of a grid with a name of their values, such as speed1.2_turn10."""
     for location, cells in source.raw():
         if isinstance(cells, QueryError):
             raise cells
-        values = list(cells)
-        name = "_".join(f"{column.name}{float(text):g}" for column, text in values)
+        values = {column.name: float(text) for column, text in cells}
+        name = "_".join(f"{control}{value:g}" for control, value in values.items())
         named = (Column("name"), re.sub(r"[^A-Za-z0-9._-]", "_", name))
-        yield location, [named, *values]
+        controls = space.controls([values[axis.control.name] for axis in space.axes])
+        given = [(columns[f"controls/{key}"], repr(value)) for key, value in controls.items()]
+        yield location, [named, *given]
 
 
 def synthesize(model: Synthesizer, rows: Sequence[Row[ClipQuestion]]) -> list[Sample]:
@@ -246,44 +240,13 @@ def measure(model: Synthesizer, space: BlendSpace, row: Row[ClipQuestion]) -> di
     ]
     indices = [i for i in product(*(range(len(half)) for half in halves)) if any(k % 2 for k in i)]
     points = [[float(half[k]) for half, k in zip(halves, i, strict=True)] for i in indices]
-    names = [axis.control.name for axis in space.axes]
     questions = [
-        structs.replace(
-            row.question,
-            controls={**space.fixed, **dict(zip(names, point, strict=True))},
-            extrapolate="ok",
-        )
+        structs.replace(row.question, controls=space.controls(point), extrapolate="ok")
         for point in points
     ]
     truths = synthesize(model, [replace(row, question=question) for question in questions])
-    speeds = [abs(space.speed(p) - truth.speed) for p, truth in zip(points, truths, strict=True)]
-    errors: dict[str, Any] = {"speed": round(max(speeds), 4)}
-    compared = list(zip(points, truths, strict=True))
-    in_step = [pair for pair in compared if _order(pair[1].markers) == space.markers]
-    for name, pairs in (("markers", in_step if space.markers else []), ("phase", compared)):
-        if pairs:
-            errors[name] = _statistics(space, pairs, name)
-    return errors
-
-
-def _distances(
-    space: BlendSpace, point: Sequence[float], truth: Sample, synchronisation: str
-) -> Annotated[Floats, "frames joints"]:
-    """Return the distances (F, J), m, of blended joints from the model's."""
-    times = np.arange(truth.steps) / truth.steps * truth.duration
-    blended = space.blend(point, times, truth, synchronisation)
-    exact = truth.rotations[:-1], truth.translations[:-1]
-    parents = truth.joints.parents
-    gaps = skeleton.positions(parents, *blended) - skeleton.positions(parents, *exact)
-    distances: Floats = np.linalg.norm(gaps, axis=-1)
-    return distances
-
-
-def _statistics(
-    space: BlendSpace, pairs: Sequence[tuple[Sequence[float], Sample]], synchronisation: str
-) -> dict[str, Any]:
-    """Return the errors at points with the model's samples, cm, and where the largest is."""
-    distances = [_distances(space, *pair, synchronisation) for pair in pairs]
+    pairs = [*zip(points, truths, strict=True)]
+    distances = [_distances(space, *pair) for pair in pairs]
     together = np.concatenate([gaps.ravel() for gaps in distances])
     largest = int(np.argmax([gaps.max() for gaps in distances]))
     frame, joint = np.unravel_index(int(np.argmax(distances[largest])), distances[largest].shape)
@@ -296,7 +259,20 @@ def _statistics(
         "worst_at": list(point),
         "worst_joint": truth.joints.names[joint],
         "worst_phase": round(float(frame) / truth.steps, 4),
+        "speed": round(max(abs(space.speed(at) - truth.speed) for at, truth in pairs), 4),
     }
+
+
+def _distances(
+    space: BlendSpace, point: Sequence[float], truth: Sample
+) -> Annotated[Floats, "frames joints"]:
+    """Return the distances (F, J), m, of blended joints from the model's."""
+    blended = space.blend(point, np.arange(truth.steps) / truth.steps)
+    exact = truth.rotations[:-1], truth.translations[:-1]
+    parents = truth.joints.parents
+    gaps = skeleton.positions(parents, *blended) - skeleton.positions(parents, *exact)
+    distances: Floats = np.linalg.norm(gaps, axis=-1)
+    return distances
 
 
 def document(
@@ -316,21 +292,20 @@ def document(
             {"name": a.control.name, "unit": a.control.unit, "values": a.values.tolist()}
             for a in space.axes
         ],
-        "fixed": dict(space.fixed),
         "fps": question.fps,
         "root": root,
-        "markers": list(space.markers),
         "error": errors,
         "samples": [
             {
                 "file": layouts.path(index, row.name, row.format),
                 "at": list(place),
+                "controls": space.controls(place),
                 "duration": sample.duration,
                 "frames": sample.steps + 1,
                 "speed": sample.speed,
                 "turn_rate": sample.turn / sample.duration,
                 "root_motion": {"x": sample.travel[0], "z": sample.travel[1], "turn": sample.turn},
-                "markers": {name: sample.markers[name] for name in space.markers},
+                "markers": sample.markers,
             }
             for index, (row, place, sample) in enumerate(
                 zip(rows, places, space.samples, strict=True)
@@ -339,23 +314,16 @@ def document(
     }
 
 
-WAYS = {"markers": "in step by the markers", "phase": "in step by shares of the cycle"}
-
-
 def sentences(facts: Mapping[str, Any]) -> Iterator[str]:
     """Yield what a user should know of a blend space's errors."""
-    if not facts["markers"]:
-        yield "no markers: feet do not come down in one order in all clips, or are not known"
     error = facts["error"]
-    for synchronisation, way in WAYS.items():
-        if (numbers := error.get(synchronisation)) is not None:
-            at = ", ".join(
-                f"{axis['name']} {value:g}"
-                for axis, value in zip(facts["axes"], numbers["worst_at"], strict=True)
-            )
-            yield (
-                f"{way}: {numbers['rms_cm']:.2f} cm from the model between grid points (root mean "
-                f"square; 99 % below {numbers['p99_cm']:.1f} cm, at most {numbers['worst_cm']:.1f} "
-                f"cm: {numbers['worst_joint']} at {at})"
-            )
+    at = ", ".join(
+        f"{axis['name']} {value:g}"
+        for axis, value in zip(facts["axes"], error["worst_at"], strict=True)
+    )
+    yield (
+        f"poses: {error['rms_cm']:.2f} cm from the model between grid points (root mean square; "
+        f"99 % below {error['p99_cm']:.1f} cm, at most {error['worst_cm']:.1f} cm: "
+        f"{error['worst_joint']} at {at})"
+    )
     yield f"speed: at most {error['speed']:.3f} m/s from the model between grid points"

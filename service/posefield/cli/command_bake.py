@@ -1,6 +1,7 @@
 """The `posefield bake` command: a blend space of looping clips for game engines."""
 
 import hashlib
+from dataclasses import replace
 from typing import Annotated
 
 import orjson
@@ -8,7 +9,6 @@ import typer
 from msgspec import structs
 
 from posefield.batch import blend_space, layouts, run
-from posefield.batch.blend_space import BlendSpace
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.rows import Row, RowFault, open_source
 from posefield.cli import command_export
@@ -52,13 +52,13 @@ def bake(
     opened = model_registry.open_model(model.stem, model, content)
     question = structs.replace(question, loop=True, root=question.root or "bone")
     source = open_source(opened, form, question, grid=grid)
-    axes, fixed, source = blend_space.open_grid(opened, source, grid)
+    space, source = blend_space.open_grid(opened, source, grid)
     rows: list[Row[ClipQuestion]] = []
     for row in source.rows():
         if isinstance(row, RowFault):
             raise InvalidField("grid", f"{row.place}: {row.message}")
         rows.append(row)
-    space = BlendSpace(axes, fixed, blend_space.synthesize(opened, rows))
+    space = replace(space, samples=blend_space.synthesize(opened, rows))
     facts = blend_space.document(opened, space, rows, blend_space.measure(opened, space, rows[0]))
     text = orjson.dumps(facts, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
     job = ExportJob(

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import exporting
 import numpy as np
@@ -57,25 +58,15 @@ def sampled(poses, share):
     return turns, (1 - u) * translations[before] + u * translations[before + 1]
 
 
-def followed(share, leader, follower):
-    """Share of a follower's cycle between the markers between which the leader is."""
-    leading, following = ([*entry, entry[0] + 1.0] for entry in (leader, follower))
-    if share < leading[0]:
-        share += 1.0
-    step = 0 if share < leading[1] else 1
-    part = (share - leading[step]) / (leading[step + 1] - leading[step])
-    return following[step] + part * (following[step + 1] - following[step])
+def rms_of_blend(files, truth, delay=0.0):
+    """Root mean square distance, cm, of two files blended half and half from a third.
 
-
-def rms_of_blend(files, shares, truth, markers):
-    """Root mean square distance, cm, of two files blended half and half from a third."""
+    delay: of the first of the two, in shares of its cycle.
+    """
     poses, exact = [local_poses(file) for file in files], local_poses(truth)
     squares = []
-    for share in shares:
-        (first, low), (second, high) = (
-            sampled(pose, followed(share, markers[-1], own))
-            for pose, own in zip(poses, markers, strict=False)
-        )
+    for share in np.arange(len(exact[0]) - 1) / (len(exact[0]) - 1):
+        (first, low), (second, high) = sampled(poses[0], share - delay), sampled(poses[1], share)
         second = second * np.sign(np.sum(first * second, axis=-1, keepdims=True))
         turns = (first + second) / np.linalg.norm(first + second, axis=-1, keepdims=True)
         wanted = sampled(exact, share)
@@ -85,38 +76,26 @@ def rms_of_blend(files, shares, truth, markers):
     return 100.0 * np.sqrt(np.mean(squares))
 
 
-@pytest.mark.parametrize("synchronisation", ["markers", "phase"])
-def test_another_reader_of_the_files_measures_the_stated_error(
-    space, posefield, tmp_path, synchronisation
-):
+def test_another_reader_of_the_files_measures_the_stated_error(space, posefield, tmp_path):
     folder, facts = space
-    middle = ("-c", "speed=1.3", "-c", "turn=2", "--loop", "--root", "bone")
-    posefield("clip", "cmu_walk", *middle, "-o", tmp_path / "middle.glb")
-    # The middle of a grid of three has the markers of the model between the two.
-    posefield(
-        *("bake", "cmu_walk", "--grid", "speed=1.0:1.6:3", "--grid", "turn=2"),
-        *("-o", tmp_path / "three", "--workers", "1"),
-    )
-    truth = json.loads((tmp_path / "three/blendspace.json").read_text())["samples"][1]
-    samples = [*facts["samples"], truth]
-    markers = [[time / s["duration"] for time in s["markers"].values()] for s in samples]
-    if synchronisation == "phase":
-        markers = [[0.0, 0.5]] * 3
+    ends = [sample["controls"] for sample in facts["samples"]]
+    middle = [f"{name}={(ends[0][name] + ends[1][name]) / 2}" for name in ends[0]]
+    words = [word for pair in middle for word in ("-c", pair)]
+    truth = tmp_path / "middle.glb"
+    posefield("clip", "cmu_walk", *words, "--loop", "--root", "bone", "-o", truth)
     files = [folder / entry["file"] for entry in facts["samples"]]
-    shares = np.arange(truth["frames"] - 1) / (truth["frames"] - 1)
-    measured = rms_of_blend(files, shares, tmp_path / "middle.glb", markers)
-    stated = facts["error"][synchronisation]["rms_cm"]
-    assert measured == pytest.approx(stated, abs=NEAR)
+    stated = facts["error"]["rms_cm"]
+    assert rms_of_blend(files, truth) == pytest.approx(stated, abs=NEAR)
     # Out of step by a twentieth of the cycle, the blend is wrong by centimetres.
-    shifted = [[m + 0.05 for m in markers[0]], markers[1], markers[2]]
-    assert rms_of_blend(files, shares, tmp_path / "middle.glb", shifted) > 1.5 * stated
+    assert rms_of_blend(files, truth, delay=0.05) > 1.5 * stated
 
 
 def test_samples_have_what_engines_need(space):
     folder, facts = space
     assert [axis["name"] for axis in facts["axes"]] == ["speed"]
-    assert (facts["fixed"], facts["root"]) == ({"turn": 2.0}, "bone")
+    assert facts["root"] == "bone"
     for sample in facts["samples"]:
+        assert (sample["controls"]["speed"], sample["controls"]["turn"]) == (sample["at"][0], 2.0)
         motion = motion_readers.read(folder / sample["file"])
         assert len(motion.rotations) == sample["frames"]
         assert sample["duration"] == pytest.approx((sample["frames"] - 1) / facts["fps"])
@@ -146,11 +125,14 @@ def test_a_finer_grid_is_nearer_and_five_by_five_keeps_the_promise(bake, tmp_pat
         facts = json.loads((tmp_path / f"walk{count}/blendspace.json").read_text())
         errors[count] = facts["error"]
         assert code == 0
-        assert f"{facts['error']['phase']['rms_cm']:.2f} cm from the model between" in out
+        assert f"{facts['error']['rms_cm']:.2f} cm from the model between" in out
     guide = (ROOT / "docs/guide/blend-spaces.md").read_text()
-    assert "".join(out.splitlines(keepends=True)[:3]) in guide
-    for way in ("markers", "phase"):
-        assert errors[5][way]["rms_cm"] < min(1.0, 0.9 * errors[3][way]["rms_cm"])
+    assert "".join(out.splitlines(keepends=True)[:2]) in guide
+    assert f"within {errors[3]['worst_cm']:.1f} cm" in guide
+    assert errors[5]["worst_cm"] < 2.0 < errors[3]["worst_cm"]
+    strides = np.reshape([s["controls"]["stride_length"] for s in facts["samples"]], (5, 5))
+    assert np.diff(strides, 2, axis=0) == pytest.approx(np.zeros((3, 5)), abs=1e-9)
+    assert np.diff(strides, 2, axis=1) == pytest.approx(np.zeros((5, 3)), abs=1e-9)
 
 
 def test_a_bake_that_was_damaged_is_mended_with_the_same_bytes(bake, tmp_path):
@@ -187,8 +169,12 @@ def test_what_cannot_be_baked_is_refused_and_nothing_is_written(bake, tmp_path, 
 
 
 def test_weights_are_bilinear_and_samples_stay_themselves():
-    control = type("Control", (), {"name": "c"})()
-    axes = [blend_space.GridAxis(control, np.array(values)) for values in ([0.0, 2.0], [0.0, 1.0])]
-    grid = blend_space.BlendSpace(axes, {}, [])
-    assert grid.weights([0.5, 0.25]) == pytest.approx({0: 0.5625, 1: 0.1875, 2: 0.1875, 3: 0.0625})
-    assert grid.weights([2.0, 1.0]) == {3: 1.0}
+    axes = [
+        blend_space.GridAxis(SimpleNamespace(name=name), np.array(values))
+        for name, values in (("a", [0.0, 0.5, 2.0]), ("b", [0.0, 1.0]))
+    ]
+    corners = [{"a": 0.0, "b": 0.0, "further": value} for value in (0.0, 1.0, 2.0, 5.0)]
+    grid = blend_space.BlendSpace(axes, corners)
+    assert grid.weights([1.25, 0.25]) == pytest.approx({2: 0.375, 3: 0.125, 4: 0.375, 5: 0.125})
+    assert grid.weights([2.0, 1.0]) == {5: 1.0}
+    assert grid.controls([1.0, 0.5]) == {"a": 1.0, "b": 0.5, "further": 2.0}
