@@ -39,8 +39,8 @@ export class ClipView implements View {
     this.#figure.wear(panel.state.body);
     scene.root.add(this.#figure.group);
     scene.frame();
-    this.ready = this.#compute();
-    scene.add((seconds) => this.#draw(seconds), this.#end.signal);
+    const { signal } = this.#end;
+    this.ready = this.#compute().then(() => scene.add((seconds) => this.#draw(seconds), signal));
   }
 
   change(): void {
@@ -70,8 +70,7 @@ export class ClipView implements View {
   }
 
   #draw(seconds: number): boolean {
-    const clip = this.#clip;
-    if (!clip) return true;
+    const clip = this.#clip!;
     const whole = clip.duration + (this.#stage.model.card.cyclic ? 0 : PAUSE);
     this.#time = (this.#time + seconds) % whole;
     const out = sample(pose(clip.names.length), clip, Math.min(this.#time, clip.duration));

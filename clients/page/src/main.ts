@@ -8,7 +8,6 @@ import * as characters from "../../viewer/src/character.ts";
 import { Scene } from "../../viewer/src/scene.ts";
 import * as theme from "../../viewer/src/theme.ts";
 import { ClipView } from "./clip-view.ts";
-import { glb, save } from "./download.ts";
 import { Panel } from "./panel.ts";
 import { WalkView } from "./walk-view.ts";
 
@@ -45,10 +44,12 @@ function tell(fault: unknown): void {
 }
 
 async function open(entries: readonly Entry[], entry: Entry): Promise<void> {
-  const [model, skin] = await Promise.all([
-    ort.then((build) => load(entry.model, { ort: build })),
+  const [build, content, skin] = await Promise.all([
+    ort,
+    bytes(entry.model),
     bytes(entry.character),
   ]);
+  const model = await load(content, { ort: build });
   const character = characters.read(skin);
   const { skeleton } = model.card;
   const standing = { ...skeleton, offsets: [entry.root, ...skeleton.offsets.slice(1)] };
@@ -74,7 +75,8 @@ async function open(entries: readonly Entry[], entry: Entry): Promise<void> {
       told.textContent = walks
         ? "Arrow keys or W A D walk and turn, Shift walks slowly; click the ground to walk there."
         : `${model.card.description}`;
-      performance.mark("moving");
+      // The frame after the first drawing.
+      requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("moving")));
     }, tell);
   };
   show();
@@ -86,6 +88,7 @@ async function exported(
   card: ModelCard,
   character: characters.Character,
 ) {
+  const { glb, save } = await import("./download.ts");
   const clip = await model.clip(panel.state.controls, { ...panel.options, fps: 60 });
   save(await glb(card, clip, character), `${model.card.name}.glb`);
 }

@@ -21,8 +21,6 @@ export interface Listeners {
   readonly download: () => void;
 }
 
-const PERFORMER = "performer";
-
 export class Panel {
   readonly state: PageState;
   readonly #form: HTMLFormElement;
@@ -41,13 +39,8 @@ export class Panel {
       ...{ view: "clip", count: 1 },
     };
     form.replaceChildren();
-    if (models.length > 1)
-      this.#choice(
-        "Model",
-        models.map(({ name }) => name),
-        opened.name,
-        listeners.open,
-      );
+    const names = models.map(({ name }) => name);
+    if (names.length > 1) this.#choice("Model", names, opened.name, listeners.open);
     if (isWalk(model))
       this.#choice("View", ["clip", "walk"], "clip", (view) => {
         this.state.view = view as PageState["view"];
@@ -61,7 +54,7 @@ export class Panel {
           listeners.change();
         },
       });
-    const performers = card.labels.find(({ name }) => name === PERFORMER)?.names ?? [];
+    const performers = card.labels.find(({ name }) => name === "performer")?.names ?? [];
     if (performers.length)
       this.#choice("Performer", ["", ...performers], "", (name) => {
         this.state.performer = name;

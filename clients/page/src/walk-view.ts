@@ -47,6 +47,7 @@ export class WalkView implements View {
     const { scene, model, card, character, panel } = this.#stage;
     const { count, body } = panel.state;
     const walkers = await model.walkers(count, panel.options);
+    if (this.#end.signal.aborted) return;
     this.#figures = Array.from({ length: count }, (_, index) => {
       const side = Math.ceil(Math.sqrt(count));
       const place = [index % side, Math.floor(index / side)].map((step) => step * APART);

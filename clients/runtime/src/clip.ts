@@ -64,20 +64,20 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
   if (options.loop && !card.cyclic)
     throw new InvalidField("loop", "true, but this model's last pose does not lead into its first");
   const stands = wantsStandingFeet(card, options);
-  const whole = model.checkDuration((await session.run(point, [], "duration")).duration[0]!);
+  const names = [
+    ...(["rotations", "root_position", "bone_offsets", "duration", "sigma", "travel"] as const),
+    ...(stands ? (["contacts"] as const) : []),
+    ...(card.curves.length ? (["curves"] as const) : []),
+  ];
+  // The same part of the graph as below: to open another one takes longer than to run it.
+  const whole = model.checkDuration((await session.run(point, [0], ...names)).duration[0]!);
   const { times, duration } = await frameTimes(model, point, whole, rate, options);
   const inPlace = options.root === "in_place" && card.root === "travelling";
   const cyclic = card.cyclic;
   const steps = clamp(roundEven(whole * PLAN_RATE), FEWEST_STEPS, MOST_STEPS);
   const count = stands ? steps + Number(!cyclic) : 0;
   const planTimes = Array.from({ length: count }, (_, step) => step * (whole / steps));
-  const outputs = await session.run(
-    point,
-    [...times, ...planTimes, 0, AFTER_END],
-    ...(["rotations", "root_position", "bone_offsets", "duration", "sigma", "travel"] as const),
-    ...(stands ? (["contacts"] as const) : []),
-    ...(card.curves.length ? (["curves"] as const) : []),
-  );
+  const outputs = await session.run(point, [...times, ...planTimes, 0, AFTER_END], ...names);
   const joints = card.skeleton.names.length;
   const frames = times.length;
   const rotations = Float64Array.from(outputs.rotations.subarray(0, 4 * joints * frames));

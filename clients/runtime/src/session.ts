@@ -131,6 +131,8 @@ export class Session {
     try {
       return await this.#ort.InferenceSession.create(content, {
         executionProviders: this.#providers,
+        // Further optimisation takes as long as forty runs, and makes them no quicker.
+        graphOptimizationLevel: "basic",
         logSeverityLevel: 3,
       });
     } catch (fault) {

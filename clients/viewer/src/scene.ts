@@ -29,7 +29,6 @@ export class Scene {
   readonly camera = new PerspectiveCamera(38, 1, 0.05, 500);
   readonly renderer: WebGLRenderer;
   readonly orbit: OrbitControls;
-  readonly #software = isSoftware();
   readonly #quality: Quality;
   readonly #steps = new Set<Step>();
   readonly #ground = new Ground();
@@ -40,9 +39,12 @@ export class Scene {
   #last = 0;
 
   constructor(host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: !this.#software });
-    this.#quality = new Quality(this.renderer, this.#software, () => this.redraw());
-    if (this.#software) this.#sun.shadow.mapSize.set(512, 512);
+    const plain = new WebGLRenderer({ antialias: false });
+    const software = isSoftware(plain.getContext());
+    if (!software) plain.forceContextLoss();
+    this.renderer = software ? plain : new WebGLRenderer({ antialias: true });
+    this.#quality = new Quality(this.renderer, software, () => this.redraw());
+    if (software) this.#sun.shadow.mapSize.set(512, 512);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     const canvas = this.renderer.domElement;
@@ -64,14 +66,15 @@ export class Scene {
 
   /** Call the step before each drawing, until the signal. */
   add(step: Step, signal: AbortSignal): void {
+    if (signal.aborted) return;
     this.#steps.add(step);
     signal.addEventListener("abort", () => this.#steps.delete(step));
     this.redraw();
   }
 
-  /** Draw once in the next frame, and on while a step asks for it. */
+  /** Draw once in the next frame, and on while a step asks for it; an empty stage is not drawn. */
   redraw(): void {
-    if (this.#asked) return;
+    if (this.#asked || !this.#steps.size) return;
     this.#asked = true;
     requestAnimationFrame((now) => this.#draw(now));
   }
@@ -241,11 +244,9 @@ const FAST = 20;
 const REST = 300;
 
 /** Tell whether a processor draws, not a graphics card. */
-function isSoftware(): boolean {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const known = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = gl && known ? String(gl.getParameter(known.UNMASKED_RENDERER_WEBGL)) : "";
-  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+function isSoftware(gl: WebGLRenderingContext | WebGL2RenderingContext): boolean {
+  const known = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = known ? String(gl.getParameter(known.UNMASKED_RENDERER_WEBGL)) : "";
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
 
