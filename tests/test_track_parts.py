@@ -7,6 +7,12 @@ import time
 
 import numpy as np
 import pytest
+from clusters import started
+
+import posefield
+from posefield.question.walk_question import WalkQuestion
+from posefield.tracks import track_crowd
+from posefield.tracks.track import of_arrays
 
 COUNT, SIZE = 7, 3
 NAMES = ["00000.bones.npz", "00001.bones.npz", "00002.bones.npz"]
@@ -29,6 +35,11 @@ def command(tracks, output, *words):
     options = ["--trajectories", str(tracks), "--people-per-file", str(SIZE), "--take", "index"]
     words = ["crowd", "cmu_walk", *options, "-o", str(output), "--json", *words]
     return [sys.executable, "-m", "posefield", *words]
+
+
+def without_parts(words):
+    at = words.index("--people-per-file")
+    return words[:at] + words[at + 2 :]
 
 
 def run(*words):
@@ -57,8 +68,7 @@ def test_parts_hold_the_people_of_one_crowd_on_one_clock(whole, tmp_path):
         f"p{person}" for person in range(COUNT)
     ]
     tracks = table(tmp_path / "tracks.csv")
-    words = command(tracks, tmp_path / "all.bones.npz")
-    del words[words.index("--people-per-file") : words.index("--people-per-file") + 2]
+    words = without_parts(command(tracks, tmp_path / "all.bones.npz"))
     subprocess.run(words, check=True, capture_output=True)
     with np.load(tmp_path / "all.bones.npz") as one:
         parts = [dict(np.load(folder / name)) for name in NAMES]
@@ -92,12 +102,40 @@ def test_a_run_that_was_killed_resumes_with_the_same_bytes(whole, tmp_path):
 
 
 @pytest.mark.system
+def test_parts_on_a_cluster_are_those_of_one_process(whole, tmp_path):
+    folder, _ = whole
+    tracks = table(tmp_path / "tracks.csv")
+    with started(tmp_path, 2) as cluster:
+        run(tracks, tmp_path / "people.bones.npz", "--scheduler", cluster.address)
+    assert contents(tmp_path / "people") == contents(folder)
+
+
+@pytest.mark.system
 def test_unusable_people_are_refused_or_named(tmp_path):
-    tracks = table(tmp_path / "tracks.csv", jump=(4,))
-    failed = subprocess.run(
-        command(tracks, tmp_path / "a.osi"), capture_output=True, text=True, check=False
-    )
+    tracks = table(tmp_path / "tracks.csv", jump=(0, 3, 4, 5))
+    words = command(tracks, tmp_path / "a.osi")
+    failed = subprocess.run(words, capture_output=True, text=True, check=False)
     assert failed.returncode == 3
-    assert "person 'p4': jumps" in failed.stderr
-    report = run(tracks, tmp_path / "a.osi", "--skip-bad")
-    assert list(report["skipped"]) == ["p4"]
+    assert "person 'p0': jumps" in failed.stderr
+    assert list((tmp_path / "a").iterdir()) == []
+    report = run(tracks, tmp_path / "a.bones.npz", "--skip-bad")
+    assert list(report["skipped"]) == ["p0", "p3", "p4", "p5"]
+    # A part of nobody has no file, and the clock begins with the first who is there.
+    assert [part["file"] for part in report["parts"]] == [NAMES[0], None, NAMES[2]]
+    words = [*without_parts(command(tracks, tmp_path / "all.bones.npz")), "--skip-bad"]
+    subprocess.run(words, check=True, capture_output=True)
+    with np.load(tmp_path / "all.bones.npz") as one:
+        times = np.concatenate([np.load(tmp_path / "a" / NAMES[part])["time"] for part in (0, 2)])
+        assert report["begin"] == one["time"].min() == 0.5
+        np.testing.assert_array_equal(times, one["time"])
+
+
+def test_the_worst_limits_come_first():
+    people = [
+        of_arrays(f"p{speed}", np.arange(4.0), np.outer(np.arange(4.0), [speed, 0.0]))
+        for speed in (3.0, 1.0, 5.0, 4.0)
+    ]
+    walk = posefield.load("cmu_walk").synthesizer
+    facts = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=4), people).facts
+    said = [line for line in facts["warnings"] if "faster than a walk" in line]
+    assert [line.split("'")[1] for line in said] == ["p5.0", "p4.0", "p3.0"]

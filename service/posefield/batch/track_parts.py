@@ -10,7 +10,7 @@ is missing, so the same command resumes after a kill.
 
 import hashlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +18,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import orjson
 from msgspec import structs
 
@@ -33,14 +32,17 @@ from posefield.model_file import checked_file
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track, track_crowd, track_files
-from posefield.tracks.track import MAX_PEOPLE, TrackRows
+from posefield.tracks.track import MAX_PEOPLE, Track, TrackRows
 from posefield.tracks.track_files import TrackReading
 
 MANIFEST = "manifest.json"
 ROW = np.dtype(
-    [("person", "<i4"), ("line", "<i8"), ("time", "<f8"), ("point", "<c16"), ("heading", "<f8")]
+    [
+        *(("person", "<i4"), ("line", "<i8"), ("time", "<f8"), ("point", "<c16")),
+        *(("heading", "<f8"), ("headed", "?")),
+    ]
 )
-"""Row of a spool file; a heading is infinite where there is none."""
+"""Row of a spool file. headed: whether it has a heading."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +85,11 @@ class TrackShard:
 
 @dataclass
 class _Spools:
-    """Spool files of the parts. numbers: of the people, by id. begin: first time of all, s."""
+    """Spool files of the parts. numbers: of the people, by id."""
 
     job: PartsJob
     folder: Path
     numbers: dict[str, int] = field(default_factory=dict)
-    begin: float = np.inf
 
     def add(self, block: TrackRows) -> None:
         """Sort the rows of a block into the files of their parts."""
@@ -99,9 +100,8 @@ class _Spools:
         rows = np.empty(len(block.people), ROW)
         rows["person"] = [self.numbers[person] for person in block.people]
         rows["line"], rows["time"], rows["point"] = block.lines, block.times, block.points
-        rows["heading"] = np.inf if block.headings is None else block.headings
-        finite = block.times[np.isfinite(block.times)]
-        self.begin = min(self.begin, float(finite.min())) if len(finite) else self.begin
+        rows["headed"] = block.headings is not None
+        rows["heading"] = 0.0 if block.headings is None else block.headings
         indices = rows["person"] // self.job.people
         for index in np.unique(indices).tolist():
             with self.file(index).open("ab") as file:
@@ -111,13 +111,23 @@ class _Spools:
         """Return the spool file of a part."""
         return self.folder / f"{index:05}.rows"
 
-    def shards(self) -> Iterator[TrackShard]:
-        """Yield the rows of the parts."""
-        names, size = list(self.numbers), self.job.people
-        for index, first in enumerate(range(0, len(names), size)):
-            yield TrackShard(
-                index, self.file(index), self.begin, tuple(names[first : first + size])
-            )
+    def shards(self) -> list[TrackShard]:
+        """Return the rows of the parts, whose clock begins with the first usable track.
+
+        Raises FileError as `track.group` does.
+        """
+        path, names, size = self.job.tracks, list(self.numbers), self.job.people
+        shards = [
+            TrackShard(index, self.file(index), np.inf, tuple(names[first : first + size]))
+            for index, first in enumerate(range(0, len(names), size))
+        ]
+        begins, facing = [np.inf], np.zeros(3, complex)
+        for shard in shards:
+            usable = track.check(_tracks(self.job, shard), path, self.job.skip_bad).tracks
+            begins += [float(person.times[0]) for person in usable]
+            facing += track.facing(usable)
+        track.check_file(path, len(names), len(begins) - 1, facing)
+        return [replace(shard, begin=min(begins)) for shard in shards]
 
 
 def write(
@@ -136,9 +146,7 @@ def write(
         spools = _Spools(job, Path(name))
         for block in track_files.row_blocks(job.tracks, job.reading):
             spools.add(block)
-        if not spools.numbers:
-            raise FileError(job.tracks, "no person in it, expected one or more")
-        shards = list(spools.shards())
+        shards = spools.shards()
         begin(len(shards))
         records = []
         tasks = ((job, shard) for shard in shards)
@@ -146,9 +154,11 @@ def write(
             records.append(record)
             advance(1)
     records.sort(key=lambda record: record["part"])
+    if not any(record["people"] for record in records):
+        raise InvalidField("trajectories", "all shorter than two frames, expected longer ones")
     manifest = {
         "people": len(spools.numbers),
-        "begin": spools.begin,
+        "begin": shards[0].begin,
         "fps": job.question.fps,
         "skipped": {person: why for record in records for person, why in record["skipped"].items()},
         "parts": records,
@@ -159,39 +169,56 @@ def write(
 
 
 def write_part(task: tuple[PartsJob, TrackShard]) -> dict[str, Any]:
-    """Write one part unless it is there, and return its record."""
+    """Write one part unless it is there, and return its record; without people it has no file."""
     job, shard = task
     path = job.folder / f"{shard.index:05}.{job.ending}"
     record_path = job.folder / f"{shard.index:05}.json"
-    rows = np.fromfile(shard.spool, ROW)
-    digest = _digest(job, shard, rows)
+    digest = _digest(job, shard)
     if path.is_file() and record_path.is_file():
         record: dict[str, Any] = orjson.loads(record_path.read_bytes())
         if record["made_from"] == digest and record["bytes"] == path.stat().st_size:
             return record
-    rows["person"] -= shard.index * job.people
-    rows = rows[np.argsort(rows["person"], kind="stable")]
-    names = np.array(shard.names, dtype=object)[rows["person"]].tolist()
-    headings = None if np.isinf(rows["heading"]).any() else rows["heading"]
-    block = TrackRows(names, rows["time"], rows["point"], headings, rows["line"])
-    tracks = track.group([block], job.tracks, job.skip_bad)
+    tracks = track.check(_tracks(job, shard), job.tracks, job.skip_bad)
     model = _open(job.model, job.identity)
-    question = structs.replace(job.question, count=len(tracks.tracks))
-    crowd = track_crowd.build_crowd(model, model.gait, question, tracks.tracks, shard.begin)
-    crowd_formats.write(crowd, path, question, model.session.card.roles)
+    question = structs.replace(job.question, count=max(1, len(tracks.tracks)))
+    crowd = track_crowd.find_people(model, model.gait, question, tracks.tracks, shard.begin)
     record = {
         "part": shard.index,
-        "file": path.name,
-        "bytes": path.stat().st_size,
-        "people": crowd.facts["people"],
+        "file": None,
+        "bytes": 0,
+        "people": [],
         "frames": crowd.frames,
-        "path_error_cm": crowd.facts["path_error_cm"],
-        "warnings": crowd.facts["warnings"],
-        "skipped": {**tracks.skipped, **crowd.facts["skipped"]},
+        "warnings": [],
+        "excess": [],
+        "skipped": {**tracks.skipped, **crowd.skipped},
         "made_from": digest,
     }
+    if crowd.people:
+        clip = track_crowd.crowd_clip(crowd)
+        crowd_formats.write(clip, path, question, model.session.card.roles)
+        excess = [round(limit.excess, 3) for limit in crowd.limits]
+        record |= {name: clip.facts[name] for name in ("people", "path_error_cm", "warnings")}
+        # Lines about pairs of people come before those about one.
+        record["excess"] = [0.0] * (len(record["warnings"]) - len(excess)) + excess
+        record |= {"file": path.name, "bytes": path.stat().st_size}
+    else:
+        path.unlink(missing_ok=True)
     atomic_files.write(orjson.dumps(record), record_path)
     return record
+
+
+def _tracks(job: PartsJob, shard: TrackShard) -> Iterator[Track]:
+    """Yield the tracks of a part, in the order of its people."""
+    rows = np.fromfile(shard.spool, ROW)
+    rows = rows[np.argsort(rows["person"], kind="stable")]
+    ends = np.searchsorted(
+        rows["person"], shard.index * job.people + np.arange(len(shard.names)), "right"
+    )
+    for name, some in zip(shard.names, np.split(rows, ends[:-1]), strict=True):
+        times, points, headings, lines = (
+            some[column].copy() for column in ("time", "point", "heading", "line")
+        )
+        yield Track(name, times, points, headings if some["headed"].all() else None, lines)
 
 
 @lru_cache(maxsize=1)
@@ -204,7 +231,7 @@ def _open(path: Path, identity: str) -> Synthesizer:
     return Synthesizer(name, session.open_bytes(content, identity))
 
 
-def _digest(job: PartsJob, shard: TrackShard, rows: npt.NDArray[Any]) -> str:
+def _digest(job: PartsJob, shard: TrackShard) -> str:
     """Return the digest of all that determines the bytes of a part."""
     facts = {
         "model": job.identity,
@@ -216,5 +243,5 @@ def _digest(job: PartsJob, shard: TrackShard, rows: npt.NDArray[Any]) -> str:
         "versions": [__version__, *map(version, VERSIONED_PACKAGES)],
     }
     hashed = hashlib.sha256(orjson.dumps(facts, option=orjson.OPT_SORT_KEYS))
-    hashed.update(rows.tobytes())
+    hashed.update(shard.spool.read_bytes())
     return hashed.hexdigest()

@@ -111,14 +111,21 @@ def parts_text(manifest: dict[str, Any], folder: Path) -> str:
     """Return the report of a crowd in parts as text."""
     records = manifest["parts"]
     size = sum(record["bytes"] for record in records)
-    worst = max(record["path_error_cm"]["worst"] for record in records)
+    files = [record for record in records if record["file"]]
+    worst = max(record["path_error_cm"]["worst"] for record in files)
+    people = sum(len(record["people"]) for record in files)
     lines = [
-        f"{folder}: {manifest['people']} people in {len(records)} files, {size / 1e6:.1f} MB",
+        f"{folder}: {people} people in {len(files)} files, {size / 1e6:.1f} MB",
         f"smoothed paths are {worst:.1f} cm away from their tracks at most",
     ]
     skipped = track_crowd.left_out(manifest["skipped"])
-    warnings = [line for record in records for line in record["warnings"]]
-    return "\n".join(lines + track_crowd.shorten(skipped) + track_crowd.shorten(warnings))
+    warnings = [
+        pair
+        for record in records
+        for pair in zip(record["excess"], record["warnings"], strict=True)
+    ]
+    worst_first = [line for _, line in sorted(warnings, key=lambda pair: -pair[0])]
+    return "\n".join(lines + track_crowd.shorten(skipped) + track_crowd.shorten(worst_first))
 
 
 def _track_facts(crowd: CrowdClip, tracks: TrackSet | None) -> dict[str, Any]:

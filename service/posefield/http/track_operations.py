@@ -105,7 +105,7 @@ def read_tracks(body: TracksBody, limit: int) -> TrackSet:
         raise InvalidField(
             "tracks", f"all {len(skipped)} people are unusable, expected one or more"
         )
-    mirrored = track.find_mirror(tracks)
+    mirrored = track.find_mirror(track.facing(tracks))
     if mirrored is not None:
         raise InvalidField("tracks", mirrored)
     return TrackSet(tuple(tracks), skipped)

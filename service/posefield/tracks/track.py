@@ -135,26 +135,38 @@ def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> Tr
             rows.setdefault(str(people[index]), []).append((block, groups[index]))
         if len(rows) > MAX_PEOPLE:
             raise FileError(path, f"more than {MAX_PEOPLE} people, expected at most as many")
-    if not rows:
+    tracks = check((_joined(person, pieces) for person, pieces in rows.items()), path, skip_bad)
+    check_file(path, len(rows), len(tracks.tracks), facing(tracks.tracks))
+    return tracks
+
+
+def check_file(path: Path, people: int, usable: int, sums: Annotated[FloorVectors, "3"]) -> None:
+    """Raise FileError for a file without usable people, or with y down. sums: as of `facing`."""
+    if not people:
         raise FileError(path, "no person in it, expected one or more")
-    tracks, skipped = [], {}
-    for person, pieces in rows.items():
-        track = _joined(person, pieces)
-        problem = find_problem(track)
-        if problem is None:
-            tracks.append(track)
-        elif skip_bad:
-            line = track.lines[problem.sample]
-            skipped[person] = f"line {line}: {problem.message}"
-        else:
-            line = int(track.lines[problem.sample])
-            raise FileError(path, f"person {person!r}: {problem.message}", line)
-    if not tracks:
-        raise FileError(path, f"all {len(skipped)} people are unusable, expected one or more")
-    mirrored = find_mirror(tracks)
+    if not usable:
+        raise FileError(path, f"all {people} people are unusable, expected one or more")
+    mirrored = find_mirror(sums)
     if mirrored is not None:
         raise FileError(path, mirrored)
-    return TrackSet(tuple(tracks), skipped)
+
+
+def check(tracks: Iterable[Track], path: Path, skip_bad: bool = False) -> TrackSet:
+    """Return the usable tracks among some of a file; none may be.
+
+    skip_bad: as of `group`. Raises FileError, with the line, for the first unusable one otherwise.
+    """
+    usable, skipped = [], {}
+    for track in tracks:
+        problem = find_problem(track)
+        if problem is None:
+            usable.append(track)
+            continue
+        line = int(track.lines[problem.sample])
+        if not skip_bad:
+            raise FileError(path, f"person {track.person!r}: {problem.message}", line)
+        skipped[track.person] = f"line {line}: {problem.message}"
+    return TrackSet(tuple(usable), skipped)
 
 
 def _joined(person: str, pieces: Sequence[tuple[TrackRows, Indices]]) -> Track:
@@ -208,22 +220,27 @@ def find_problem(track: Track) -> TrackProblem | None:
     return None
 
 
-def find_mirror(tracks: Sequence[Track]) -> str | None:
-    """Return a sentence where headings agree with travel only if y points down, else None."""
-    straight, mirrored = [np.zeros(0, complex)], [np.zeros(0, complex)]
+def facing(tracks: Iterable[Track]) -> Annotated[FloorVectors, "3"]:
+    """Return sums of headings from the direction of travel, and from its mirror, and their number.
+
+    Sums of parts of a file add up to that of the file.
+    """
+    sums = np.zeros(3, complex)
     for track in tracks:
-        if track.headings is None:
-            continue
-        moving = track.speeds > MOVING
-        ways = np.diff(track.points)[moving]
-        faces = np.exp(1j * track.headings[:-1][moving])
-        ways /= np.abs(ways)
-        straight.append(faces * np.conj(ways))
-        mirrored.append(faces * -ways)
-    agreement, opposite = (
-        abs(np.concatenate(pairs).mean()) if sum(map(len, pairs)) else 0.0
-        for pairs in (straight, mirrored)
-    )
+        if track.headings is not None:
+            moving = track.speeds > MOVING
+            ways = np.diff(track.points)[moving]
+            faces = np.exp(1j * track.headings[:-1][moving]) / np.abs(ways)
+            sums += (faces @ np.conj(ways), -faces @ ways, len(ways))
+    return sums
+
+
+def find_mirror(sums: Annotated[FloorVectors, "3"]) -> str | None:
+    """Return a sentence where headings agree with travel only if y points down, else None.
+
+    sums: as of `facing`.
+    """
+    agreement, opposite = np.abs(sums[:2] / max(abs(sums[2]), 1.0)).tolist()
     if opposite > MIRRORED and agreement < FOLLOWED:
         return (
             f"headings agree with the mirrored direction of travel ({opposite:.2f}) and not with "

@@ -4,7 +4,8 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -55,6 +56,13 @@ class Person:
     take: int
 
 
+class PersonLimit(NamedTuple):
+    """Limit of a walker that a track passes: by what ratio, and a line about it."""
+
+    excess: float
+    text: str
+
+
 @dataclass(frozen=True)
 class TrackCrowd:
     """People on tracks, and how their motions are made.
@@ -70,6 +78,12 @@ class TrackCrowd:
     begin: float
     frames: int
     skipped: dict[str, str]
+
+    @cached_property
+    def limits(self) -> list[PersonLimit]:
+        """Limits of walkers that their tracks pass, the worst first."""
+        limits = chain.from_iterable(_limits(self, person) for person in self.people)
+        return sorted(limits, key=lambda limit: -limit.excess)
 
     @cached_property
     def walkers(self) -> TrackWalkers:
@@ -135,7 +149,7 @@ def find_people(
     question: of its fields, the frame rate, labels, takes, feet and seed count. begin: time of the
     first frame, s; that of the first sample by default.
 
-    Raises InvalidField for tracks that are too long or all too short.
+    It is empty if all tracks are too short. Raises InvalidField for tracks that are too long.
     """
     walking_crowd.frame_count(1, 1.0, question.fps, question.seed)
     gait = gait.with_labels(question.labels)
@@ -152,9 +166,7 @@ def find_people(
             skipped[track.person] = f"shorter than two frames at {question.fps:g} frames a second"
             continue
         people.append(Person(track, path, *_draw(track.person, question.seed)))
-    if not people:
-        raise InvalidField("trajectories", "all shorter than two frames, expected longer ones")
-    frames = max(person.path.first + len(person.path) for person in people)
+    frames = max((person.path.first + len(person.path) for person in people), default=0)
     if frames > MOST_FRAMES:
         span = f"{frames} frames from the first sample to the last"
         raise InvalidField("trajectories", f"{span}, expected {MOST_FRAMES} at most")
@@ -179,9 +191,16 @@ def build_crowd(
 ) -> CrowdClip:
     """Return the crowd of people on tracks, on one clock; they are hidden outside of their tracks.
 
-    begin: as of `find_people`. Raises InvalidField as `find_people` does.
+    begin: as of `find_people`. Raises InvalidField as `find_people` does, and for tracks that are
+    all too short.
     """
-    crowd = find_people(model, gait, question, tracks, begin)
+    return crowd_clip(find_people(model, gait, question, tracks, begin))
+
+
+def crowd_clip(crowd: TrackCrowd) -> CrowdClip:
+    """Return a crowd as a clip on one clock. Raises InvalidField for an empty one."""
+    if not crowd.people:
+        raise InvalidField("trajectories", "all shorter than two frames, expected longer ones")
     card = crowd.gait.session.card
     people, counts = crowd.people, [len(person.path) for person in crowd.people]
     first = np.array([person.path.first for person in people])
@@ -194,7 +213,7 @@ def build_crowd(
     points = np.array([person.path.points[0] for person in people])
     return CrowdClip(
         card.skeleton,
-        question.fps,
+        crowd.question.fps,
         crowd.frames,
         Placement(floor_plane.at_height(points, np.zeros(len(points))), np.zeros(len(points))),
         np.arange(len(people)),
@@ -250,8 +269,8 @@ def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
         "skipped": crowd.skipped,
         **overlaps,
         "warnings": [
-            *(line for person in crowd.people for line in limits(crowd, person)),
             *overlaps.get("warnings", ()),
+            *(limit.text for limit in crowd.limits),
         ],
     }
 
@@ -262,7 +281,7 @@ def left_out(skipped: Mapping[str, str]) -> list[str]:
 
 
 def shorten(lines: Sequence[str]) -> list[str]:
-    """Return the first lines about people, and how many more there are."""
+    """Return the first lines about people, which are the worst, and how many more there are."""
     more = len(lines) - MOST_LINES
     return [*lines[:MOST_LINES], *([f"and {more} more"] if more > 0 else [])]
 
@@ -280,7 +299,7 @@ def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:
     return walking_crowd.overlap_facts(points, rate)
 
 
-def limits(crowd: TrackCrowd, person: Person) -> Iterator[str]:
+def _limits(crowd: TrackCrowd, person: Person) -> Iterator[PersonLimit]:
     """Yield what a walker cannot do as the track does, with the time, and what it does instead."""
     path, rate = person.path, crowd.question.fps
     speeds = np.abs(path.velocities)
@@ -300,4 +319,5 @@ def limits(crowd: TrackCrowd, person: Person) -> Iterator[str]:
         if values[at] > 1.0:
             time = crowd.begin + (path.first + at) / rate
             text = sentence.format(values[at] * unit)
-            yield f"person {person.track.person!r} at {time:.2f} s: {text}"
+            line = f"person {person.track.person!r} at {time:.2f} s: {text}"
+            yield PersonLimit(float(values[at]), line)
