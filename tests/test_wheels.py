@@ -62,6 +62,13 @@ def test_the_service_alone_shows_a_walk_and_tells_how_to_get_the_training_comman
     bin_ = wheels.install(dist, tmp_path, sys.executable, "posefield", "posefield-client")
     run(bin_ / "posefield", "demo", "--once", "--output", "demo", cwd=tmp_path)
     assert (tmp_path / "demo/walk_1.2.usdc").read_bytes().startswith(b"PXR-USDC")
+    run(bin_ / "posefield", "page", "cmu_walk", "--output", "site", cwd=tmp_path)
+    scripts = [name for name in (tmp_path / "site").rglob("*.js") if name.stat().st_size > 10_000]
+    assert scripts and (tmp_path / "site/models/cmu_walk.onnx").exists()
+    grid = ("--grid", "speed=1.0:1.4:2")
+    run(bin_ / "posefield", "bake", "cmu_walk", *grid, "--output", "space", cwd=tmp_path)
+    space = json.loads((tmp_path / "space/blendspace.json").read_text())
+    assert all((tmp_path / "space" / sample["file"]).exists() for sample in space["samples"])
     helped = run(bin_ / "posefield", "--help", cwd=tmp_path).stdout
     assert all(command in helped for command in ("serve", "train", "evaluate"))
     assert 'pip install "posefield[train]"' in " ".join(helped.replace("│", "").split())
@@ -84,7 +91,7 @@ def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):
         )
         shipped = {file: opened.read(file) for file in SHIPPED}
     assert all(shipped[file] == (ROOT / "service" / file).read_bytes() for file in SHIPPED)
-    pages = {f"posefield/http/pages/{page}/index.html" for page in ("docs", "viewer")}
+    pages = {f"posefield/http/pages/{page}/index.html" for page in ("docs", "model", "viewer")}
     assert pages <= whole
     assert any(name.endswith("licenses/LICENSE") for name in whole)
     assert any(name.endswith("licenses/posefield/shipped/NOTICE") for name in whole)

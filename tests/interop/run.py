@@ -5,9 +5,9 @@
 It fails if a reader differs from the kinematics of this project, finds no animation or another
 number of frames, and if a deliberately damaged or known unsupported file passes. glTF files must
 pass the Khronos validator without errors and warnings, and the contract must pass Redocly. Then it
-builds and queries the image, and checks a cache before the service, the model in other engines, the
-page in a browser, glTF files in Godot and the Blender add-on. `--others` runs what CI does not: the
-add-on in the older Blender, and the Rust example, whose build takes minutes.
+builds and queries the image, and checks a cache before the service, the model in other engines and
+in the C example, the page in a browser, glTF files in Godot and the Blender add-on. `--others` runs
+what CI does not: the add-on in the older Blender, and the Rust example, whose build takes minutes.
 """
 
 import json
@@ -35,7 +35,7 @@ import godot
 import lint
 import numpy as np
 import page
-import rust
+import programs
 import slow_clients
 from compare import Characters, Row, compare
 
@@ -79,7 +79,9 @@ def khronos(node: Path, folder: Path) -> list[Row]:
 def main() -> int:
     """Exit code: 1 if a row is not as it should be or a part has a fault."""
     if sys.argv[1:] == ["--others"]:
-        return _print_faults(addon=lambda: addon.faults(environment.OLDER), rust=rust.faults)
+        return _print_faults(
+            addon=lambda: addon.faults(environment.OLDER), rust=programs.rust_faults
+        )
     python, node = environment.prepare()
     # Two threads would train the same models twice.
     page.models()
@@ -93,6 +95,7 @@ def main() -> int:
         slow_clients=slow_clients.faults,
         curves=lambda: faces.faults(python, node),
         engines=lambda: engines.faults(*environment.node()),
+        c=programs.c_faults,
         avatars=lambda: avatars.faults(*environment.node()),
         page=lambda: page.faults(node),
         addon=addon.faults,
