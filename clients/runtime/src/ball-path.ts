@@ -1,17 +1,19 @@
 /** Paths of the joints that contact: the smoothest changes of predicted paths, with lifted swings. */
 
+import * as limits from "./constants.ts";
 import {
-  FULL_STEP,
-  LEAST_LIFT,
-  LIFT_ACCELERATION,
-  LIFT_EXPONENT,
-  LIFT_SHARE,
-  RISE,
-} from "./constants.ts";
-import { roll } from "./rolling.ts";
-import { smoothHeights, smoothPlaces } from "./smooth-change.ts";
-import { distance, type Foot, framesOf, isInner, mask, type Run, runs } from "./stances.ts";
-import { type Complex, roundEven, type Vector } from "./vectors.ts";
+  distance,
+  type Foot,
+  framesOf,
+  type Grid,
+  inCycle,
+  isInner,
+  mask,
+  type Run,
+  roll,
+  runs,
+} from "./stances.ts";
+import { type Complex, conj, roundEven, scaled, sum, times, type Vector } from "./vectors.ts";
 
 /** The path of a foot that stands in stances, and rolls there. */
 export function planPath(foot: Foot, stances: readonly Run[]): Vector[] {
@@ -21,12 +23,13 @@ export function planPath(foot: Foot, stances: readonly Run[]): Vector[] {
   const flat = foot.floor.map(
     ([z, x], frame): Complex => [z - rolled.floor[frame]![0], x - rolled.floor[frame]![1]],
   );
-  const floor = smoothPlaces(grid, flat, stances).map(
+  const floor = smoothPath(grid, flat, stances).map(
     ([z, x], frame): Complex => [z + rolled.floor[frame]![0], x + rolled.floor[frame]![1]],
   );
-  const level = foot.heights.map((height, frame) => height - rolled.heights[frame]!);
-  const heights = smoothHeights(grid, level, stances, contact.height).map(
-    (height, frame) => rolled.heights[frame]! + height,
+  const level = foot.heights.map((height, frame): Complex => [height - rolled.heights[frame]!, 0]);
+  const still = { ...grid, way: ORIGIN, factor: UNTURNED };
+  const heights = smoothPath(still, level, stances, [contact.height, 0]).map(
+    ([height], frame) => rolled.heights[frame]! + height,
   );
   const { added, lowest } = lifts(foot, floor, heights, stances);
   return floor.map(([z, x], frame): Vector => {
@@ -51,9 +54,10 @@ function lifts(
     if (length >= grid.count) continue;
     const inner = isInner(swing, grid);
     const step = distance(grid, floor, ...stancesBeside(swing, foot));
-    let smallest = LIFT_SHARE * contact.clearance * Math.min(step / FULL_STEP, 1);
+    let smallest = limits.LIFT_SHARE * contact.clearance * Math.min(step / limits.FULL_STEP, 1);
     // A parabola: how high a foot is lifted at most in the duration of its swing.
-    if (inner) smallest = Math.min(smallest, (LIFT_ACCELERATION * (length / grid.rate) ** 2) / 8);
+    if (inner)
+      smallest = Math.min(smallest, (limits.LIFT_ACCELERATION * (length / grid.rate) ** 2) / 8);
     // A swing at an end of a clip goes on outside it, for the usual duration.
     const usual = inner ? length : Math.max(length, roundEven(contact.swing * grid.rate));
     const lead = swing.begin === 0 && !inner ? usual - length : 0;
@@ -66,7 +70,7 @@ function lifts(
     const extra = Math.max(smallest * Math.max(...rises) - lifted, 0);
     for (const [index, frame] of frames.entries()) {
       added![frame % grid.count] = extra * rises[index]!;
-      lowest![frame % grid.count] = Math.min(smallest, LEAST_LIFT) * rises[index]!;
+      lowest![frame % grid.count] = Math.min(smallest, limits.LEAST_LIFT) * rises[index]!;
     }
   }
   return { added: added!, lowest: lowest! };
@@ -81,7 +85,117 @@ function stancesBeside({ begin, end }: Run, { grid }: Foot): [number, number] {
 
 /** The share of a lift at a share of a swing, which begins and ends at rest. */
 function liftShare(share: number, seconds: number): number {
-  const quickest = Math.max(seconds / RISE, 2);
+  const quickest = Math.max(seconds / limits.RISE, 2);
   const soon = Math.min(Math.min(share, 1 - share) * quickest, 1);
-  return Math.sin(Math.PI * share) ** LIFT_EXPONENT * soon ** 2 * (3 - 2 * soon);
+  return Math.sin(Math.PI * share) ** limits.LIFT_EXPONENT * soon ** 2 * (3 - 2 * soon);
+}
+
+const ORIGIN: Complex = [0, 0];
+const UNTURNED: Complex = [1, 0];
+
+/** A frame of a path: a factor of an unknown place, if any, and an offset. */
+interface Term {
+  readonly unknown: number | null;
+  readonly factor: Complex;
+  readonly offset: Complex;
+}
+
+/**
+ * The path of smoothest change that stays in one place in each stance: at `fixed`, or where it fits.
+ *
+ * A path y minimises the sum of |y - f|² + (tau r)⁴ |D² (y - f)|². f is the predicted path, r the
+ * rate and D² the second difference, which goes on into the next cycle.
+ */
+function smoothPath(
+  grid: Grid,
+  path: readonly Complex[],
+  stances: readonly Run[],
+  fixed?: Complex,
+): readonly Complex[] {
+  if (!stances.length) return path;
+  const { count, cyclic } = grid;
+  const terms = termsOf(grid, stances, fixed);
+  const changes = terms.map((term, frame): Term => {
+    return { ...term, offset: sum(term.offset, scaled(path[frame]!, -1)) };
+  });
+  const squares = new LeastSquares(count);
+  for (const change of changes) squares.add(1, [change]);
+  const stiffness = (limits.PATH_SPREAD * grid.rate) ** 4;
+  for (let middle = 1; middle < count + (cyclic ? 1 : -1); middle++) {
+    const bend = [1, -2, 1].map((share, index): Term => {
+      const frame = middle - 1 + index;
+      const { unknown, factor, offset } = changes[frame % count]!;
+      const turned = scaled(frame < count ? UNTURNED : grid.factor, share);
+      return { unknown, factor: times(turned, factor), offset: times(turned, offset) };
+    });
+    squares.add(stiffness, bend);
+  }
+  const places = squares.solve();
+  return terms.map(({ unknown, factor, offset }) =>
+    unknown === null ? offset : sum(times(factor, places[unknown]!), offset),
+  );
+}
+
+/** Terms of the frames of a grid; those of a stance share an unknown, or are fixed. */
+function termsOf(grid: Grid, stances: readonly Run[], fixed?: Complex): Term[] {
+  const back = { factor: conj(grid.factor), offset: inCycle(grid, ORIGIN, -1) };
+  const terms = Array.from({ length: grid.count }, (_, unknown): Term => {
+    return { unknown, factor: UNTURNED, offset: ORIGIN };
+  });
+  for (const stance of stances)
+    for (const frame of framesOf(stance)) {
+      const earlier = frame >= grid.count;
+      const unknown = fixed ? null : stance.begin;
+      const free = earlier ? back : { factor: UNTURNED, offset: ORIGIN };
+      terms[frame % grid.count] = { unknown, ...free, ...(fixed ? { offset: fixed } : {}) };
+    }
+  return terms;
+}
+
+/** The least total of squares of sums of few terms, by the normal equations. */
+class LeastSquares {
+  readonly #rows: readonly Map<number, Complex>[];
+  readonly #right: Complex[];
+
+  constructor(size: number) {
+    this.#rows = Array.from({ length: size }, () => new Map());
+    this.#right = this.#rows.map(() => ORIGIN);
+  }
+
+  /** Add the square of a sum of terms, times a weight. */
+  add(weight: number, terms: readonly Term[]): void {
+    const rest = scaled(terms.map(({ offset }) => offset).reduce(sum), -1);
+    for (const { unknown: row, factor } of terms) {
+      if (row === null) continue;
+      const share = scaled(conj(factor), weight);
+      this.#right[row] = sum(this.#right[row]!, times(share, rest));
+      for (const { unknown: column, factor: other } of terms)
+        if (column !== null) this.#increase(row, column, times(share, other));
+    }
+  }
+
+  /** Values of all unknowns; zero for those in no term. */
+  solve(): readonly Complex[] {
+    const right = this.#right;
+    for (const [pivot, row] of this.#rows.entries()) {
+      const later = [...row].filter(([column]) => column > pivot);
+      for (const [below] of later) {
+        const share = scaled(this.#rows[below]!.get(pivot)!, -1 / row.get(pivot)![0]);
+        right[below] = sum(right[below]!, times(share, right[pivot]!));
+        for (const [column, value] of later) this.#increase(below, column, times(share, value));
+      }
+    }
+    for (const [pivot, row] of [...this.#rows.entries()].toReversed()) {
+      for (const [column, value] of row)
+        if (column > pivot)
+          right[pivot] = sum(right[pivot]!, times(scaled(value, -1), right[column]!));
+      if (row.size) right[pivot] = scaled(right[pivot]!, 1 / row.get(pivot)![0]);
+    }
+    return right;
+  }
+
+  #increase(row: number, column: number, value: Complex): void {
+    const cells = this.#rows[row]!;
+    cells.set(column, sum(cells.get(column) ?? ORIGIN, value));
+  }
 }

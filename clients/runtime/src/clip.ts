@@ -1,18 +1,9 @@
 /** Clips: frames at a rate, feet that stand, and loops that close. */
 
 import type { ModelCard } from "./card.ts";
-import {
-  AFTER_END,
-  FEWEST_STEPS,
-  FPS_RANGE,
-  FRAME_ROUNDING,
-  MOST_STEPS,
-  PLAN_RATE,
-  WARP_STEPS,
-} from "./constants.ts";
+import * as limits from "./constants.ts";
 import { InvalidField } from "./errors.ts";
-import { placeFeet } from "./feet-placement.ts";
-import { type FeetPlan, planFeet } from "./feet-plan.ts";
+import { type FeetPlan, placeFeet, planFeet } from "./feet.ts";
 import { findLegs, LimbPoses, quaternionAt } from "./limbs.ts";
 import { type Controls, type Model, type Options, type Poses, range } from "./model.ts";
 import type { Point } from "./session.ts";
@@ -60,7 +51,7 @@ export interface Clip extends Poses {
 export async function clip(model: Model, controls: Controls, options: ClipOptions): Promise<Clip> {
   const { card, session } = model;
   const point = model.point(controls, options);
-  const rate = range("fps", options.fps ?? 30, ...FPS_RANGE, "frames a second");
+  const rate = range("fps", options.fps ?? 30, ...limits.FPS_RANGE, "frames a second");
   if (options.loop && !card.cyclic)
     throw new InvalidField("loop", "true, but this model's last pose does not lead into its first");
   const stands = wantsStandingFeet(card, options);
@@ -74,10 +65,10 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
   const { times, duration } = await frameTimes(model, point, whole, rate, options);
   const inPlace = options.root === "in_place" && card.root === "travelling";
   const cyclic = card.cyclic;
-  const steps = clamp(roundEven(whole * PLAN_RATE), FEWEST_STEPS, MOST_STEPS);
+  const steps = clamp(roundEven(whole * limits.PLAN_RATE), limits.FEWEST_STEPS, limits.MOST_STEPS);
   const count = stands ? steps + Number(!cyclic) : 0;
   const planTimes = Array.from({ length: count }, (_, step) => step * (whole / steps));
-  const outputs = await session.run(point, [...times, ...planTimes, 0, AFTER_END], ...names);
+  const outputs = await session.run(point, [...times, ...planTimes, 0, limits.AFTER_END], ...names);
   const joints = card.skeleton.names.length;
   const frames = times.length;
   const rotations = Float64Array.from(outputs.rotations.subarray(0, 4 * joints * frames));
@@ -203,7 +194,7 @@ async function frameTimes(
   const duration = moments.length ? first + lastKnot / rate : whole;
   let last = end === undefined ? whole : range("end", end, first, Math.max(whole, duration), "s");
   if (last * (1 + 2 ** -23) >= Math.min(whole, duration)) last = duration;
-  const count = Math.floor((last - first) * rate + FRAME_ROUNDING) + 1;
+  const count = Math.floor((last - first) * rate + limits.FRAME_ROUNDING) + 1;
   const times = Array.from({ length: count }, (_, frame) => {
     const found = knots.findIndex(([knot]) => knot >= frame);
     const after = clamp(found < 0 ? knots.length : found, 1, knots.length - 1);
@@ -227,25 +218,28 @@ function playback(
   const shifts = new Map<number, number>();
   for (const moment of moments.toReversed()) {
     const frame = roundEven((moment - start) * rate);
-    if (frame >= begin - FRAME_ROUNDING) shifts.set(frame, moment - start - frame / rate);
+    if (frame >= begin - limits.FRAME_ROUNDING) shifts.set(frame, moment - start - frame / rate);
   }
-  if (![...shifts.keys()].some((knot) => Math.abs(knot - begin) < FRAME_ROUNDING))
+  if (![...shifts.keys()].some((knot) => Math.abs(knot - begin) < limits.FRAME_ROUNDING))
     shifts.set(begin, 0);
   // The end plays at its own time, unless it is a moment or one before it has the last frame.
   const latest = Math.max(...shifts.keys());
-  if (shifts.size === 1 || (!moments.includes(duration) && latest < end - FRAME_ROUNDING))
+  if (shifts.size === 1 || (!moments.includes(duration) && latest < end - limits.FRAME_ROUNDING))
     shifts.set(end, 0);
   return [...shifts].sort(([a], [b]) => a - b);
 }
 
 /** The time, s, of a canonical frame of a motion. */
 async function timeOfFrame(model: Model, point: Point, whole: number, frame: number) {
-  const times = Array.from({ length: WARP_STEPS }, (_, step) => (step * whole) / (WARP_STEPS - 1));
+  const times = Array.from(
+    { length: limits.WARP_STEPS },
+    (_, step) => (step * whole) / (limits.WARP_STEPS - 1),
+  );
   const { frame: frames } = await model.session.run(point, times, "frame");
   const after = clamp(
     frames.findIndex((value) => value > frame),
     1,
-    WARP_STEPS - 1,
+    limits.WARP_STEPS - 1,
   );
   const [low, high] = [frames[after - 1]!, frames[after]!];
   return times[after - 1]! + ((frame - low) / (high - low)) * (times[after]! - times[after - 1]!);

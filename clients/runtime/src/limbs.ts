@@ -1,7 +1,7 @@
 /** Legs of two bones, found in a skeleton, and the positions of their joints in poses. */
 
 import type { ModelCard } from "./card.ts";
-import { HingeLimits } from "./hinge.ts";
+import { HingeLimits } from "./two-bone.ts";
 import { add, multiply, norm, type Quaternion, rotate, subtract, type Vector } from "./vectors.ts";
 
 /** Joints by index: hip, knee, ankle, and the ball, which is placed. */

@@ -100,12 +100,7 @@ export class Model {
     const longest = this.durations[1];
     // Times beyond the longest clip overflow single precision; they are refused below.
     const within = times.map((value) => Math.min(Math.max(value, 0), longest));
-    const outputs: Partial<Record<"curves", Float32Array>> &
-      Record<(typeof POSE_OUTPUTS)[number], Float32Array> = await this.session.run(
-      point,
-      within,
-      ...names,
-    );
+    const outputs = await this.session.run(point, within, ...names);
     const duration = this.checkDuration(outputs.duration[0]!);
     for (const [index, value] of times.entries())
       range(`times/${index}`, value, 0, duration * (1 + TIME_SLACK), "s");

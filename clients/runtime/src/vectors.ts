@@ -78,6 +78,14 @@ export function times(a: Complex, b: Complex): Complex {
   return [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
 }
 
+export function sum(a: Complex, b: Complex): Complex {
+  return [a[0] + b[0], a[1] + b[1]];
+}
+
+export function scaled(a: Complex, factor: number): Complex {
+  return [a[0] * factor, a[1] * factor];
+}
+
 export function conj(a: Complex): Complex {
   return [a[0], -a[1]];
 }

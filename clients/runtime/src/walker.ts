@@ -1,11 +1,11 @@
 /** Walkers that are steered: speed and turning change at any time, and feet stand. */
 
-import { AFTER_END, LEAST_LIFT, MOST_LOWERED, STANDING, SUNK, UNEVEN } from "./constants.ts";
+import * as limits from "./constants.ts";
 import { InvalidField } from "./errors.ts";
-import { placeLeg } from "./feet-placement.ts";
-import { need } from "./feet-plan.ts";
+import { need, placeLeg } from "./feet.ts";
 import { findLegs, type Limb, LimbPoses, quaternionAt } from "./limbs.ts";
 import type { Model, Options, Poses } from "./model.ts";
+import type { Point } from "./session.ts";
 import { cycleOf, relativeRoot, type Stride } from "./strides.ts";
 import { meanBend } from "./two-bone.ts";
 import {
@@ -18,7 +18,9 @@ import {
   type Quaternion,
   rotate,
   scale,
+  scaled,
   subtract,
+  sum,
   times,
   turn,
   type Vector,
@@ -46,7 +48,7 @@ const LOST = 0.2;
 const SETTLE = 0.06;
 /** Rise of a foot that steps on the spot, m. */
 const RISE = 0.05;
-const [SPEEDS, TURNS, PHASES] = [9, 5, 48];
+const PHASES = 48;
 const UP: Vector = [0, 1, 0];
 
 /** Foot of a walker: where it stands, or how it left. */
@@ -75,15 +77,19 @@ interface WalkerState {
   heading: number;
   moves: boolean;
   lowered: number;
+  /** Length of a stride, m. */
+  length: number;
   readonly feet: FootState[];
 }
 
-/** Strides over a grid of speeds and turns, and the pose in which walkers stand. */
+/** Controls of a walk by speed and turn, and the pose in which walkers stand. */
 interface Gait {
-  readonly speeds: readonly number[];
-  readonly turns: readonly number[];
-  readonly strides: readonly Stride[];
+  readonly point: Point;
+  /** Smallest and largest speed, m/s, and turn, degrees a cycle. */
+  readonly speeds: readonly [number, number];
+  readonly turns: readonly [number, number];
   readonly controls: (speed: number, turned: number) => number[];
+  readonly length: number;
   readonly rotations: Float32Array;
   readonly root: Vector;
   readonly bones: Float32Array;
@@ -96,15 +102,13 @@ export class Walkers {
   /** Of all walkers, one after another. */
   readonly poses: Pick<Poses, "names" | "parents" | "rotations" | "rootPosition" | "boneOffsets">;
   readonly #model: Model;
-  readonly #options: Options;
   readonly #gait: Gait;
   readonly #legs: readonly { readonly contact: number; readonly leg: Limb }[];
   readonly #walkers: readonly WalkerState[];
 
-  private constructor(model: Model, options: Options, gait: Gait, count: number) {
+  private constructor(model: Model, gait: Gait, count: number) {
     const { names, parents } = model.card.skeleton;
     this.#model = model;
-    this.#options = options;
     this.#gait = gait;
     this.#legs = findLegs(model.card, gait.bones);
     this.poses = {
@@ -114,19 +118,19 @@ export class Walkers {
       rootPosition: new Float32Array(3 * count),
       boneOffsets: gait.bones,
     };
-    this.#walkers = Array.from({ length: count }, () => standingWalker(this.#legs.length));
+    this.#walkers = Array.from({ length: count }, () => standingWalker(gait, this.#legs.length));
     for (let index = 0; index < count; index++) this.put(index, [0, 0], 0);
   }
 
   static async of(model: Model, count: number, options: Options): Promise<Walkers> {
     if (!Number.isInteger(count) || count < 1)
       throw new InvalidField("count", `${count}, expected a whole number of 1 or more`);
-    return new Walkers(model, options, await gaitOf(model, options), count);
+    return new Walkers(model, await gaitOf(model, options), count);
   }
 
   /** Slowest and fastest captured walk, m/s; walkers stand, and walk slower, too. */
   get speeds(): readonly [number, number] {
-    return [this.#gait.speeds[0]!, this.#gait.speeds.at(-1)!];
+    return this.#gait.speeds;
   }
 
   /** Place, x and z in m, heading, rad, and speed, m/s, of a walker now. */
@@ -142,7 +146,7 @@ export class Walkers {
 
   /** Put a standing walker somewhere: x and z, m, and a heading, rad. */
   put(index: number, [x, z]: readonly [number, number], heading: number): void {
-    const state = Object.assign(this.#walkers[index]!, standingWalker(0), {
+    const state = Object.assign(this.#walkers[index]!, standingWalker(this.#gait, 0), {
       feet: this.#walkers[index]!.feet,
       place: [z, x],
       heading,
@@ -184,17 +188,20 @@ export class Walkers {
   /** Move all walkers on by some seconds, of a frame. */
   async step(seconds: number): Promise<void> {
     const { card, session } = this.#model;
-    const strides = this.#walkers.map((walker) => this.#advance(walker, seconds));
+    const controls = this.#walkers.map((walker) => this.#accelerate(walker, seconds));
+    const point = { ...this.#gait.point, controls };
+    const strides = await stridesOf(this.#model, point);
+    const times = strides.map((stride, index) => {
+      advance(this.#walkers[index]!, stride, this.#gait.liftOffs, seconds);
+      return this.#walkers[index]!.phase * stride.duration;
+    });
     const { rotations, root_position, contacts } = await session.run(
-      {
-        ...this.#model.point(this.#model.defaults, this.#options),
-        controls: strides.map(({ controls }) => controls),
-      },
-      strides.map(({ stride }, index) => this.#walkers[index]!.phase * stride.duration),
+      point,
+      times,
       ...(["rotations", "root_position", "contacts"] as const),
     );
     const joints = card.skeleton.names.length;
-    for (const [index, { stride }] of strides.entries()) {
+    for (const [index, stride] of strides.entries()) {
       const { phase, speed, moves } = this.#walkers[index]!;
       const local = rotations.subarray(4 * joints * index, 4 * joints * (index + 1));
       const { root, heading } = relativeRoot(stride, phase, root_position, index);
@@ -204,41 +211,22 @@ export class Walkers {
       blend(local, this.#gait.rotations, weight);
       const mixed = add(scale(root, weight), scale(this.#gait.root, 1 - weight));
       const down = this.#legs.map(
-        ({ contact }) => !moves || contacts[index * card.contacts.length + contact]! > STANDING,
+        ({ contact }) =>
+          !moves || contacts[index * card.contacts.length + contact]! > limits.STANDING,
       );
       this.#stand(index, this.#pose(index, local, mixed), seconds, down);
     }
   }
 
-  /** Advance speed, place and phase; the stride and the controls there. */
-  #advance(walker: WalkerState, seconds: number) {
-    const { steering } = walker;
-    walker.speed += clamp(
-      steering.speed - walker.speed,
-      -ACCELERATION * seconds,
-      ACCELERATION * seconds,
-    );
-    walker.turning += clamp(
-      steering.turn - walker.turning,
-      -TURN_ACCELERATION * seconds,
-      TURN_ACCELERATION * seconds,
-    );
-    const speed = clamp(walker.speed, ...this.speeds);
-    const [slowest, most] = [this.#gait.turns[0]!, this.#gait.turns.at(-1)!];
-    const length = Math.hypot(...strideAt(this.#gait, speed, 0).way);
-    const turned = clamp((walker.turning * length * 180) / (Math.PI * speed), slowest, most);
-    const stride = strideAt(this.#gait, speed, turned);
-    walker.heading = wrapped(walker.heading + walker.turning * seconds);
-    const moves = walker.speed > IDLE || steering.speed > IDLE;
-    // A walk begins as the foot that stands farther back leaves the floor.
-    if (moves && !walker.moves) walker.phase = this.#gait.liftOffs[rearFoot(walker)]!;
-    walker.moves = moves;
-    if (moves) walker.phase += (walker.speed * seconds) / Math.hypot(...stride.way);
-    walker.phase -= Math.floor(walker.phase);
-    const drift = Math.atan2(stride.way[1], stride.way[0]);
-    const gone = scaled(direction(walker.heading + drift), walker.speed * seconds);
-    walker.place = [walker.place[0] + gone[0], walker.place[1] + gone[1]];
-    return { stride, controls: this.#gait.controls(speed, turned) };
+  /** Change the speed and the turning of a walker as it is steered; the controls for them. */
+  #accelerate(walker: WalkerState, seconds: number): number[] {
+    const { speed, turn: turning } = walker.steering;
+    const [most, mostTurning] = [ACCELERATION * seconds, TURN_ACCELERATION * seconds];
+    walker.speed += clamp(speed - walker.speed, -most, most);
+    walker.turning += clamp(turning - walker.turning, -mostTurning, mostTurning);
+    const pace = clamp(walker.speed, ...this.speeds);
+    const turned = (walker.turning * walker.length * 180) / (Math.PI * pace);
+    return this.#gait.controls(pace, clamp(turned, ...this.#gait.turns));
   }
 
   /** Joints of the legs of a walker; its rotations and root are written to the poses. */
@@ -277,7 +265,7 @@ export class Walkers {
     const needs = balls.map(({ limb, foot }) =>
       foot.standing ? need(poses, limb, 0, foot.ball, 0) : 0,
     );
-    const goal = Math.min(Math.max(...needs), 2 * MOST_LOWERED);
+    const goal = Math.min(Math.max(...needs), 2 * limits.MOST_LOWERED);
     walker.lowered += (goal - walker.lowered) * -Math.expm1(-seconds / SETTLE);
     for (const { limb, contact, foot, yaw } of balls) {
       const drop = limb.toe ? rotate(poses.orientation(limb.tip, 0), limb.toe)[1] : 0;
@@ -297,6 +285,26 @@ export class Walkers {
     const { contact, leg: limb } = this.#legs[leg]!;
     return { limb, contact: this.#model.card.contacts[contact]! };
   }
+}
+
+/** Move a walker on: its heading, phase and place. */
+function advance(
+  walker: WalkerState,
+  { way }: Stride,
+  liftOffs: readonly number[],
+  seconds: number,
+): void {
+  walker.heading = wrapped(walker.heading + walker.turning * seconds);
+  walker.length = Math.hypot(...way);
+  const moves = walker.speed > IDLE || walker.steering.speed > IDLE;
+  // A walk begins as the foot that stands farther back leaves the floor.
+  if (moves && !walker.moves) walker.phase = liftOffs[rearFoot(walker)]!;
+  walker.moves = moves;
+  if (moves) walker.phase += (walker.speed * seconds) / walker.length;
+  walker.phase -= Math.floor(walker.phase);
+  const drift = Math.atan2(way[1], way[0]);
+  const gone = scaled(direction(walker.heading + drift), walker.speed * seconds);
+  walker.place = sum(walker.place, gone);
 }
 
 /** Move a foot on: it stands in its place, swings as predicted, or steps on the spot. */
@@ -327,14 +335,14 @@ function moveFoot(
   }
   if (foot.standing) {
     foot.above *= Math.exp(-seconds / SETTLE);
-    const level = height + clamp(y - height, -SUNK, UNEVEN);
+    const level = height + clamp(y - height, -limits.SUNK, limits.UNEVEN);
     foot.ball = [foot.place[0], level + foot.above, foot.place[2]];
   } else {
     const moved = add(predicted, scale(foot.offset, fade(foot)));
     const share = clamp(foot.since / (foot.steps ? STEP : RELEASE), 0, 1);
     const lift = foot.steps
       ? RISE * Math.sin(Math.PI * share)
-      : Math.min(LEAST_LIFT, Math.max(y - height, 0)) * share;
+      : Math.min(limits.LEAST_LIFT, Math.max(y - height, 0)) * share;
     foot.ball = [moved[0], Math.max(foot.steps ? 0 : moved[1], height + lift), moved[2]];
   }
 }
@@ -353,12 +361,12 @@ function newFoot(): FootState {
   };
 }
 
-function standingWalker(legs: number): WalkerState {
+function standingWalker({ length }: Gait, legs: number): WalkerState {
   const feet = Array.from({ length: legs }, newFoot);
   const still = { speed: 0, turn: 0 };
   return {
     ...{ steering: still, speed: 0, turning: 0, phase: 0, place: [0, 0], heading: 0 },
-    ...{ moves: false, lowered: 0, feet },
+    ...{ moves: false, lowered: 0, length, feet },
   };
 }
 
@@ -380,9 +388,8 @@ async function gaitOf(model: Model, options: Options): Promise<Gait> {
   if (!card.cyclic || card.root !== "travelling" || pace < 0 || !card.contacts.length)
     throw new InvalidField("model", `${card.name} is no walk with a speed and contacts of feet`);
   const { minimum, maximum } = card.controls[pace]!;
-  const speeds = spaced(minimum, maximum, SPEEDS);
-  const side = card.controls[bend];
-  const turns = side ? spaced(side.minimum, side.maximum, TURNS) : [0];
+  const side = card.controls[bend] ?? { minimum: 0, maximum: 0 };
+  const turns = [side.minimum, side.maximum] as const;
   /** Other controls are the mean of captured clips with a similar speed. */
   const controls = (speed: number, turned: number) => {
     const width = (maximum - minimum) / 6;
@@ -396,20 +403,12 @@ async function gaitOf(model: Model, options: Options): Promise<Gait> {
       );
     });
   };
-  const point = model.point(model.defaults, options);
-  const grid = speeds.flatMap((speed) => turns.map((turned) => controls(speed, turned)));
-  const ends = await session.run(
-    { ...point, controls: grid },
-    grid.map(() => AFTER_END),
-    ...(["duration", "travel", "root_position"] as const),
-  );
-  const strides = grid.map((_, row) => cycleOf(ends, row, ends.duration[row]!));
-  const still = { speeds, turns, strides };
-  const slowest = strideAt(still, minimum, 0);
+  const slow = controls(minimum, clamp(0, ...turns));
+  const point = { ...model.point(model.defaults, options), controls: [slow] };
+  const slowest = (await stridesOf(model, point))[0]!;
   const phases = Array.from({ length: PHASES }, (_, index) => index / PHASES);
-  const slow = controls(minimum, clamp(0, turns[0]!, turns.at(-1)!));
   const cycle = await session.run(
-    { ...point, controls: [slow] },
+    point,
     phases.map((phase) => phase * slowest.duration),
     ...(["rotations", "root_position", "bone_offsets", "contacts"] as const),
   );
@@ -425,7 +424,7 @@ async function gaitOf(model: Model, options: Options): Promise<Gait> {
   }
   const liftOffs = findLegs(card, cycle.bone_offsets).map(({ contact }) => {
     const likely = (index: number) =>
-      cycle.contacts[(index % PHASES) * card.contacts.length + contact]! > STANDING;
+      cycle.contacts[(index % PHASES) * card.contacts.length + contact]! > limits.STANDING;
     return (
       Math.max(
         phases.findIndex((_, index) => likely(index) && !likely(index + 1)),
@@ -433,42 +432,20 @@ async function gaitOf(model: Model, options: Options): Promise<Gait> {
       ) / PHASES
     );
   });
-  return { ...still, controls, rotations, root, bones: cycle.bone_offsets, liftOffs };
-}
-
-/** The stride at a speed and a turn, degrees a cycle, between those of the grid. */
-function strideAt(
-  { speeds, turns, strides }: Pick<Gait, "speeds" | "turns" | "strides">,
-  speed: number,
-  turned: number,
-): Stride {
-  const [row, across] = gridPlace(speeds, speed);
-  const [column, along] = gridPlace(turns, turned);
-  const corner = (i: number, j: number) =>
-    strides[
-      Math.min(row + i, speeds.length - 1) * turns.length + Math.min(column + j, turns.length - 1)
-    ]!;
-  const mixed = (value: (stride: Stride) => number) =>
-    (1 - across) * ((1 - along) * value(corner(0, 0)) + along * value(corner(0, 1))) +
-    across * ((1 - along) * value(corner(1, 0)) + along * value(corner(1, 1)));
   return {
-    duration: mixed(({ duration }) => duration),
-    way: [mixed(({ way }) => way[0]), mixed(({ way }) => way[1])],
-    turned: mixed((stride) => stride.turned),
-    start: [mixed(({ start }) => start[0]), mixed(({ start }) => start[1])],
+    ...{ point, speeds: [minimum, maximum], turns, controls, length: Math.hypot(...slowest.way) },
+    ...{ rotations, root, bones: cycle.bone_offsets, liftOffs },
   };
 }
 
-function gridPlace(values: readonly number[], value: number): [number, number] {
-  const last = values.length - 1;
-  if (last === 0) return [0, 0];
-  const at = clamp(((value - values[0]!) / (values[last]! - values[0]!)) * last, 0, last);
-  const before = Math.min(Math.floor(at), last - 1);
-  return [before, at - before];
-}
-
-function spaced(low: number, high: number, count: number): number[] {
-  return Array.from({ length: count }, (_, index) => low + ((high - low) * index) / (count - 1));
+/** The stride of each point. */
+async function stridesOf({ session }: Model, point: Point): Promise<Stride[]> {
+  const ends = await session.run(
+    point,
+    point.controls.map(() => limits.AFTER_END),
+    ...(["duration", "travel", "root_position"] as const),
+  );
+  return point.controls.map((_, row) => cycleOf(ends, row, ends.duration[row]!));
 }
 
 /** Mix rotations with others, of which 1 - weight is taken, along the shorter arcs. */
@@ -488,8 +465,4 @@ function yawOf([x, , z]: Vector): number {
 
 function wrapped(angle: number): number {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
-}
-
-function scaled([z, x]: Complex, factor: number): Complex {
-  return [z * factor, x * factor];
 }
