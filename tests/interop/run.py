@@ -23,6 +23,7 @@ import addon
 import avatars
 import blender_bvh
 import blender_motion
+import blends
 import cache
 import cases
 import container
@@ -96,6 +97,7 @@ def main() -> int:
         curves=lambda: faces.faults(python, node),
         engines=lambda: engines.faults(*environment.node()),
         c=programs.c_faults,
+        blends=lambda: blends.faults(node),
         avatars=lambda: avatars.faults(*environment.node()),
         page=lambda: page.faults(node),
         addon=addon.faults,

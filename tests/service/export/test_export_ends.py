@@ -110,6 +110,24 @@ def test_killed_ten_times_it_ends_with_the_same_bytes(command, undisturbed, tmp_
     assert exporting.content(tmp_path) == undisturbed
 
 
+def test_a_killed_blend_space_is_in_no_part_there_and_ends_with_the_same_bytes(tmp_path):
+    def bake(folder):
+        grid = ("--grid", "speed=0.6:1.7:12", "--grid", "turn=-4:20:10", "--workers", "1")
+        return [str(POSEFIELD), "bake", "cmu_walk", *grid, "-o", str(tmp_path / folder)]
+
+    process = begun(bake("killed"))
+    while not [*tmp_path.glob("killed/clips/*/*.glb")] and process.poll() is None:
+        time.sleep(0.001)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    subprocess.run(bake("undisturbed"), check=True, capture_output=True)
+    undisturbed = exporting.content(tmp_path / "undisturbed")
+    assert 0 < whole(tmp_path / "killed", undisturbed) < 120
+    assert not (tmp_path / "killed/blendspace.json").exists()
+    go_on(bake("killed"))
+    assert exporting.content(tmp_path / "killed") == undisturbed
+
+
 @pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(("workers", "after"), [(1, 5), (2, 5), (2, 0)])
 def test_told_to_stop_it_says_how_to_go_on(told, workers, after, command, undisturbed, tmp_path):
