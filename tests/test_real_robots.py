@@ -140,9 +140,37 @@ def model(biped, tmp_path_factory):
     return path
 
 
-def test_clips_of_a_robot_stand_on_their_soles_within_limits(model):
+QUANTITIES = {"forward": "forward_velocity", "left": "left_velocity", "turning": "turn_rate"}
+
+
+@pytest.fixture(scope="module")
+def measured(biped, tmp_path_factory):
+    """Return the path of a model whose commands are the velocities of the biped's gaits."""
+    folder = biped[1]
+    controls = [
+        f'[[controls]]\nname = "{name}"\nauto = {{ quantity = "{quantity}" }}\ndescription = "Mean"'
+        for name, quantity in QUANTITIES.items()
+    ]
+    (folder / "measured.toml").write_text("\n".join([RECIPE, *controls]))
+    family = recipe.read(folder / "measured.toml")
+    examples = ingest.ingest(family, folder)[0]
+    # Commands of the files are not the velocities of their gaits.
+    stated = np.array([example.controls for example in biped[2]])
+    velocities = np.array([example.controls for example in examples])
+    assert np.ptp(velocities[:, 0]) < 0.6 * np.ptp(stated[:, 0])
+    path = tmp_path_factory.mktemp("measured") / "go_bdx.onnx"
+    training.export(training.train_examples(family, examples), path)
+    return path
+
+
+KINDS = pytest.mark.parametrize("kind", ["model", "measured"])
+"""Models of given and of measured commands."""
+
+
+@KINDS
+def test_clips_of_a_robot_stand_on_their_soles_within_limits(kind, request):
     """Mean skate of ten commands between the captured ones: 0.2 cm/s, and 1.3 as predicted."""
-    opened = posefield.load(model)
+    opened = posefield.load(request.getfixturevalue(kind))
     card = opened.synthesizer.session.card
     assert {card.robot.bodies[point.body] for point in card.soles} == FEET
     commands, names = np.array(card.examples), [control.name for control in card.controls]
@@ -152,7 +180,11 @@ def test_clips_of_a_robot_stand_on_their_soles_within_limits(model):
         mixed = rng.dirichlet(np.ones(4)) @ commands[rng.choice(len(commands), 4, replace=False)]
         command = dict(zip(names, mixed.tolist(), strict=True))
         clip = opened.clip(fps=137, **command)
-        assert not doctor.diagnose(clip.robot_motion(), card.robot).findings
+        told = {fault.kind for fault in doctor.diagnose(clip.robot_motion(), card.robot).findings}
+        # Between captured velocities gaits are so slow that a foot seems to stand while it swings.
+        assert told <= ({"skating"} if kind == "measured" else set())
+        if kind == "measured":
+            assert list(clip.trust.measured.values()) == pytest.approx(list(command.values()))
         skates.append((clip.trust.feet.skate_before, clip.trust.feet.skate))
         loop = opened.clip(fps=50, loop=True, **command).robot_motion()
         np.testing.assert_allclose(loop.angles[0], loop.angles[-1], atol=1e-7)
@@ -176,7 +208,9 @@ def numpy_evaluator(path):
     return Evaluator(ReferenceModel(path), arrays, arrays)
 
 
-def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(model):
+@KINDS
+def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(kind, request):
+    model = request.getfixturevalue(kind)
     opened, evaluator = posefield.load(model), numpy_evaluator(model)
     card = opened.synthesizer.session.card
     commands, names = mixed_commands(card, 6), [control.name for control in card.controls]
@@ -200,9 +234,9 @@ def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(model)
         np.testing.assert_allclose(rotations, motion.base_rotations, atol=1e-5)
         np.testing.assert_allclose(1.0 / reference.phase_rates, trust.duration, atol=1e-6)
         # The service squares small differences of large numbers in single precision.
-        np.testing.assert_allclose(plan.sigmas[row], trust.sigma, atol=5e-5)
+        np.testing.assert_allclose(plan.sigmas[row], trust.sigma, atol=1e-4)
         sigmas = np.array(trust.joint_sigma)[joints]
-        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=5e-5)
+        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=1e-4)
         assert plan.supported[row] == trust.supported
         # Negative control: feet as predicted differ.
         predicted = opened.clip(feet="as_predicted", fps=97, extrapolate="ok", **question)

@@ -18,8 +18,9 @@ from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.inference import session
 from posefield.model_file import card_check, checked_file
-from posefield.motion import quat
+from posefield.motion import cycle_velocities, quat
 from posefield.motion.clip import Clip
+from posefield.reference.motion_plan import Arrays, Evaluator, ReferenceModel
 from posefield.registry import model_registry
 from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
@@ -442,6 +443,76 @@ def test_a_model_of_a_robot_answers_with_its_angles_between_the_commands(family,
     nearest = np.degrees(np.abs(gait(robot, 0.4).angles[:40] - expected).max())
     assert nearest > 1.0
     assert motion.base_path[39, 0] == pytest.approx(0.45 * 39 / 40, abs=1e-3)
+
+
+MEASURED = """
+[[controls]]
+name = "{name}"
+auto = {{ quantity = "{quantity}" }}
+description = "Measured"
+"""
+
+
+@pytest.fixture(scope="module")
+def measured(family, robot, tmp_path_factory):
+    """Model of gaits on arcs, whose commands are measured ahead and of the heading."""
+    folder = tmp_path_factory.mktemp("measured")
+    rows, upright = ["file"], np.array([0.0, 0.0, 1.0])
+    for index, pace in enumerate(np.linspace(0.2, 0.9, 12)):
+        # Not as an arithmetic sequence, which measured velocities would follow.
+        headings = 0.5 * np.cos(2.3 * index) * np.arange(41) / 40
+        motion = gait(robot, pace)
+        radius = pace / max(abs(headings[-1]), 1e-6) * np.sign(headings[-1])
+        arc = [radius * np.sin(headings), radius * (1.0 - np.cos(headings)), np.full(41, 0.7)]
+        turned = quat.from_axis_angle(upright, headings)
+        motion = replace(motion, base_path=np.stack(arc, axis=-1), base_rotations=turned)
+        content = robot_formats.WRITTEN["awd.json"].write(motion, robot)
+        (folder / f"{index}.json").write_bytes(content)
+        rows.append(f"{index}.json")
+    (folder / "clips.csv").write_text("\n".join(rows) + "\n")
+    (folder / "biped.xml").write_text((family / "biped.xml").read_text())
+    begin, _, rest = RECIPE.partition("[[controls]]")
+    rest = rest[rest.index("[motion]") :]
+    pairs = (("ahead", "forward_velocity"), ("turning", "turn_rate"))
+    controls = "".join(MEASURED.format(name=name, quantity=what) for name, what in pairs)
+    (folder / "recipe.toml").write_text(begin + controls + rest)
+    recipe = posefield_train.read_recipe(folder / "recipe.toml")
+    posefield_train.export(posefield_train.train(recipe, folder), folder / "biped.onnx")
+    return folder / "biped.onnx"
+
+
+def test_commands_that_are_measured_are_met_exactly(measured, robot):
+    model = posefield.load(measured)
+    arrays = Arrays(np, np.asarray, lambda a: a.astype(int), lambda rows, indices: rows[indices])
+    evaluator = Evaluator(ReferenceModel(measured), arrays, arrays)
+    commands = np.array([[0.31, 0.2], [0.55, -0.33], [0.7, 0.0]])
+    plan = evaluator.plan(commands)
+    ways = plan.travels[:, [1, 0, 2]]
+    planned = cycle_velocities.of_travels(np, ways, plan.durations)
+    np.testing.assert_allclose(planned[:, 1:], commands, atol=1e-12)
+    beside = []
+    for command, way, duration in zip(commands, ways, plan.durations, strict=True):
+        question = {"ahead": command[0], "turning": command[1], "fps": 40.0, "loop": True}
+        clip, predicted = (model.clip(**question, exact=exact) for exact in ("auto", "none"))
+        np.testing.assert_allclose(clip.trust.duration, duration, atol=1e-6)
+        np.testing.assert_allclose(travel(clip), way, atol=1e-6)
+        np.testing.assert_allclose(velocities(clip)[1:], command, atol=1e-9)
+        assert list(clip.trust.measured.values()) == pytest.approx(command)
+        assert all(target.reached for target in clip.trust.targets)
+        beside.append(np.abs(velocities(predicted)[1:] - command).max())
+    assert max(beside) > 1e-5, "negative control: the prediction travels otherwise"
+
+
+def travel(clip):
+    """Way to the left and ahead, m, and turn, rad, of a loop."""
+    motion = clip.robot_motion()
+    gone = motion.base_path[-1] - motion.base_path[0]
+    turned = quat.mul(motion.base_rotations[-1], quat.conj(motion.base_rotations[0]))
+    return np.array([gone[1], gone[0], quat.twist(turned, np.array([0.0, 0.0, 1.0]))])
+
+
+def velocities(clip):
+    return cycle_velocities.of_travels(np, travel(clip), np.float64(clip.trust.duration))
 
 
 def numbers(robot, content, name, folder):

@@ -2031,11 +2031,13 @@ export interface components {
              *     origin is the first pose's root on the floor, and the axes follow its heading.
              *     `step_length` is the greatest distance of one foot ahead of the other, in metres.
              *     `stride_length` (m), `speed` (m/s) and `turn` (degrees to the left) are of a whole
-             *     cycle. `leg_length` and `stature` (m) are of the performer's bones and independent of
+             *     cycle. `forward_velocity`, `left_velocity` (m/s) and `turn_rate` (rad/s to the left) are
+             *     the constant velocities, in the frame that turns with the body, that cover the travel of
+             *     a cycle. `leg_length` and `stature` (m) are of the performer's bones and independent of
              *     the motion.
              * @enum {string}
              */
-            quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "leg_length" | "stature";
+            quantity: "left" | "height" | "forward" | "step_length" | "stride_length" | "speed" | "turn" | "left_velocity" | "forward_velocity" | "turn_rate" | "leg_length" | "stature";
             /** @description Indices of the joints whose mean position is measured, of the two feet of a step, or of the bones of a leg. */
             joints?: number[];
             /**

@@ -64,7 +64,8 @@ class Auto(RecipePart):
         description="left, height, forward: coordinate of a joint in the frame of the first pose, "
         "m; root_height: height of the root, m; step_length: greatest distance of one foot ahead "
         "of the other, m; stride_length (m), speed (m/s), turn (degrees to the left): of a whole "
-        "cycle; leg_length, stature: of the performer, m"
+        "cycle; forward_velocity, left_velocity (m/s), turn_rate (rad/s to the left): of a cycle "
+        "in the frame that turns with it; leg_length, stature: of the performer, m"
     )
     joint: Text | Annotated[list[Text], Field(min_length=1)] | None = Field(
         default=None,

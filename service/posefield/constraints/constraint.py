@@ -14,11 +14,14 @@ from posefield.constraints.constrained_motion import (
     MotionVariables,
 )
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import measures
+from posefield.motion import cycle_velocities, measures
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure, MeasuredMotion
 
 ValuesAndGradients = tuple[Values, Gradients]
 """Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
+
+SLOPE_STEP = 1e-5
+"""Difference of a logarithm of seconds, of metres and of radians, for slopes of velocities."""
 
 StackedValues = Annotated[Floats, "motions values"]
 StackedGradients = Annotated[Floats, "motions values variables"]
@@ -159,7 +162,7 @@ class StepLengthConstraint:
 
 @dataclass(frozen=True)
 class TravelConstraint:
-    """Constraint on the travel of a cycle: distance, m, speed, m/s, or turn, degrees."""
+    """Constraint on the travel of a cycle: distance, m, speed, m/s, turn, degrees, or velocity."""
 
     names: tuple[str, ...]
     quantity: str
@@ -183,6 +186,15 @@ class TravelConstraint:
         duration, travel = np.exp(numbers[:, -CYCLE_VARIABLES]), numbers[:, -CYCLE_VARIABLES + 1 :]
         values = measures.travel_values(self.quantity, travel, duration)
         gradients = np.zeros((len(numbers), 1, numbers.shape[1]))
+        if self.quantity in cycle_velocities.QUANTITIES:
+            for column, step in enumerate(SLOPE_STEP * np.eye(CYCLE_VARIABLES), -CYCLE_VARIABLES):
+                moved = [numbers[:, -CYCLE_VARIABLES:] + way * step for way in (0.5, -0.5)]
+                after, before = (
+                    measures.travel_values(self.quantity, each[:, 1:], np.exp(each[:, 0]))
+                    for each in moved
+                )
+                gradients[:, 0, column] = (after - before) / SLOPE_STEP
+            return values[:, None], gradients
         if self.quantity == "turn":
             gradients[:, 0, -1] = np.degrees(1.0)
             return values[:, None], gradients

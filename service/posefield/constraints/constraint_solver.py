@@ -20,6 +20,7 @@ from posefield.constraints.take_variation import TakeVariation
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTarget, bring_back
 from posefield.inference.session import PredictionState, Session
 from posefield.model_file.model_card import ModelCard
+from posefield.motion import cycle_velocities
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import motion_question
 from posefield.question.results import PoseAnswer, Trust
@@ -256,8 +257,10 @@ class ConstraintSolver:
         """Return the predicted motion of a question, or its take."""
         corrector = self.corrector(question.level)
         state = self._session.state(question.point, np.zeros(1), question.labels, question.level)
-        motion, take = corrector.predict(state), constraints.take
-        return self.variation.vary(corrector, motion, question, take) if take else motion
+        motion, take = _at_velocities(corrector.predict(state), constraints), constraints.take
+        if take is None:
+            return motion
+        return _at_velocities(self.variation.vary(corrector, motion, question, take), constraints)
 
     def _aims(
         self, question: ValidatedQuestion, constraints: ConstraintSet, motion: ConstrainedMotion
@@ -320,6 +323,25 @@ class ConstraintSolver:
         last = motion.scene.reduced.frames - 1
         at = (goal.moment.share or 0.0) * last if goal.time is None else frame
         return PositionConstraint((goal.name,), goal.moment, (0, 1, 2), np.array(goal.position), at)
+
+
+def _at_velocities(motion: ConstrainedMotion, constraints: ConstraintSet) -> ConstrainedMotion:
+    """Return a prediction or take that travels at the velocities among the constraints.
+
+    Its duration and its poses about the travel are as they were.
+    """
+    goals = {str(measure.quantity): goal for _, measure, goal in constraints.controls}
+    names = cycle_velocities.QUANTITIES
+    chosen = np.array([1.0 * (name in goals) for name in names])
+    if not chosen.any():
+        return motion
+    velocities, numbers = np.array([goals.get(name, 0.0) for name in names]), motion.numbers.copy()
+    numbers[-len(names) :] = cycle_velocities.matched(
+        np, motion.travel, np.float64(motion.duration), velocities, chosen
+    )
+    scene = motion.scene
+    scene = replace(scene, predicted=scene.predicted if motion.is_take else numbers)
+    return replace(motion, scene=scene, numbers=numbers)
 
 
 def _same_joints_and_frame(a: PositionConstraint, b: PositionConstraint, last: float) -> bool:

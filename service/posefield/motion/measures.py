@@ -13,7 +13,7 @@ import numpy as np
 
 from posefield.common.bounded_types import Index, Share
 from posefield.common.units import Bones, Floats, Frames, Positions, RootPath, Vector
-from posefield.motion import quat, skeleton
+from posefield.motion import cycle_velocities, quat, skeleton
 
 Quantity = Literal[
     "left",
@@ -23,6 +23,9 @@ Quantity = Literal[
     "stride_length",
     "speed",
     "turn",
+    "left_velocity",
+    "forward_velocity",
+    "turn_rate",
     "leg_length",
     "stature",
 ]
@@ -30,11 +33,13 @@ MeasureMoment = Literal["start", "end", "highest", "lowest", "farthest", "landma
 
 POSITION_AXES = {"left": 0, "height": 1, "forward": 2}
 """Quantities of a joint's position, m, and the axis of each in the frame of the clip."""
-TRAVEL_QUANTITIES = ("stride_length", "speed", "turn")
-"""Quantities of a whole clip: m, m/s, degrees to the left."""
+TRAVEL_QUANTITIES = ("stride_length", "speed", "turn", *cycle_velocities.QUANTITIES)
+"""Quantities of a whole clip: m, m/s, degrees to the left; m/s, m/s, rad/s to the left."""
 BODY_QUANTITIES = ("leg_length", "stature")
 """Quantities of the performer, not of the motion, m."""
-UNITS = {"speed": "m/s", "turn": "deg"}
+UNITS = {"speed": "m/s", "turn": "deg"} | dict(
+    zip(cycle_velocities.QUANTITIES, ("m/s", "m/s", "rad/s"), strict=True)
+)
 """Units of the quantities that are not in metres."""
 QUANTITIES: tuple[str, ...] = get_args(Quantity)
 MOMENTS: tuple[str, ...] = get_args(MeasureMoment)
@@ -86,7 +91,7 @@ class MeasuredMotion:
 def evaluate(measure: Measure, motion: MeasuredMotion) -> float:
     """Return the value of a quantity, in its unit."""
     match measure.quantity:
-        case "stride_length" | "speed" | "turn":
+        case quantity if quantity in TRAVEL_QUANTITIES:
             path, seconds = motion.travel[None], np.array([motion.duration])
             return float(travel_values(measure.quantity, path, seconds)[0])
         case "leg_length":
@@ -106,12 +111,15 @@ def evaluate(measure: Measure, motion: MeasuredMotion) -> float:
 def travel_values(
     quantity: str, travels: Annotated[Floats, "motions 3"], durations: Annotated[Floats, "motions"]
 ) -> Annotated[Floats, "motions"]:
-    """Return distances, m, speeds, m/s, or changes of heading, degrees, of travels (M, 3).
+    """Return distances, m, speeds, m/s, turns, degrees, or velocities of travels (M, 3).
 
     durations: (M,), s.
     """
     if quantity == "turn":
         return np.asarray(np.degrees(travels[:, 2]))
+    if quantity in cycle_velocities.QUANTITIES:
+        column = cycle_velocities.QUANTITIES.index(quantity)
+        return np.asarray(cycle_velocities.of_travels(np, travels, durations)[:, column])
     ways = np.hypot(travels[:, 0], travels[:, 1])
     return np.asarray(ways / durations if quantity == "speed" else ways)
 

@@ -21,7 +21,8 @@ from posefield.kriging import kriging_model, support
 from posefield.kriging.kriging_model import COVARIANCE_MODELS
 from posefield.model_file import onnx_file
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import quat
+from posefield.motion import cycle_velocities, quat
+from posefield.motion.cycle_velocities import QUANTITIES
 from posefield.reference import array_rotations as rotations
 from posefield.robots import robot_clip, standing_soles
 from posefield.robots.standing_soles import Array, Repeat, StandingSoles
@@ -130,6 +131,7 @@ class ReferenceModel:
             shares *= kernel.correlation + (1.0 - kernel.correlation) * same
         form = np.zeros((count + 1 + len(bounds.low) + len(samples),) * 2)
         form[np.tril_indices(len(form))] = weights["precision"]
+        quantities = [control.measure and control.measure.quantity for control in card.controls]
         captured = support.fit_support(np.array(card.examples)).table()
         return {
             "low": bounds.low,
@@ -153,6 +155,7 @@ class ReferenceModel:
             **{f"support_{name}": np.asarray(value) for name, value in captured.items()},
             **self._tensor(),
             "contacts": self._contacts(),
+            "commanded": 1.0 * np.array([[q == name for name in QUANTITIES] for q in quantities]),
         }
 
     def _tensor(self) -> dict[str, Floats]:
@@ -196,7 +199,11 @@ class ReferenceModel:
 
 def _check(path: str | Path, card: ModelCard) -> None:
     """Raise ModelError for a model that is not of the gaits of a robot."""
-    measured = [control.name for control in card.controls if control.measure]
+    measured = [
+        control.name
+        for control in card.controls
+        if control.measure and control.measure.quantity not in QUANTITIES
+    ]
     if card.robot is None:
         raise ModelError(path, "no robot's, expected a model whose recipe has [robot]")
     if not card.cyclic or card.root != "travelling":
@@ -205,7 +212,8 @@ def _check(path: str | Path, card: ModelCard) -> None:
         raise ModelError(path, "of an earlier version, whose angles are curved: train it again")
     if measured:
         raise ModelError(
-            path, f"{measured[0]} is measured, expected controls from columns of the table alone"
+            path,
+            f"{measured[0]} is measured, expected columns or some of {', '.join(QUANTITIES)}",
         )
 
 
@@ -260,6 +268,8 @@ class Evaluator:
         basis = self._basis(commands)
         variance = w["sill"] * xp.sum((basis @ w["form"]) * basis, -1)
         variance = variance + xp.exp(logarithms[:, 0])
+        goals, chosen = limited @ w["commanded"], xp.sum(w["commanded"], 0)
+        travel = cycle_velocities.matched(xp, travel, durations, goals, chosen)
         travels = xp.stack([travel[:, 1], travel[:, 0], travel[:, 2]], -1)
         shares = xp.exp(warp + w["warp_still"])
         shares = shares / xp.sum(shares, -1)[:, None]

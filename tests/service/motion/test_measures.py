@@ -7,7 +7,7 @@ import pytest
 from families import sample_walk
 
 from posefield.model_file.model_card import mean_accelerations
-from posefield.motion import measures
+from posefield.motion import cycle_velocities, measures
 from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train.source.measured_controls import travel
 
@@ -91,6 +91,35 @@ def test_a_stroll_is_as_fast_and_turns_as_much_as_it_was_made_to():
         assert measures.evaluate(Measure("stride_length"), seen) == pytest.approx(chord, abs=1e-9)
         assert measures.evaluate(Measure("speed"), seen) == pytest.approx(chord / seen.duration)
     assert arc - chord > 1e-3, "negative control: an arc is longer than its chord"
+
+
+VELOCITIES = np.array([[0.1, 0.4, 0.0], [-0.2, 0.7, 1e-7], [0.3, -0.5, 1.3], [0.0, 1.0, -2.5]])
+"""To the left and ahead, m/s, and of the heading, rad/s."""
+
+
+def test_travels_are_integrals_of_velocities_and_give_them_back():
+    durations = np.array([1.0, 0.8, 1.7, 2.0])
+    gone = cycle_velocities.travels(np, VELOCITIES, durations)
+    steps = 4000
+    shares = (np.arange(steps) + 0.5)[:, None] / steps
+    headings = shares * VELOCITIES[:, 2] * durations
+    ahead, left = VELOCITIES[:, 1], VELOCITIES[:, 0]
+    integrals = [
+        (np.cos(headings) * left + np.sin(headings) * ahead).mean(axis=0) * durations,
+        (np.cos(headings) * ahead - np.sin(headings) * left).mean(axis=0) * durations,
+        VELOCITIES[:, 2] * durations,
+    ]
+    assert np.abs(gone.T - integrals).max() < 1e-6
+    assert np.abs(gone[:, :2] / durations[:, None] - VELOCITIES[:, :2]).max() > 0.1, "a chord"
+    for column, quantity in enumerate(cycle_velocities.QUANTITIES):
+        values = measures.travel_values(quantity, gone, durations)
+        np.testing.assert_allclose(values, VELOCITIES[:, column], atol=ROUNDING)
+    chosen, goals = np.array([0.0, 1.0, 1.0]), VELOCITIES[::-1]
+    mixed = cycle_velocities.of_travels(
+        np, cycle_velocities.matched(np, gone, durations, goals, chosen), durations
+    )
+    np.testing.assert_allclose(mixed[:, 0], VELOCITIES[:, 0], atol=ROUNDING)
+    np.testing.assert_allclose(mixed[:, 1:], goals[:, 1:], atol=ROUNDING)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from posefield.inference import reduced_motion, session
 from posefield.kriging import kriging_model
 from posefield.model_file import onnx_file
 from posefield.motion import skeleton
-from posefield.motion.measures import Measure
+from posefield.motion.measures import TRAVEL_QUANTITIES, Measure
 
 SMALL = 1e-6
 
@@ -30,8 +30,11 @@ def aims(begun) -> list:
     ]
     if not begun.opened.card.cyclic:
         return places
-    ways = [("speed", "m/s"), ("turn", "deg"), ("stride_length", "m")]
-    return [*places, *(TravelConstraint(("x",), name, np.zeros(1), unit) for name, unit in ways)]
+    ways = [Measure(quantity) for quantity in TRAVEL_QUANTITIES]
+    return [
+        *places,
+        *(TravelConstraint(("x",), way.quantity, np.zeros(1), way.unit) for way in ways),
+    ]
 
 
 @pytest.mark.parametrize("name", ["reaching", "walking"])
