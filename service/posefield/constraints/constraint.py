@@ -14,14 +14,14 @@ from posefield.constraints.constrained_motion import (
     MotionVariables,
 )
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import cycle_velocities, measures
+from posefield.motion import measures
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure, MeasuredMotion
 
 ValuesAndGradients = tuple[Values, Gradients]
 """Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
 
 SLOPE_STEP = 1e-5
-"""Difference of a logarithm of seconds, of metres and of radians, for slopes of velocities."""
+"""Difference of a logarithm of seconds, of metres and of radians, for slopes of travel."""
 
 StackedValues = Annotated[Floats, "motions values"]
 StackedGradients = Annotated[Floats, "motions values variables"]
@@ -183,27 +183,16 @@ class TravelConstraint:
         self, scenes: Sequence[MotionVariables], numbers: StackedVariables
     ) -> tuple[StackedValues, StackedGradients]:
         """Return the values (M, 1) of cycles and their gradients (M, 1, numbers)."""
-        duration, travel = np.exp(numbers[:, -CYCLE_VARIABLES]), numbers[:, -CYCLE_VARIABLES + 1 :]
-        values = measures.travel_values(self.quantity, travel, duration)
         gradients = np.zeros((len(numbers), 1, numbers.shape[1]))
-        if self.quantity in cycle_velocities.QUANTITIES:
-            for column, step in enumerate(SLOPE_STEP * np.eye(CYCLE_VARIABLES), -CYCLE_VARIABLES):
-                moved = [numbers[:, -CYCLE_VARIABLES:] + way * step for way in (0.5, -0.5)]
-                after, before = (
-                    measures.travel_values(self.quantity, each[:, 1:], np.exp(each[:, 0]))
-                    for each in moved
-                )
-                gradients[:, 0, column] = (after - before) / SLOPE_STEP
-            return values[:, None], gradients
-        if self.quantity == "turn":
-            gradients[:, 0, -1] = np.degrees(1.0)
-            return values[:, None], gradients
-        distance = np.maximum(np.hypot(travel[:, 0], travel[:, 1]), 1e-9)
-        per = duration if self.quantity == "speed" else np.ones(len(duration))
-        gradients[:, 0, -CYCLE_VARIABLES + 1 : -1] = travel[:, :2] / (distance * per)[:, None]
-        if self.quantity == "speed":
-            gradients[:, 0, -CYCLE_VARIABLES] = -values
-        return values[:, None], gradients
+        for column in range(-CYCLE_VARIABLES, 0):
+            step = np.eye(1, numbers.shape[1], column % numbers.shape[1]) * SLOPE_STEP
+            rise = self._values(numbers + 0.5 * step) - self._values(numbers - 0.5 * step)
+            gradients[:, 0, column] = rise / SLOPE_STEP
+        return self._values(numbers)[:, None], gradients
+
+    def _values(self, numbers: StackedVariables) -> Annotated[Floats, "motions"]:
+        duration, travel = np.exp(numbers[:, -CYCLE_VARIABLES]), numbers[:, -CYCLE_VARIABLES + 1 :]
+        return measures.travel_values(self.quantity, travel, duration)
 
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions

@@ -258,9 +258,8 @@ class ConstraintSolver:
         corrector = self.corrector(question.level)
         state = self._session.state(question.point, np.zeros(1), question.labels, question.level)
         motion, take = _at_velocities(corrector.predict(state), constraints), constraints.take
-        if take is None:
-            return motion
-        return _at_velocities(self.variation.vary(corrector, motion, question, take), constraints)
+        varied = self.variation.vary(corrector, motion, question, take) if take else motion
+        return _at_velocities(varied, constraints) if take else motion
 
     def _aims(
         self, question: ValidatedQuestion, constraints: ConstraintSet, motion: ConstrainedMotion
@@ -326,21 +325,16 @@ class ConstraintSolver:
 
 
 def _at_velocities(motion: ConstrainedMotion, constraints: ConstraintSet) -> ConstrainedMotion:
-    """Return a prediction or take that travels at the velocities among the constraints.
-
-    Its duration and its poses about the travel are as they were.
-    """
+    """Return a prediction or take with its travel at the velocities among the constraints."""
     goals = {str(measure.quantity): goal for _, measure, goal in constraints.controls}
-    names = cycle_velocities.QUANTITIES
+    names, numbers, scene = cycle_velocities.QUANTITIES, motion.numbers.copy(), motion.scene
     chosen = np.array([1.0 * (name in goals) for name in names])
-    if not chosen.any():
-        return motion
-    velocities, numbers = np.array([goals.get(name, 0.0) for name in names]), motion.numbers.copy()
-    numbers[-len(names) :] = cycle_velocities.matched(
-        np, motion.travel, np.float64(motion.duration), velocities, chosen
-    )
-    scene = motion.scene
-    scene = replace(scene, predicted=scene.predicted if motion.is_take else numbers)
+    if chosen.any():
+        velocities = np.array([goals.get(name, 0.0) for name in names])
+        numbers[-len(names) :] = cycle_velocities.matched(
+            np, motion.travel, np.float64(motion.duration), velocities, chosen
+        )
+        scene = scene if motion.is_take else replace(scene, predicted=numbers)
     return replace(motion, scene=scene, numbers=numbers)
 
 

@@ -14,7 +14,6 @@ import jax
 import jax.numpy as jnp
 
 from posefield.reference.motion_plan import Arrays, Evaluator, Plan, Reference, ReferenceModel
-from posefield.robots import standing_soles
 
 
 class ReferenceMotion(Evaluator):
@@ -37,9 +36,6 @@ class ReferenceMotion(Evaluator):
             partial(jnp.asarray, dtype=dtype),
             lambda values: values.astype(jnp.int32),
             lambda values, indices: values[indices],
-            lambda step, columns: jax.lax.fori_loop(
-                0, standing_soles.ITERATIONS, lambda _, state: step(state), columns
-            ),
         )
         super().__init__(model, arrays, arrays)
         self._compiled = jax.jit(super().plan), jax.jit(super().sample)

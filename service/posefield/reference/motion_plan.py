@@ -24,8 +24,8 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion import cycle_velocities, quat
 from posefield.motion.cycle_velocities import QUANTITIES
 from posefield.reference import array_rotations as rotations
-from posefield.robots import robot_clip, standing_soles
-from posefield.robots.standing_soles import Array, Repeat, StandingSoles
+from posefield.robots import robot_clip
+from posefield.robots.standing_soles import Array, StandingSoles
 from posefield.validation import question_validation
 
 TO_Z_UP = [2, 0, 1]
@@ -35,15 +35,13 @@ class Arrays(NamedTuple):
     """A module of arrays.
 
     xp: `numpy`, `torch` or `jax.numpy`. constant: makes an array of NumPy's. whole: an array's
-    numbers, rounded down, as indices. take: rows of an array (R, C) at indices. repeat: loop
-    of the legs' solver.
+    numbers, rounded down, as indices. take: rows of an array (R, C) at indices.
     """
 
     xp: Any
     constant: Callable[[Floats], Array]
     whole: Callable[[Array], Array]
     take: Callable[[Array, Array], Array]
-    repeat: Repeat = standing_soles.repeated
 
 
 class Plan(NamedTuple):
@@ -131,6 +129,7 @@ class ReferenceModel:
             shares *= kernel.correlation + (1.0 - kernel.correlation) * same
         form = np.zeros((count + 1 + len(bounds.low) + len(samples),) * 2)
         form[np.tril_indices(len(form))] = weights["precision"]
+        exponents = weights.get("duration_exponents", np.zeros((samples.shape[1], 1)))
         quantities = [control.measure and control.measure.quantity for control in card.controls]
         captured = support.fit_support(np.array(card.examples)).table()
         return {
@@ -147,7 +146,8 @@ class ReferenceModel:
             "form": form + np.tril(form, -1).T,
             "sill": weights["sill"].astype(np.float64)[0],
             "shortest": np.array(bounds.duration_limits),
-            **_power_law(weights, len(bounds.low)),
+            "floor": weights.get("duration_floor", np.ones(samples.shape[1]))[: samples.shape[1]],
+            "exponents": exponents[: samples.shape[1], 0],
             "warp_still": weights["warp_still"],
             "warp_form": weights["warp_form"],
             "warp_breaks": weights["warp_breaks"][3:, 0, 0],
@@ -155,6 +155,7 @@ class ReferenceModel:
             **{f"support_{name}": np.asarray(value) for name, value in captured.items()},
             **self._tensor(),
             "contacts": self._contacts(),
+            "conjugate": np.array([1.0, -1.0, -1.0, -1.0]),
             "commanded": 1.0 * np.array([[q == name for name in QUANTITIES] for q in quantities]),
         }
 
@@ -217,14 +218,6 @@ def _check(path: str | Path, card: ModelCard) -> None:
         )
 
 
-def _power_law(weights: Mapping[str, Any], controls: int) -> dict[str, Floats]:
-    """Return floor and exponents (d,) of the controls in the duration."""
-    if "duration_floor" not in weights:
-        return {"floor": np.ones(controls), "exponents": np.zeros(controls)}
-    exponents = weights["duration_exponents"][:controls, 0]
-    return {"floor": weights["duration_floor"][:controls], "exponents": exponents}
-
-
 class Evaluator:
     """Evaluation of a model by one module of arrays.
 
@@ -243,7 +236,7 @@ class Evaluator:
         self._whole, self._take, self._steps = fast.whole, fast.take, model.card.frames - 1
         self._hinges, self._feet = len(model.hinges), len(model.feet)
         arguments = model.robot, model.card.soles, self._steps
-        self._soles = StandingSoles(fine.xp, fine.constant, *arguments, fine.repeat)
+        self._soles = StandingSoles(fine.xp, fine.constant, *arguments)
         self._limits = StandingSoles(fast.xp, fast.constant, *arguments)
         self._covariance = COVARIANCE_MODELS[model.card.kriging.covariance]
 
@@ -325,7 +318,7 @@ class Evaluator:
         if self._model.card.soles:
             changed = self._soles.corrected(path, rotations.matrices(xp, turns), angles)
             angles = angles + (changed - self._soles.limited(angles))
-        before = turns[:, :-1] * self._constant_signs(turns)
+        before = turns[:, :-1] * w["conjugate"]
         spins = rotations.rotation_vectors(xp, rotations.product(xp, turns[:, 1:], before))
         cycle = travel[:, 2]
         contacts = w["contacts"] + 0.0 * numbers[..., : self._feet]
@@ -340,11 +333,6 @@ class Evaluator:
             ],
             -1,
         )
-
-    def _constant_signs(self, turns: Array) -> Array:
-        """Return the signs that conjugate quaternions."""
-        one = turns[:1, :1, :1] * 0.0 + 1.0
-        return self._xp.concatenate([one, -one, -one, -one], -1)
 
     def sample(self, plan: Plan, phase: Array) -> Reference:
         """Return the reference at phases (E,), in cycles; whole cycles do not count."""

@@ -5,12 +5,13 @@ known at training. In a run of them the point stays at the mean of its predicted
 its displacement is linear in them; from one run to the next the displacement changes smoothly. The
 hinges of each leg follow by a fixed number of damped Gauss-Newton steps within their limits.
 Nothing is searched or decided, and so NumPy, torch and JAX evaluate the same functions, which take
-their module as `xp`, and gradients pass through them.
+their module as `xp`, and gradients pass through them. Legs of one kind are solved at once.
 
 Positions are metres, Z up. A cycle of N steps has frames 0 to N, and frame N is frame 0 moved on.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -28,7 +29,6 @@ DAMPING = 1e-6
 
 Array = Any
 """Array of NumPy, torch or JAX."""
-Repeat = Callable[[Callable[[list[Array]], list[Array]], list[Array]], list[Array]]
 Constant = Callable[[Floats], Array]
 """Function from NumPy's arrays to arrays of the right kind, precision and device."""
 
@@ -46,6 +46,9 @@ class SolePoint:
     stances: tuple[tuple[Index, Index], ...]
 
 
+Points = Sequence[SolePoint]
+
+
 class Leg(NamedTuple):
     """Chain from the base to a foot.
 
@@ -58,25 +61,25 @@ class Leg(NamedTuple):
     rows: tuple[int, ...]
 
 
-def legs(robot: Robot, points: Sequence[SolePoint]) -> list[Leg]:
+def legs(robot: Robot, points: Points) -> list[Leg]:
     """Return the legs of the feet that have sole points, in the order of the points.
 
     A hinge above two feet, as in a waist, belongs to neither.
     """
     feet = list(dict.fromkeys(point.body for point in points))
-    chains = {foot: _chain(robot, foot) for foot in feet}
-    shared = [body for body in range(len(robot.bodies)) if _count(chains.values(), body) > 1]
+    chains = [_chain(robot, foot) for foot in feet]
+    legs_of_bodies = Counter(body for chain in chains for body in chain)
     return [
         Leg(
-            chains[foot],
+            chain,
             tuple(
                 hinge
                 for hinge, body in enumerate(robot.hinge_bodies)
-                if body in chains[foot] and body not in shared
+                if body in chain and legs_of_bodies[body] == 1
             ),
             tuple(row for row, point in enumerate(points) if point.body == foot),
         )
-        for foot in feet
+        for foot, chain in zip(feet, chains, strict=True)
     ]
 
 
@@ -87,39 +90,113 @@ def _chain(robot: Robot, foot: int) -> tuple[int, ...]:
     return tuple(chain)
 
 
-def _count(chains: Iterable[tuple[int, ...]], body: int) -> int:
-    return sum(body in chain for chain in chains)
+class LegGroup:
+    """L legs of c hinges from the base to the foot, of which each turns h alone, and of p points.
+
+    Each is a chain of transforms (4, 4), linear in one, the sine, and one less the cosine of an
+    angle. All R frames of all commands are rows of few products of matrices.
+    """
+
+    def __init__(
+        self, xp: Any, constant: Constant, robot: Robot, points: Points, group: list[Leg]
+    ) -> None:
+        chains = [_links(robot, leg.bodies) for leg in group]
+        self._xp, self.rows = xp, [row for leg in group for row in leg.rows]
+        self._turning = [chains[0][0].index(hinge) for hinge in group[0].hinges]
+        self._links = constant(np.stack([links for _, links, _ in chains]))
+        identity, turned = np.eye(len(robot.hinges)), [h for leg in group for h in leg.hinges]
+        self._chains = constant(identity[[hinge for chain, _, _ in chains for hinge in chain]])
+        self._columns, self._identity = (
+            constant(identity[turned]),
+            constant(np.eye(len(self._turning))),
+        )
+        lines = np.stack([_homogeneous(robot.axes, 0.0), _homogeneous(robot.anchors, 1.0)], axis=-1)
+        self._lines = constant(lines[turned].reshape(len(group), -1, 4, 2))
+        places = [
+            last @ _homogeneous(np.array([points[row].position for row in leg.rows]), 1.0).T
+            for leg, (_, _, last) in zip(group, chains, strict=True)
+        ]
+        self._places = constant(np.stack(places))
+
+    def points(self, angles: Array) -> tuple[Array, list[Array]]:
+        """Return sole points (L, R, 3, p), m, from the base, and slopes (L, R, p, h) of each axis.
+
+        angles (R, H): of all hinges of the robot, rad.
+        """
+        xp, (legs, hinges) = self._xp, self._links.shape[:2]
+        turned = (self._chains @ angles.T).reshape(legs, hinges, -1)
+        shares = xp.stack([turned * 0.0 + 1.0, xp.sin(turned), 1.0 - xp.cos(turned)], -1)
+        links = (shares @ self._links).reshape(legs, hinges, -1, 4, 4)
+        poses = [links[:, 0]]
+        for hinge in range(1, hinges):
+            poses.append(poses[-1] @ links[:, hinge])
+        points = (poses[-1].reshape(legs, -1, 4) @ self._places).reshape(legs, len(angles), 4, -1)
+        stacked = xp.stack([poses[hinge] for hinge in self._turning], 1)
+        lines = stacked.reshape(legs, len(self._turning), -1, 4) @ self._lines
+        lines = xp.swapaxes(lines.reshape(legs, len(self._turning), -1, 8), 1, 2)
+        axes = [lines[:, :, None, :, 2 * axis] for axis in range(3)]
+        arms = [points[:, :, a, :, None] - lines[:, :, None, :, 2 * a + 1] for a in range(3)]
+        pairs = ((1, 2), (2, 0), (0, 1))
+        return points[:, :, :3], [axes[i] * arms[j] - axes[j] * arms[i] for i, j in pairs]
+
+    def turns(self, goals: Array, points: Array, slopes: Sequence[Array]) -> Array:
+        """Return the turns (R, H), rad, of all hinges of a step from points to goals."""
+        xp, gaps = self._xp, goals - points
+        matrix = sum(xp.swapaxes(slope, -1, -2) @ slope for slope in slopes)
+        vector = sum(
+            xp.sum(slope * gaps[:, :, axis, :, None], 2) for axis, slope in enumerate(slopes)
+        )
+        # By elimination over all systems at once: a library solves one after the other.
+        system = xp.concatenate([matrix + DAMPING * self._identity, vector[..., None]], -1)
+        for pivot, unit in enumerate(self._identity):
+            row = system[..., pivot, :] / system[..., pivot, pivot, None]
+            system = system - (system[..., pivot] - unit)[..., None] * row[..., None, :]
+        solved = xp.swapaxes(system[..., -1], 0, 1)
+        return solved.reshape(len(solved), -1) @ self._columns
 
 
-def repeated(step: Callable[[list[Array]], list[Array]], columns: list[Array]) -> list[Array]:
-    """Return the columns after ITERATIONS steps."""
-    for _ in range(ITERATIONS):
-        columns = step(columns)
-    return columns
+def _links(robot: Robot, bodies: Sequence[int]) -> tuple[list[int], Floats, Floats]:
+    """Return the hinges of a chain, their links (c, 3, 16), and the transform behind the last.
+
+    A link is its first matrix, the second times the sine, and the third by one less the cosine.
+    """
+    hinges, links, fixed = list[int](), [], np.eye(4)
+    for body in bodies:
+        fixed = fixed @ _transform(quat.to_matrix(robot.turns[body]), robot.offsets[body], 1.0)
+        for hinge in (h for h, hinged in enumerate(robot.hinge_bodies) if hinged == body):
+            cross = np.cross(np.eye(3), robot.axes[hinge])
+            turned = [_transform(k, -k @ robot.anchors[hinge], 0.0) for k in (cross, cross @ cross)]
+            links.append([fixed, *(fixed @ matrix for matrix in turned)])
+            hinges, fixed = [*hinges, hinge], np.eye(4)
+    return hinges, np.array(links).reshape(len(links), 3, 16), fixed
+
+
+def _transform(matrix: Floats, offset: Floats, corner: float) -> Floats:
+    return np.vstack([np.column_stack([matrix, offset]), [0.0, 0.0, 0.0, corner]])
+
+
+def _homogeneous(vectors: Floats, last: float) -> Floats:
+    return np.column_stack([vectors, np.full(len(vectors), last)])
 
 
 class StandingSoles:
     """Solver of the legs of a robot for its sole points.
 
-    constant: makes arrays of `xp` of NumPy's. steps: N of a cycle. repeat: as `repeated`, for a
-    module that compiles loops.
+    constant: makes arrays of `xp` of NumPy's. steps: N of a cycle.
     """
 
     def __init__(
-        self,
-        xp: Any,
-        constant: Constant,
-        robot: Robot,
-        points: Sequence[SolePoint],
-        steps: int,
-        repeat: Repeat = repeated,
+        self, xp: Any, constant: Constant, robot: Robot, points: Points, steps: int
     ) -> None:
-        self._xp, self._robot, self._steps, self._repeat = xp, robot, steps, repeat
-        self._legs = legs(robot, points)
-        order = [row for leg in self._legs for row in leg.rows]
-        runs = [_stance_matrices(points[row], steps) for row in order]
-        self._positions = [
-            constant(np.array([points[row].position for row in leg.rows])) for leg in self._legs
+        self._xp, self._steps = xp, steps
+        kinds: dict[tuple[object, ...], list[Leg]] = {}
+        for leg in legs(robot, points):
+            hinges = [h for h, body in enumerate(robot.hinge_bodies) if body in leg.bodies]
+            alone = tuple(hinge in leg.hinges for hinge in hinges)
+            kinds.setdefault((alone, len(leg.rows)), []).append(leg)
+        self._groups = [LegGroup(xp, constant, robot, points, group) for group in kinds.values()]
+        runs = [
+            _stance_matrices(points[row], steps) for group in self._groups for row in group.rows
         ]
         # Without sole points there are only limits.
         if runs:
@@ -128,13 +205,6 @@ class StandingSoles:
             )
         self._shares = constant(np.arange(steps) / steps)
         self._low, self._high = (constant(robot.ranges[:, side]) for side in range(2))
-        self._turns = [constant(turn) for turn in quat.to_matrix(robot.turns)]
-        self._offsets = [constant(offset) for offset in robot.offsets]
-        self._axes = [constant(axis) for axis in robot.axes]
-        self._anchors = [constant(anchor) for anchor in robot.anchors]
-        crosses = [_cross_matrix(axis) for axis in robot.axes]
-        self._crosses = [(constant(k), constant(k @ k)) for k in crosses]
-        self._identity = constant(np.eye(3))
 
     def limited(self, angles: Array) -> Array:
         """Return angles (..., H), rad, within the robot's limits."""
@@ -148,34 +218,24 @@ class StandingSoles:
         """
         xp, steps = self._xp, self._steps
         path, turns = base_path[..., :steps, None, :], base_turns[..., :steps, :, :]
-        limited = self.limited(angles[..., :steps, :])
-        columns = [limited[..., hinge] for hinge in range(limited.shape[-1])]
-        legs_points = [self._points(leg, columns)[0] for leg in range(len(self._legs))]
-        predicted = xp.concatenate(legs_points, -2) @ xp.swapaxes(turns, -1, -2) + path
+        rows = self.limited(angles[..., :steps, :]).reshape(-1, angles.shape[-1])
+        reached = [group.points(rows) for group in self._groups]
+        shape = (*path.shape[:-2], -1, 3)
+        predicted = [
+            xp.swapaxes(xp.swapaxes(points, 2, 3), 0, 1).reshape(shape) for points, _ in reached
+        ]
+        predicted = xp.concatenate(predicted, -2) @ xp.swapaxes(turns, -1, -2) + path
         # From the base, goals are where its motion leaves them.
         goals = (self._goals(base_path, base_turns, predicted) - path) @ turns
-        first = 0
-        for leg, (_, hinges, rows) in enumerate(self._legs):
-            goal, first = goals[..., first : first + len(rows), :], first + len(rows)
-
-            def step(
-                columns: list[Array],
-                leg: int = leg,
-                hinges: tuple[int, ...] = hinges,
-                goal: Array = goal,
-            ) -> list[Array]:
-                points, slopes = self._points(leg, columns)
-                across = xp.swapaxes(slopes, -1, -2)
-                gaps = (goal - points).reshape(*slopes.shape[:-1], 1)
-                turns = _solution(across @ slopes, (across @ gaps)[..., 0])
-                solved = list(columns)
-                for turn, hinge in zip(turns, hinges, strict=True):
-                    angle = columns[hinge] + turn
-                    solved[hinge] = xp.clip(angle, self._low[hinge], self._high[hinge])
-                return solved
-
-            columns = self._repeat(step, columns)
-        solved = xp.stack(columns, -1)
+        goals, first = goals.reshape(len(rows), -1, 3), 0
+        for group, (points, slopes) in zip(self._groups, reached, strict=True):
+            goal = goals[:, first : first + len(group.rows)].reshape(len(rows), len(points), -1, 3)
+            goal, first = xp.swapaxes(xp.swapaxes(goal, 0, 1), 2, 3), first + len(group.rows)
+            for iteration in range(ITERATIONS):
+                if iteration:
+                    points, slopes = group.points(rows)
+                rows = self.limited(rows + group.turns(goal, points, slopes))
+        solved = rows.reshape(*angles.shape[:-2], steps, -1)
         return xp.concatenate([solved, solved[..., :1, :]], -2)
 
     def _goals(self, base_path: Array, base_turns: Array, predicted: Array) -> Array:
@@ -203,72 +263,11 @@ class StandingSoles:
     def _linear(self, functions: Array, values: Array) -> Array:
         return self._xp.einsum("...pj,pij->...pi", values, functions)
 
-    def _points(self, leg: int, columns: Sequence[Array]) -> tuple[Array, Array]:
-        """Return a leg's sole points (..., p, 3), m, from the base, and slopes (..., 3 p, h).
-
-        columns: angles (...) of each hinge, rad.
-        """
-        xp, robot, chain = self._xp, self._robot, self._legs[leg]
-        turn = columns[0][..., None, None] * 0.0 + self._identity
-        origin = turn[..., 0] * 0.0
-        axes, fixed_points = list[Array](), list[Array]()
-        for body in chain.bodies:
-            origin = origin + turn @ self._offsets[body]
-            turn = turn @ self._turns[body]
-            for hinge in [h for h, hinged in enumerate(robot.hinge_bodies) if hinged == body]:
-                angle = columns[hinge][..., None, None]
-                first, second = self._crosses[hinge]
-                fixed = origin + turn @ self._anchors[hinge]
-                if hinge in chain.hinges:
-                    axes.append(turn @ self._axes[hinge])
-                    fixed_points.append(fixed)
-                spin = self._identity + xp.sin(angle) * first + (1.0 - xp.cos(angle)) * second
-                turn = turn @ spin
-                origin = fixed - turn @ self._anchors[hinge]
-        points = self._positions[leg] @ xp.swapaxes(turn, -1, -2) + origin[..., None, :]
-        arms = points[..., None, :] - xp.stack(fixed_points, -2)[..., None, :, :]
-        slopes = xp.stack(_cross(xp.stack(axes, -2)[..., None, :, :], arms), -2)
-        return points, slopes.reshape(*slopes.shape[:-3], -1, len(axes))
-
-
-def _solution(matrix: Array, vector: Array) -> list[Array]:
-    """Return the n numbers (...) that solve damped symmetric systems (..., n, n), (..., n).
-
-    By elimination over all systems at once, which for legs takes a tenth of the time of a library's
-    solver of one after the other.
-    """
-    size = matrix.shape[-1]
-    rows = [[matrix[..., i, j] for j in range(i + 1)] for i in range(size)]
-    sides = [vector[..., i] for i in range(size)]
-    for pivot in range(size):
-        inverse = 1.0 / (rows[pivot][pivot] + DAMPING)
-        for i in range(pivot + 1, size):
-            share = rows[i][pivot] * inverse
-            for j in range(pivot + 1, i + 1):
-                rows[i][j] = rows[i][j] - share * rows[j][pivot]
-            sides[i] = sides[i] - share * sides[pivot]
-        sides[pivot] = sides[pivot] * inverse
-    for i in reversed(range(size)):
-        for j in range(i + 1, size):
-            # Of an eliminated column its own pivot's share is left.
-            sides[i] = sides[i] - rows[j][i] * sides[j] / (rows[i][i] + DAMPING)
-    return sides
-
 
 def _turned(xp: Any, angle: Array, x: Array, y: Array) -> list[Array]:
     """Return planar vectors turned by an angle, rad."""
     cosine, sine = xp.cos(angle), xp.sin(angle)
     return [cosine * x - sine * y, sine * x + cosine * y]
-
-
-def _cross(a: Array, b: Array) -> list[Array]:
-    return [a[..., i] * b[..., j] - a[..., j] * b[..., i] for i, j in ((1, 2), (2, 0), (0, 1))]
-
-
-def _cross_matrix(axis: Floats) -> Floats:
-    """Return the matrix (3, 3) of the vector product with an axis from the left."""
-    x, y, z = axis
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _stance_matrices(point: SolePoint, steps: int) -> tuple[Floats, Floats, Floats]:
