@@ -33,6 +33,7 @@ MOST_HIGH, MOST_DEEP = 1.5, 0.5
 
 Content = Mapping[str, Any]
 """Fields of a file by name; the numbers of a CSV file are the field "rows"."""
+Poses = tuple[Floats, Floats, Floats]
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,23 @@ class File:
     def names(self, field: str) -> tuple[str, ...]:
         """Return the names in a field."""
         return tuple(str(name) for name in np.asarray(self.content[field]).ravel())
+
+    def motion(
+        self,
+        name: str,
+        poses: Poses,
+        rate: tuple[float, str],
+        joints: str,
+        quaternions: str,
+        **facts: Any,
+    ) -> RobotMotion:
+        """Return the motion of a format.
+
+        poses: base positions (F, 3), m, rotations (F, 4), angles (F, H), rad. rate: as `rate`
+        returns it. joints, quaternions: how they were known. facts: further fields.
+        """
+        evidence = {"joints": joints, "quaternions": quaternions, "rate": rate[1]}
+        return RobotMotion(self.source, name, *poses, rate[0], evidence=evidence, **facts)
 
 
 def wxyz(values: Annotated[Floats, "frames 4"], order: QuaternionOrder) -> Floats:

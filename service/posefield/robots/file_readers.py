@@ -4,7 +4,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield.robots.file_conventions import File, tell_order, tell_quaternions, wxyz
+from posefield.robots.file_conventions import File, Poses, tell_order, tell_quaternions, wxyz
 from posefield.robots.robot import Robot
 from posefield.robots.robot_motion import RobotMotion
 
@@ -22,10 +22,9 @@ def from_rows(file: File) -> RobotMotion:
         )
     path, angles = rows[:, :3], rows[:, 7:]
     rotations, told = tell_quaternions(file, path, rows[:, 3:7], angles)
-    rate, rate_told = file.rate(None, " (Unitree's files have 30)")
+    rate = file.rate(None, " (Unitree's files have 30)")
     name = "unitree.csv" if np.array_equal(rotations[:, 0], rows[:, 6]) else "qpos.csv"
-    evidence = {"quaternions": told, "rate": rate_told, "joints": UNNAMED}
-    return RobotMotion(file.source, name, path, rotations, angles, rate, evidence=evidence)
+    return file.motion(name, (path, rotations, angles), rate, UNNAMED, told)
 
 
 def from_tracking(file: File) -> RobotMotion:
@@ -33,35 +32,30 @@ def from_tracking(file: File) -> RobotMotion:
     angles = file.array("joint_pos", None, None)
     bodies = file.array("body_pos_w", len(angles), None, 3)
     turns = file.array("body_quat_w", len(angles), bodies.shape[1], 4)[:, 0]
-    rate, rate_told = file.rate(_number(file, "fps"), "")
     ordered, told = tell_order(file, angles, bodies, turns)
     name = "beyondmimic.npz" if told.startswith("breadth") else "mjlab.npz"
     if file.conventions.order:
         name = "beyondmimic.npz" if file.conventions.order == "breadth" else "mjlab.npz"
-    evidence = {"joints": told, "quaternions": WXYZ, "rate": rate_told}
-    return RobotMotion(file.source, name, bodies[:, 0], turns, ordered, rate, evidence=evidence)
+    return file.motion(name, (bodies[:, 0], turns, ordered), _rate(file), told, WXYZ)
 
 
 def _number(file: File, field: str) -> float | None:
     return float(np.ravel(file.array(field, *([None] * np.ndim(file.content[field]))))[0])
 
 
+def _rate(file: File, field: str = "fps") -> tuple[float, str]:
+    return file.rate(_number(file, field), "")
+
+
 def from_holosoma(file: File) -> RobotMotion:
     """Return the motion of MuJoCo's coordinates with names of joints and bodies."""
     hinges = file.names("joint_names")
     columns = file.array("joint_pos", None, 7 + len(hinges))
-    rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {"joints": NAMED, "quaternions": WXYZ, "rate": rate_told}
-    return RobotMotion(
-        file.source,
-        "holosoma.npz",
-        columns[:, :3],
-        columns[:, 3:7],
-        columns[:, 7:],
-        rate,
-        hinges,
-        evidence=evidence,
-    )
+    return file.motion("holosoma.npz", _split(columns), _rate(file), NAMED, WXYZ, hinges=hinges)
+
+
+def _split(qpos: Floats) -> Poses:
+    return qpos[:, :3], qpos[:, 3:7], qpos[:, 7:]
 
 
 def from_isaaclab(file: File) -> RobotMotion:
@@ -72,18 +66,8 @@ def from_isaaclab(file: File) -> RobotMotion:
     rotations = file.array("body_rotations", len(angles), len(bodies), 4)
     robot = file.conventions.robot
     base = bodies.index(robot.bodies[0]) if robot and robot.bodies[0] in bodies else 0
-    rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {"joints": NAMED, "quaternions": WXYZ, "rate": rate_told}
-    return RobotMotion(
-        file.source,
-        "isaaclab.npz",
-        positions[:, base],
-        rotations[:, base],
-        angles,
-        rate,
-        hinges,
-        evidence=evidence,
-    )
+    poses = positions[:, base], rotations[:, base], angles
+    return file.motion("isaaclab.npz", poses, _rate(file), NAMED, WXYZ, hinges=hinges)
 
 
 PELVIS = ("pelvis_tx", "pelvis_tz", "pelvis_ty", "pelvis_tilt", "pelvis_list", "pelvis_rotation")
@@ -104,18 +88,10 @@ def from_loco_joints(file: File) -> RobotMotion:
         # The height is told from that of the robot's file.
         path = path + robot.offsets[0]
     turns = np.stack([columns[name] for name in PELVIS[3:]], axis=-1)
-    rate, rate_told = file.rate(None, " (LocoMuJoCo's first files have 500)")
-    evidence = {"joints": NAMED, "quaternions": "none: three angles", "rate": rate_told}
-    return RobotMotion(
-        file.source,
-        "locomujoco.npz",
-        path,
-        quat.from_euler(turns, "YXZ"),
-        np.stack([columns[name] for name in hinges], axis=-1),
-        rate,
-        hinges,
-        evidence=evidence,
-    )
+    rate = file.rate(None, " (LocoMuJoCo's first files have 500)")
+    angles = np.stack([columns[name] for name in hinges], axis=-1)
+    poses, told = (path, quat.from_euler(turns, "YXZ"), angles), "none: three angles"
+    return file.motion("locomujoco.npz", poses, rate, NAMED, told, hinges=hinges)
 
 
 def from_qpos(file: File) -> RobotMotion:
@@ -127,17 +103,9 @@ def from_qpos(file: File) -> RobotMotion:
         # The first joint of a trajectory is the free one of the base.
         hinges, told = file.names("joint_names")[1:], NAMED
     field = next((name for name in ("frequency", "fps") if name in file.content), None)
-    rate, rate_told = file.rate(_number(file, field) if field else None, "")
-    return RobotMotion(
-        file.source,
-        "locomujoco.npz" if "split_points" in file.content else "qpos.npz",
-        columns[:, :3],
-        columns[:, 3:7],
-        columns[:, 7:],
-        rate,
-        hinges,
-        evidence={"joints": told, "quaternions": "wxyz: MuJoCo's", "rate": rate_told},
-    )
+    rate = file.rate(_number(file, field) if field else None, "")
+    name = "locomujoco.npz" if "split_points" in file.content else "qpos.npz"
+    return file.motion(name, _split(columns), rate, told, "wxyz: MuJoCo's", hinges=hinges)
 
 
 LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll", "toe_base")
@@ -192,23 +160,12 @@ def from_kimodo(file: File) -> RobotMotion:
                 f"joint {name!r} turns by {np.degrees(off_axis[-1]):.1f} degrees in the mean about "
                 f"other axes than its hinge in {robot.name}: expected the robot G1"
             )
-    rate, rate_told = file.rate(None, " (Kimodo's files have 30)")
+    rate = file.rate(None, " (Kimodo's files have 30)")
     left_out = np.degrees(max(off_axis))
-    evidence = {
-        "joints": f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out",
-        "quaternions": "none: matrices",
-        "rate": rate_told,
-    }
-    return RobotMotion(
-        file.source,
-        "kimodo.npz",
-        positions[:, 0, [2, 0, 1]],
-        turns[:, 0],
-        np.unwrap(np.stack(angles, axis=-1), axis=0),
-        rate,
-        robot.hinges,
-        evidence=evidence,
-    )
+    told = f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out"
+    unwrapped = np.unwrap(np.stack(angles, axis=-1), axis=0)
+    poses = positions[:, 0, [2, 0, 1]], turns[:, 0], unwrapped
+    return file.motion("kimodo.npz", poses, rate, told, "none: matrices", hinges=robot.hinges)
 
 
 def _kimodo_joint(file: File, robot: Robot, body: int) -> int:
@@ -227,11 +184,9 @@ def _kimodo_joint(file: File, robot: Robot, body: int) -> int:
 def from_gmr(file: File) -> RobotMotion:
     """Return the motion of a retargeter's pickle."""
     angles = file.array("dof_pos", None, None)
-    rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {"joints": UNNAMED, "quaternions": XYZW, "rate": rate_told}
     rotations = wxyz(file.array("root_rot", len(angles), 4), "xyzw")
     path = file.array("root_pos", len(angles), 3)
-    return RobotMotion(file.source, "gmr.pkl", path, rotations, angles, rate, evidence=evidence)
+    return file.motion("gmr.pkl", (path, rotations, angles), _rate(file), UNNAMED, XYZW)
 
 
 def from_mimickit(file: File) -> RobotMotion:
@@ -241,28 +196,20 @@ def from_mimickit(file: File) -> RobotMotion:
         raise file.error(
             f"found {frames.shape[1]} numbers a frame, expected 6 of the base and more"
         )
-    rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {"joints": UNNAMED, "quaternions": "none: rotation vectors", "rate": rate_told}
-    return RobotMotion(
-        file.source,
-        "mimickit.pkl",
-        frames[:, :3],
-        quat.exp(frames[:, 3:6]),
-        frames[:, 6:],
-        rate,
-        loops=bool(file.content["loop_mode"]),
-        evidence=evidence,
+    poses, loops = (
+        (frames[:, :3], quat.exp(frames[:, 3:6]), frames[:, 6:]),
+        file.content["loop_mode"],
     )
+    told = "none: rotation vectors"
+    return file.motion("mimickit.pkl", poses, _rate(file), UNNAMED, told, loops=bool(loops))
 
 
 def from_asap(file: File) -> RobotMotion:
     """Return the motion of a pickle with the base's quaternions and joint angles."""
     angles = file.array("dof", None, None)
-    rate, rate_told = file.rate(_number(file, "fps"), "")
-    evidence = {"joints": UNNAMED, "quaternions": XYZW, "rate": rate_told}
     path = file.array("root_trans_offset", len(angles), 3)
     rotations = wxyz(file.array("root_rot", len(angles), 4), "xyzw")
-    return RobotMotion(file.source, "asap.pkl", path, rotations, angles, rate, evidence=evidence)
+    return file.motion("asap.pkl", (path, rotations, angles), _rate(file), UNNAMED, XYZW)
 
 
 AWD_FIELDS = ("root_pos", "root_quat", "joints_pos")
@@ -290,19 +237,9 @@ def from_awd(file: File) -> RobotMotion:
                 f"{starts.get(name)}, expected {size} numbers within the {rows.shape[1]} of a frame"
             )
         parts[name] = rows[:, starts[name] : starts[name] + size]
-    rate, rate_told = _frame_rate(file)
-    evidence = {"joints": NAMED, "quaternions": XYZW, "rate": rate_told}
-    return RobotMotion(
-        file.source,
-        "awd.json",
-        parts["root_pos"],
-        wxyz(parts["root_quat"], "xyzw"),
-        parts["joints_pos"],
-        rate,
-        hinges,
-        loops=_loops(file),
-        evidence=evidence,
-    )
+    poses = parts["root_pos"], wxyz(parts["root_quat"], "xyzw"), parts["joints_pos"]
+    facts = {"hinges": hinges, "loops": _loops(file)}
+    return file.motion("awd.json", poses, _frame_rate(file), NAMED, XYZW, **facts)
 
 
 DIFFERENCES = 0.9
@@ -319,24 +256,12 @@ def _are_velocities(angles: Floats, speeds: Floats) -> bool:
 def from_amp(file: File) -> RobotMotion:
     """Return the motion of rows of text: with a quaternion, or with TienKung's three angles."""
     rows = file.array("Frames", None, None)
-    rate, rate_told = _frame_rate(file)
-    half = rows.shape[1] // 2
-    evidence = {"joints": UNNAMED, "rate": rate_told}
+    rate, half, loops = _frame_rate(file), rows.shape[1] // 2, _loops(file)
     if rows.shape[1] % 2 == 0 and half > 7:
         if _are_velocities(rows[:, 6:half], rows[:, half + 6 :]):
-            evidence["quaternions"] = "none: roll, pitch and yaw, as velocities follow in each row"
-            turns = quat.from_euler(rows[:, [5, 4, 3]], "ZYX")
-            angles = rows[:, 6:half]
-            return RobotMotion(
-                file.source,
-                "tienkung.txt",
-                rows[:, :3],
-                turns,
-                angles,
-                rate,
-                loops=_loops(file),
-                evidence=evidence,
-            )
+            told = "none: roll, pitch and yaw, as velocities follow in each row"
+            poses = rows[:, :3], quat.from_euler(rows[:, [5, 4, 3]], "ZYX"), rows[:, 6:half]
+            return file.motion("tienkung.txt", poses, rate, UNNAMED, told, loops=loops)
         count = next((n for n in range(half, 6, -1) if _are_leading(rows, n)), None)
         if count:
             raise file.error(
@@ -344,17 +269,8 @@ def from_amp(file: File) -> RobotMotion:
                 "the file of whole poses (TienKung calls it motion_visualization)"
             )
     path, angles = rows[:, :3], rows[:, 7:]
-    rotations, evidence["quaternions"] = tell_quaternions(file, path, rows[:, 3:7], angles)
-    return RobotMotion(
-        file.source,
-        "amp.txt",
-        path,
-        rotations,
-        angles,
-        rate,
-        loops=_loops(file),
-        evidence=evidence,
-    )
+    rotations, told = tell_quaternions(file, path, rows[:, 3:7], angles)
+    return file.motion("amp.txt", (path, rotations, angles), rate, UNNAMED, told, loops=loops)
 
 
 def _are_leading(rows: Floats, count: int) -> bool:
