@@ -236,7 +236,7 @@ def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(kind, 
         # The service squares small differences of large numbers in single precision.
         np.testing.assert_allclose(plan.sigmas[row], trust.sigma, atol=1e-4)
         sigmas = np.array(trust.joint_sigma)[joints]
-        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=1e-4)
+        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=2e-4)
         assert plan.supported[row] == trust.supported
         # Negative control: feet as predicted differ.
         predicted = opened.clip(feet="as_predicted", fps=97, extrapolate="ok", **question)
