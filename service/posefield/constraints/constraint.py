@@ -184,15 +184,14 @@ class TravelConstraint:
     ) -> tuple[StackedValues, StackedGradients]:
         """Return the values (M, 1) of cycles and their gradients (M, 1, numbers)."""
         gradients = np.zeros((len(numbers), 1, numbers.shape[1]))
-        for column in range(-CYCLE_VARIABLES, 0):
-            step = np.eye(1, numbers.shape[1], column % numbers.shape[1]) * SLOPE_STEP
-            rise = self._values(numbers + 0.5 * step) - self._values(numbers - 0.5 * step)
-            gradients[:, 0, column] = rise / SLOPE_STEP
-        return self._values(numbers)[:, None], gradients
-
-    def _values(self, numbers: StackedVariables) -> Annotated[Floats, "motions"]:
-        duration, travel = np.exp(numbers[:, -CYCLE_VARIABLES]), numbers[:, -CYCLE_VARIABLES + 1 :]
-        return measures.travel_values(self.quantity, travel, duration)
+        steps = 0.5 * SLOPE_STEP * np.eye(CYCLE_VARIABLES)
+        tried = np.vstack([np.zeros(CYCLE_VARIABLES), steps, -steps])[:, None]
+        outer = (numbers[:, -CYCLE_VARIABLES:] + tried).reshape(-1, CYCLE_VARIABLES)
+        values = measures.travel_values(self.quantity, outer[:, 1:], np.exp(outer[:, 0]))
+        value, *ends = values.reshape(len(tried), -1)
+        rises = np.subtract(ends[:CYCLE_VARIABLES], ends[CYCLE_VARIABLES:])
+        gradients[:, 0, -CYCLE_VARIABLES:] = rises.T / SLOPE_STEP
+        return value[:, None], gradients
 
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions

@@ -21,10 +21,10 @@ def from_rows(file: File) -> RobotMotion:
             "quaternion, and one for each joint"
         )
     path, angles = rows[:, :3], rows[:, 7:]
-    rotations, told = tell_quaternions(file, path, rows[:, 3:7], angles)
+    rotations, quaternions = tell_quaternions(file, path, rows[:, 3:7], angles)
     rate = file.rate(None, " (Unitree's files have 30)")
     name = "unitree.csv" if np.array_equal(rotations[:, 0], rows[:, 6]) else "qpos.csv"
-    return file.motion(name, (path, rotations, angles), rate, UNNAMED, told)
+    return file.motion(name, (path, rotations, angles), rate, UNNAMED, quaternions)
 
 
 def from_tracking(file: File) -> RobotMotion:
@@ -32,11 +32,11 @@ def from_tracking(file: File) -> RobotMotion:
     angles = file.array("joint_pos", None, None)
     bodies = file.array("body_pos_w", len(angles), None, 3)
     turns = file.array("body_quat_w", len(angles), bodies.shape[1], 4)[:, 0]
-    ordered, told = tell_order(file, angles, bodies, turns)
-    name = "beyondmimic.npz" if told.startswith("breadth") else "mjlab.npz"
+    ordered, order = tell_order(file, angles, bodies, turns)
+    name = "beyondmimic.npz" if order.startswith("breadth") else "mjlab.npz"
     if file.conventions.order:
         name = "beyondmimic.npz" if file.conventions.order == "breadth" else "mjlab.npz"
-    return file.motion(name, (bodies[:, 0], turns, ordered), _rate(file), told, WXYZ)
+    return file.motion(name, (bodies[:, 0], turns, ordered), _rate(file), order, WXYZ)
 
 
 def _number(file: File, field: str) -> float | None:
@@ -90,22 +90,22 @@ def from_loco_joints(file: File) -> RobotMotion:
     turns = np.stack([columns[name] for name in PELVIS[3:]], axis=-1)
     rate = file.rate(None, " (LocoMuJoCo's first files have 500)")
     angles = np.stack([columns[name] for name in hinges], axis=-1)
-    poses, told = (path, quat.from_euler(turns, "YXZ"), angles), "none: three angles"
-    return file.motion("locomujoco.npz", poses, rate, NAMED, told, hinges=hinges)
+    poses, quaternions = (path, quat.from_euler(turns, "YXZ"), angles), "none: three angles"
+    return file.motion("locomujoco.npz", poses, rate, NAMED, quaternions, hinges=hinges)
 
 
 def from_qpos(file: File) -> RobotMotion:
     """Return the motion of MuJoCo's coordinates."""
     columns = file.array("qpos", None, None)
     hinges: tuple[str, ...] = ()
-    told = UNNAMED
+    joints = UNNAMED
     if "joint_names" in file.content:
         # The first joint of a trajectory is the free one of the base.
-        hinges, told = file.names("joint_names")[1:], NAMED
+        hinges, joints = file.names("joint_names")[1:], NAMED
     field = next((name for name in ("frequency", "fps") if name in file.content), None)
     rate = file.rate(_number(file, field) if field else None, "")
     name = "locomujoco.npz" if "split_points" in file.content else "qpos.npz"
-    return file.motion(name, _split(columns), rate, told, "wxyz: MuJoCo's", hinges=hinges)
+    return file.motion(name, _split(columns), rate, joints, "wxyz: MuJoCo's", hinges=hinges)
 
 
 LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll", "toe_base")
@@ -162,10 +162,12 @@ def from_kimodo(file: File) -> RobotMotion:
             )
     rate = file.rate(None, " (Kimodo's files have 30)")
     left_out = np.degrees(max(off_axis))
-    told = f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out"
+    joints_from = f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out"
     unwrapped = np.unwrap(np.stack(angles, axis=-1), axis=0)
     poses = positions[:, 0, [2, 0, 1]], turns[:, 0], unwrapped
-    return file.motion("kimodo.npz", poses, rate, told, "none: matrices", hinges=robot.hinges)
+    return file.motion(
+        "kimodo.npz", poses, rate, joints_from, "none: matrices", hinges=robot.hinges
+    )
 
 
 def _kimodo_joint(file: File, robot: Robot, body: int) -> int:
@@ -200,8 +202,8 @@ def from_mimickit(file: File) -> RobotMotion:
         (frames[:, :3], quat.exp(frames[:, 3:6]), frames[:, 6:]),
         file.content["loop_mode"],
     )
-    told = "none: rotation vectors"
-    return file.motion("mimickit.pkl", poses, _rate(file), UNNAMED, told, loops=bool(loops))
+    quaternions = "none: rotation vectors"
+    return file.motion("mimickit.pkl", poses, _rate(file), UNNAMED, quaternions, loops=bool(loops))
 
 
 def from_asap(file: File) -> RobotMotion:
@@ -259,9 +261,9 @@ def from_amp(file: File) -> RobotMotion:
     rate, half, loops = _frame_rate(file), rows.shape[1] // 2, _loops(file)
     if rows.shape[1] % 2 == 0 and half > 7:
         if _are_velocities(rows[:, 6:half], rows[:, half + 6 :]):
-            told = "none: roll, pitch and yaw, as velocities follow in each row"
+            quaternions = "none: roll, pitch and yaw, as velocities follow in each row"
             poses = rows[:, :3], quat.from_euler(rows[:, [5, 4, 3]], "ZYX"), rows[:, 6:half]
-            return file.motion("tienkung.txt", poses, rate, UNNAMED, told, loops=loops)
+            return file.motion("tienkung.txt", poses, rate, UNNAMED, quaternions, loops=loops)
         count = next((n for n in range(half, 6, -1) if _are_leading(rows, n)), None)
         if count:
             raise file.error(
@@ -269,8 +271,10 @@ def from_amp(file: File) -> RobotMotion:
                 "the file of whole poses (TienKung calls it motion_visualization)"
             )
     path, angles = rows[:, :3], rows[:, 7:]
-    rotations, told = tell_quaternions(file, path, rows[:, 3:7], angles)
-    return file.motion("amp.txt", (path, rotations, angles), rate, UNNAMED, told, loops=loops)
+    rotations, quaternions = tell_quaternions(file, path, rows[:, 3:7], angles)
+    return file.motion(
+        "amp.txt", (path, rotations, angles), rate, UNNAMED, quaternions, loops=loops
+    )
 
 
 def _are_leading(rows: Floats, count: int) -> bool:

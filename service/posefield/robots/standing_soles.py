@@ -112,11 +112,11 @@ class LegGroup:
         )
         lines = np.stack([_homogeneous(robot.axes, 0.0), _homogeneous(robot.anchors, 1.0)], axis=-1)
         self._lines = constant(lines[turned].reshape(len(group), -1, 4, 2))
-        places = [
+        corners = [
             last @ _homogeneous(np.array([points[row].position for row in leg.rows]), 1.0).T
             for leg, (_, _, last) in zip(group, chains, strict=True)
         ]
-        self._places = constant(np.stack(places))
+        self._corners = constant(np.stack(corners))
 
     def points(self, angles: Array) -> tuple[Array, list[Array]]:
         """Return sole points (L, R, 3, p), m, from the base, and slopes (L, R, p, h) of each axis.
@@ -130,7 +130,7 @@ class LegGroup:
         poses = [links[:, 0]]
         for hinge in range(1, hinges):
             poses.append(poses[-1] @ links[:, hinge])
-        points = (poses[-1].reshape(legs, -1, 4) @ self._places).reshape(legs, len(angles), 4, -1)
+        points = (poses[-1].reshape(legs, -1, 4) @ self._corners).reshape(legs, len(angles), 4, -1)
         stacked = xp.stack([poses[hinge] for hinge in self._turning], 1)
         lines = stacked.reshape(legs, len(self._turning), -1, 4) @ self._lines
         lines = xp.swapaxes(lines.reshape(legs, len(self._turning), -1, 8), 1, 2)
