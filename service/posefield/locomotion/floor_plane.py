@@ -67,6 +67,31 @@ def turn_roots(
     return np.concatenate([root[..., None, :], rotations[..., 1:, :]], axis=-2)
 
 
+def smooth(
+    values: Annotated[FloorVectors, "frames"],
+    deviation: float,
+    sharp: bool = False,
+    fixed: bool = True,
+) -> Annotated[FloorVectors, "frames"]:
+    """Return values (F,) averaged by a Gaussian of some frames.
+
+    sharp: whether parabolas stay as they are. fixed: whether the first and the last value stay.
+    """
+    reach = min(int(np.ceil(5.0 * deviation)), len(values) - 1)
+    if deviation <= 0.3 or reach < 1:
+        return values
+    offsets = np.arange(-reach, reach + 1)
+    kernel = np.exp(-0.5 * np.square(offsets / deviation))
+    kernel /= kernel.sum()
+    if sharp:
+        wide = np.exp(-0.25 * np.square(offsets / deviation))
+        kernel = 2.0 * kernel - wide / wide.sum()
+    before, after = values[reach:0:-1], values[-2 : -reach - 2 : -1]
+    if fixed:
+        before, after = 2.0 * values[0] - before, 2.0 * values[-1] - after
+    return np.convolve(np.concatenate([before, values, after]), kernel, "valid")
+
+
 Ends = tuple[Annotated[Floats, "2"] | None, Annotated[Floats, "2"] | None]
 """Slopes (2,) of a spline at its first and last knot; None for no curvature there."""
 

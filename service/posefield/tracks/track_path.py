@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Frames
-from posefield.locomotion.floor_plane import FloorVectors
+from posefield.locomotion.floor_plane import FloorVectors, smooth
 from posefield.motion import quat
 from posefield.tracks.track import Track
 
@@ -93,31 +93,6 @@ def _interpolate(
     rise = share * share * (3.0 - 2.0 * share)
     curve = bend * (1.0 - share) * tangents[piece] - bend * share * tangents[piece + 1]
     return np.asarray(points[piece] + rise * (points[piece + 1] - points[piece]) + step * curve)
-
-
-def smooth(
-    values: Annotated[FloorVectors, "frames"],
-    deviation: float,
-    sharp: bool = False,
-    fixed: bool = True,
-) -> Annotated[FloorVectors, "frames"]:
-    """Return values (F,) averaged by a Gaussian of some frames.
-
-    sharp: whether parabolas stay as they are. fixed: whether the first and the last value stay.
-    """
-    reach = min(int(np.ceil(5.0 * deviation)), len(values) - 1)
-    if deviation <= 0.3 or reach < 1:
-        return values
-    offsets = np.arange(-reach, reach + 1)
-    kernel = np.exp(-0.5 * np.square(offsets / deviation))
-    kernel /= kernel.sum()
-    if sharp:
-        wide = np.exp(-0.25 * np.square(offsets / deviation))
-        kernel = 2.0 * kernel - wide / wide.sum()
-    before, after = values[reach:0:-1], values[-2 : -reach - 2 : -1]
-    if fixed:
-        before, after = 2.0 * values[0] - before, 2.0 * values[-1] - after
-    return np.convolve(np.concatenate([before, values, after]), kernel, "valid")
 
 
 def _derivative(

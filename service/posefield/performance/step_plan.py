@@ -1,0 +1,196 @@
+"""Plans of people who step any way: cadence, phase, standing, and turns of the legs along a path.
+
+The phase is tied to the distance; turns on the spot, ways to the side and a last step of each foot
+after a stop advance it too. All is planned in the size of the model's body.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from posefield.common.units import Floats, Frames
+from posefield.locomotion import stepping
+from posefield.locomotion.floor_plane import FloorVectors, smooth
+from posefield.locomotion.stepping import StandingPoses
+from posefield.motion import quat
+from posefield.performance import standing_pose
+from posefield.performance.standing_pose import Walker
+
+TABLE_SPEEDS = 9
+"""Speeds at which strides and mean places of the root are known; lines between."""
+QUIET = 0.12
+"""Cadence up to which a person stands, cycles a second."""
+SLOW, SLOW_WINDOW = 0.2, 0.5
+"""Speed below which steps follow the average velocity, m/s, and its standard deviation, s."""
+SETTLING, LEAST_SETTLED = 0.6, 0.5
+"""Mean cadence of the last steps after a stop, cycles a second, and their fewest cycles."""
+EASE = 0.1
+"""Standard deviation of the average with which standing and stepping are blended, s."""
+LEAST_WALKED = 0.4
+"""Smallest share of the walk in the pose of a person who steps."""
+
+
+@dataclass(frozen=True)
+class Strider:
+    """Strides of a walker by speed, straight forward.
+
+    speeds: (S,), m/s. lengths: (S,), m. durations: (S,), s. drifts: (S,), rad. offsets: mean points
+    of the root (S,).
+    """
+
+    walker: Walker
+    speeds: Floats
+    lengths: Floats
+    durations: Floats
+    drifts: Floats
+    offsets: Annotated[FloorVectors, "speeds"]
+
+
+def find_strider(walker: Walker) -> Strider:
+    """Return the strides of a walker."""
+    speeds = np.linspace(*walker.gait.region.speeds, TABLE_SPEEDS)
+    controls = walker.controls(speeds, np.zeros(TABLE_SPEEDS))
+    done, offsets = walker.strides(controls), walker.mean_offsets(controls)
+    return Strider(walker, done.speeds, np.abs(done.travels), done.durations, done.drifts, offsets)
+
+
+def find_standing_poses(walkers: Sequence[Walker]) -> StandingPoses | None:
+    """Return the standing poses of walkers; None for a model without two feet."""
+    poses = [standing_pose.find_standing_pose(walker) for walker in walkers]
+    poses_of_all = [pose for pose in poses if pose is not None]
+    if len(poses_of_all) < len(poses):
+        return None
+    passings = np.empty((len(poses_of_all), 2))
+    for row, pose in zip(passings, poses_of_all, strict=True):
+        for passing in pose.passings:
+            row[passing.swinging] = passing.phase
+    return StandingPoses(
+        np.stack([pose.rotations for pose in poses_of_all]),
+        np.array([pose.height for pose in poses_of_all]),
+        np.array([pose.place for pose in poses_of_all]),
+        tuple(leg.upper for leg in poses_of_all[0].legs),
+        passings,
+        np.stack([walker.double_supports for walker in walkers]),
+    )
+
+
+class StepPath(NamedTuple):
+    """Path of a body over F frames: points (F,), m, velocities (F,), m/s, headings (F,), rad."""
+
+    points: Annotated[FloorVectors, "frames"]
+    velocities: Annotated[FloorVectors, "frames"]
+    headings: Frames
+
+
+@dataclass(frozen=True)
+class StepPlan:
+    """Plan of one person in F frames, as of `LocomotionPlan` and `Stepping`.
+
+    speeds: (F,), m/s, and turning: (F,), rad/s, of the controls. phases: (F,), without wrapping.
+    """
+
+    speeds: Frames
+    turning: Frames
+    phases: Frames
+    points: Annotated[FloorVectors, "frames"]
+    headings: Frames
+    shares: Frames
+    firm: Frames
+    turns: Annotated[Floats, "frames 2"]
+    shifts: Annotated[FloorVectors, "frames 2"]
+
+
+def plan_steps(
+    table: Strider,
+    standing: tuple[StandingPoses, int] | None,
+    path: StepPath,
+    number: float,
+    rate: float,
+) -> StepPlan:
+    """Return the plan of a person along a path.
+
+    standing: poses, and the row of the walker; None for a model without two feet. number: from 0 to
+    1, of the first phase. rate: frames a second.
+    """
+    points, velocities, headings = path
+    region, frames = table.walker.gait.region, len(points)
+    low, high = region.speeds
+    slow = smooth(velocities, SLOW_WINDOW * rate, fixed=False)
+    stepped = np.where(np.abs(velocities) < SLOW, slow, velocities) * np.exp(-1j * headings)
+    forward = np.clip(stepped.real, low, high)
+    lengths, durations, drifts = (
+        np.interp(forward, table.speeds, values)
+        for values in (table.lengths, table.durations, table.drifts)
+    )
+    turning = np.gradient(headings) * rate
+    right, left = region.turning(forward)
+    walked = np.clip(turning, right, left) * quat.smoothstep(np.clip(stepped.real / low, 0.0, 1.0))
+    cadences = stepping.cadences(
+        stepped.real, stepped.imag, turning - walked, (lengths, durations), low
+    )
+    supports = np.zeros(2) if standing is None else standing[0].supports[standing[1]]
+    phases, moving = _phases(cadences, supports, number, rate)
+    steps = smooth(moving.astype(complex), EASE * rate, fixed=False).real
+    speed = np.clip(np.abs(stepped.real) / low, 0.0, 1.0)
+    shares = 1.0 - steps * np.maximum(LEAST_WALKED, np.sqrt(speed))
+    shares = smooth(shares.astype(complex), EASE * rate, fixed=False).real
+    offsets = np.interp(forward, table.speeds, table.offsets)
+    turns, shifts = np.zeros((frames, 2)), np.zeros((frames, 2), complex)
+    if standing is not None:
+        # Of the turn and the way since the middle of a stance the stride has a part in its pose.
+        poses, row = standing
+        passings = poses.passings[row]
+        strides = (1.0 - shares)[:, None] * stepping.stepped(phases, phases, passings)
+        turns = stepping.stepped(phases, headings, passings)
+        turns -= (walked * durations)[:, None] * strides
+        shifts = stepping.stepped(phases, points, passings) * np.exp(-1j * headings)[:, None]
+        shifts -= lengths[:, None] * strides
+        offsets = offsets + shares * (poses.points[row] - offsets)
+    else:
+        shares = np.zeros(frames)
+    faced = headings - (1.0 - shares) * drifts
+    return StepPlan(
+        forward,
+        walked,
+        phases,
+        points - np.exp(1j * faced) * offsets,
+        faced,
+        shares,
+        quat.smoothstep(np.clip(1.0 - steps, 0.0, 1.0)),
+        turns,
+        shifts,
+    )
+
+
+def _phases(
+    cadences: Frames, supports: Annotated[Floats, "2"], number: float, rate: float
+) -> tuple[Frames, np.ndarray]:
+    """Return phases (F,), without wrapping, and whether a person steps (F,).
+
+    supports: phases in which both feet stand. number: from 0 to 1. After a stop each foot takes one
+    more step, to its place under the body, if there is time.
+    """
+    moving = cadences > QUIET
+    steps = np.where(moving, cadences, 0.0) / rate
+    edges = np.flatnonzero(np.diff(moving)) + 1
+    phases = np.empty(len(cadences))
+    phase = number if moving[0] else float(supports[int(number * 2.0) % 2])
+    for begin, end in zip([0, *edges], [*edges, len(cadences)], strict=True):
+        if moving[begin]:
+            phases[begin:end] = phase + np.cumsum(steps[begin:end])
+        elif begin == 0:
+            phases[begin:end] = phase
+        else:
+            waits = (supports - phase - LEAST_SETTLED) % 1.0
+            cycles = LEAST_SETTLED + float(waits.min())
+            count = int(cycles / SETTLING * rate)
+            if end - begin > count:
+                share = np.minimum(np.arange(1, end - begin + 1) / count, 1.0)
+                phases[begin:end] = phase + cycles * share * (1.5 - 0.5 * share**2)
+                moving[begin : begin + count] = True
+            else:
+                phases[begin:end] = phase + np.cumsum(cadences[begin:end]) / rate
+        phase = float(phases[end - 1])
+    return phases, moving
