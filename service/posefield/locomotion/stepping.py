@@ -7,7 +7,7 @@ each foot keeps its heading while it stands, and the planner of feet sets the fe
 Between steps the pose is blended into a standing one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, TypeVar
 
 import numpy as np
@@ -64,6 +64,11 @@ class Stepping:
     firm: CharacterFrames
     turns: Annotated[Floats, "characters frames 2"]
     shifts: Annotated[FloorVectors, "characters frames 2"]
+
+    def part(self, begin: int, end: int) -> "Stepping":
+        """Return the frames from `begin` until before `end`."""
+        names = "shares", "firm", "turns", "shifts"
+        return replace(self, **{name: getattr(self, name)[:, begin:end] for name in names})
 
     def apply(
         self,

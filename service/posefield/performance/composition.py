@@ -279,7 +279,7 @@ def path_errors(walk: WalkPlan, roots: RootPath, rotations: Rotations) -> PathEr
     return PathErrors(
         _rms(offsets.imag),
         _rms(offsets.real),
-        _rms(np.angle(travel / planned_travel)),
+        _rms(np.angle(travel * np.conj(planned_travel))),
         _rms(facing - facing.mean()),
         _rms(np.abs(travel) - np.abs(planned_travel)),
         cycles,

@@ -102,10 +102,10 @@ def _of_segment(field: str, segment: Segment) -> Iterator[Bounded]:
         yield from _places(f"{field}/to", segment.to or ())
     if isinstance(segment, Act):
         yield from _places(f"{field}/at", segment.at or ())
-        if segment.facing is not None:
-            yield f"{field}/facing", segment.facing, -MOST_ANGLE, MOST_ANGLE, "rad"
     if isinstance(segment, Hold):
         yield from _places(f"{field}/look_at", segment.look_at or ())
+    elif segment.facing is not None:
+        yield f"{field}/facing", segment.facing, -MOST_ANGLE, MOST_ANGLE, "rad"
 
 
 def _curve(field: str, curve: float | Curve | None, unit: str) -> Iterator[Bounded]:

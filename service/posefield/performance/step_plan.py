@@ -13,7 +13,7 @@ import numpy as np
 from posefield.common.units import Floats, Frames
 from posefield.locomotion import stepping
 from posefield.locomotion.floor_plane import FloorVectors, smooth
-from posefield.locomotion.stepping import StandingPoses
+from posefield.locomotion.stepping import StandingPoses, Stepping
 from posefield.motion import quat
 from posefield.performance import standing_pose
 from posefield.performance.standing_pose import Walker
@@ -30,6 +30,12 @@ EASE = 0.1
 """Standard deviation of the average with which standing and stepping are blended, s."""
 LEAST_WALKED = 0.4
 """Smallest share of the walk in the pose of a person who steps."""
+TURN_SPEED, TURN_EASE = 1.9, 0.5
+"""Mean rate of a turn on the spot, rad/s, and the time that it takes besides, s."""
+FACED = np.radians(2.0)
+"""Angle up to which nobody turns on the spot, rad."""
+LAST_STEPS = 1.0 / SETTLING + 1.0
+"""Time in which a person who stops comes to stand, s, at most."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,18 @@ def find_standing_poses(walkers: Sequence[Walker]) -> StandingPoses | None:
         passings,
         np.stack([walker.double_supports for walker in walkers]),
     )
+
+
+def turn_seconds(angle: float) -> float:
+    """Return the time of a turn on the spot by an angle, rad, in s."""
+    return TURN_EASE + abs(angle) / TURN_SPEED
+
+
+def turn_on_the_spot(start: float, facing: float, rate: float) -> Frames:
+    """Return the headings (F,), rad, of the shorter turn to a heading; the first one for none."""
+    angle = float(np.angle(np.exp(1j * (facing - start))))
+    count = round(turn_seconds(angle) * rate) if abs(angle) > FACED else 0
+    return start + angle * quat.smoothstep(np.linspace(0.0, 1.0, count + 1))
 
 
 class StepPath(NamedTuple):
@@ -162,6 +180,15 @@ def plan_steps(
         turns,
         shifts,
     )
+
+
+def stepping_of(
+    plans: Sequence[StepPlan], poses: StandingPoses, parents: tuple[int, ...]
+) -> Stepping:
+    """Return the steps of people whose plans have equally many frames."""
+    names = "shares", "firm", "turns", "shifts"
+    fields = (np.stack([getattr(plan, name) for plan in plans]) for name in names)
+    return Stepping(poses, parents, *fields)
 
 
 def _phases(

@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.units import Floats, PerPoint, PointControls
 from posefield.common.value_cache import ValueCache
 from posefield.constraints.take_variation import TakeSettings
-from posefield.locomotion import floor_plane, stepping, stride
+from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.model_file.model_card import PERFORMER
 from posefield.performance import standing_pose, standing_steps
@@ -26,6 +26,8 @@ from posefield.validation.crowd_validation import CharacterTakes
 
 CYCLE_FRAMES = 60
 """Default number of frames of a steady cycle."""
+FACING_SPEED = 0.4
+"""Speed of walks whose body faces one way, if none is said, m/s."""
 # Frames between those at which sigma is computed.
 SIGMA_STEP = 6
 
@@ -41,15 +43,16 @@ def walk_passage(
     phases = plan.phases % 1.0
     done = plan.walker.strides(plan.controls, level)
     posed = _poses(model, plan.walker, plan.controls, done, phases, level, take)
-    pose = None if plan.legs is None else standing_pose.find_standing_pose(plan.walker)
-    if pose is not None and plan.legs is not None:
-        hips = tuple(leg.upper for leg in pose.legs)
-        stepping.turn_legs(pose.parents, posed.rotations, hips, plan.legs)
+    contacts = _contacts(model, plan.walker, plan.controls, done, phases, level)
+    if plan.steps is not None:
+        frames = np.arange(len(plan))
+        posed = plan.steps.apply((0 * frames, frames), 0 * frames, posed)
+        contacts += plan.steps.firm[0, :, None] * (1.0 - contacts)
     roots = plan.places + posed.places * np.exp(1j * plan.headings)
     walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
         floor_plane.at_height(roots, posed.heights),
-        _contacts(model, plan.walker, plan.controls, done, phases, level),
+        contacts,
         _sigmas(model, plan.walker, plan.controls),
         phases,
     )
@@ -187,12 +190,13 @@ def walk_of(script: Script, index: int) -> tuple[Walk, Source]:
 
 def request_of(script: Script, walk: Walk, source: Source) -> WalkRequest:
     """Return the walk that a segment asks for."""
-    mean_speed = float(source.gait.rates[:, 0].mean())
+    faces = walk.facing is not None
+    usual_speed = FACING_SPEED if faces else float(source.gait.rates[:, 0].mean())
     names = {PERFORMER: walk.performer} if walk.performer is not None else {}
     discs = tuple(Disc(*disc.position, disc.radius) for disc in script.question.obstacles)
     along = None if walk.along is None else np.array(walk.along, dtype=np.float64)
     return WalkRequest(
-        mean_speed if walk.speed is None else walk.speed,
+        usual_speed if walk.speed is None else walk.speed,
         along=along,
         to=walk.to,
         seconds=walk.seconds,
@@ -203,7 +207,8 @@ def request_of(script: Script, walk: Walk, source: Source) -> WalkRequest:
         start=walk.start,
         stop=walk.stop,
         obstacles=discs,
-        detour=bool(discs) and walk.along is None and walk.seconds is None,
+        detour=bool(discs) and walk.along is None and walk.seconds is None and not faces,
+        facing=walk.facing,
     )
 
 
@@ -265,6 +270,8 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
     if pose is not None:
         cut = timeline.find_cut(script.adapted(index, still(pose)), range(1))
         begin, first = standing_pose.path_start(walking, pose)
+        if request.facing is not None:
+            begin = FloorMotion(0.0, pose.place)
         at_rest = replace(cut, motion=FloorMotion())
         return WalkEntry(request, cut.motion.after(begin), first, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]

@@ -16,15 +16,18 @@ from posefield.common.units import Floats, Frames, PerPoint, PointControls
 from posefield.locomotion import stepping
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
+from posefield.locomotion.stepping import Stepping
 from posefield.performance import (
     standing_pose,
     standing_steps,
+    step_plan,
     walk_paths,
     walk_request,
 )
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.standing_pose import Walker, find_walker
 from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
+from posefield.performance.step_plan import StepPath
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import SpeedRamps, WalkNote, WalkRequest
 from posefield.question.motion_question import check_number, check_range
@@ -152,6 +155,9 @@ DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 UNSEEN_PIVOT = 0.2
 """Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 7°
 over a foot that stands for 0.65 s, and captured pelvises turn by 9° in each stride (median)."""
+FACING_SPEEDS, STANDS = (0.1, 0.6), 0.999
+"""Speeds of walks whose body faces one way, m/s, and the share of the standing pose at rest."""
+FACING_NOTE = "steps to the side, backwards and on the spot are synthesised: none was captured"
 # Frames between the points at which controls are solved, and the most points of mean offsets.
 STEP, OFFSET_POINTS = 6, 12
 SECONDS_RANGE = (0.1, walk_request.MAX_SECONDS)
@@ -165,9 +171,9 @@ class WalkPlan:
 
     path: that the root follows in the mean over a cycle. distances: (F,), along it, m. places: (F,)
     and headings: (F,), rad, of the frame that travels with the walker. phases: (F,), of the cycle,
-    without wrapping. controls: (F, d). speeds: (F,), m/s. legs: turns of both about the vertical
-    (F, 2), rad; None for other models. notes: on what is not as captured.
-    stops: whether it ends standing. standing: steps at standing ends; None without them.
+    without wrapping. controls: (F, d). speeds: (F,), m/s. steps: beyond the captured walk; None
+    without them. notes: on what is not as captured. stops: whether it ends standing. standing:
+    steps at standing ends; None without them.
     """
 
     walker: Walker
@@ -178,7 +184,7 @@ class WalkPlan:
     phases: Annotated[Floats, "frames"]
     controls: Annotated[Floats, "frames controls"]
     speeds: Annotated[Floats, "frames"]
-    legs: Annotated[Floats, "frames 2"] | None = None
+    steps: Stepping | None = None
     notes: tuple[WalkNote, ...] = ()
     stops: bool = False
     standing: StandingEnds | None = None
@@ -192,8 +198,8 @@ class WalkPlan:
         names = ("distances", "places", "headings", "phases", "controls", "speeds")
         arrays = {name: getattr(self, name)[begin:end] for name in names}
         standing = self.standing and self.standing.part(len(self), begin, end)
-        legs = None if self.legs is None else self.legs[begin:end]
-        return replace(self, **arrays, standing=standing, legs=legs)
+        steps = self.steps and self.steps.part(begin, end)
+        return replace(self, **arrays, standing=standing, steps=steps)
 
     @property
     def closes(self) -> bool:
@@ -224,6 +230,8 @@ def plan_walk(
     """
     walk_request.check_fields(request)
     walker = find_walker(gait, request.labels, request.controls)
+    if request.facing is not None:
+        return _plan_facing(walker, request, start or FloorMotion(), request.facing)
     path, distances, notes = _route(gait, request, start)
     walk_request.check_clear(path, request.obstacles)
     speeds = np.gradient(distances, 1.0 / RATE)
@@ -242,10 +250,10 @@ def plan_walk(
     stepped = bool(np.abs(beyond).max() > UNSTEPPED)
     extra = _stepping_cadences(speeds / ways, beyond) / RATE if stepped else 0.0
     phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, end_kinds, extra)
-    legs = _leg_turns(walker, phases, beyond) if stepped else None
+    steps = _turning_steps(walker, phases, beyond) if stepped else None
     headings = tangents - _between(len(distances), knots, done.drifts)
     origins = centres - np.exp(1j * headings) * _offsets(walker, controls)
-    fields = walker, path, distances, origins, headings, phases, controls, speeds, legs
+    fields = walker, path, distances, origins, headings, phases, controls, speeds, steps
     all_notes = *notes, *pivots, *phase_notes
     return WalkPlan(*fields, all_notes, request.stop == "standing", standing)
 
@@ -260,20 +268,49 @@ def _stepping_cadences(walked: Frames, beyond: Frames) -> Frames:
     return np.asarray((walked**power + turned**power) ** (1.0 / power) - walked)
 
 
-def _leg_turns(
-    walker: Walker, phases: Frames, beyond: Frames
-) -> Annotated[Floats, "frames 2"] | None:
-    """Return the turns of the legs (F, 2), rad, so that feet stand while a walker turns.
+def _turning_steps(walker: Walker, phases: Frames, beyond: Frames) -> Stepping | None:
+    """Return the turns of the legs so that feet stand while a walker turns.
 
     None for a model without two feet that step in turn.
     """
-    pose = standing_pose.find_standing_pose(walker)
-    if pose is None:
+    poses = step_plan.find_standing_poses([walker])
+    if poses is None:
         return None
-    passings = np.empty(2)
-    for passing in pose.passings:
-        passings[passing.swinging] = passing.phase
-    return stepping.stepped(phases, np.cumsum(beyond) / RATE, passings)
+    turns = stepping.stepped(phases, np.cumsum(beyond) / RATE, poses.passings[0])[None]
+    parents, none = walker.card.skeleton.parents, np.zeros(turns.shape[:2])
+    return Stepping(poses, parents, none, none, turns, np.zeros(turns.shape, complex))
+
+
+def _plan_facing(
+    walker: Walker, request: WalkRequest, start: FloorMotion, facing: float
+) -> WalkPlan:
+    """Return the plan of a walk whose body keeps a heading, rad, on steps as of people on tracks.
+
+    It turns on the spot first, and then goes straight to its place, from standing to standing.
+    """
+    poses, goal = step_plan.find_standing_poses([walker]), _destination(request)
+    if poses is None:
+        message = "given for a model without two feet that step in turn"
+        raise InvalidField("facing", f"{message}, expected a walk")
+    curve = walk_request.check_speeds(request.speed, request.speed_over, FACING_SPEEDS)
+    headings = step_plan.turn_on_the_spot(start.turn, check_number("facing", facing), RATE)
+    path = walk_paths.straight(start, goal, len(headings) > 1)
+    walk_request.check_clear(path, request.obstacles)
+    ramps = SpeedRamps(0.0, 0.0, request.acceleration)
+    gone = np.zeros(1)
+    if path.length > walk_paths.AT_PLACE:
+        gone = walk_request.distances_over_length(curve, request.speed_over, path.length, ramps)
+    distances = np.pad(gone, (len(headings), round(step_plan.LAST_STEPS * RATE)), "edge")
+    headings = np.pad(headings, (0, len(distances) - len(headings)), "edge")
+    points = path.at(distances)[0]
+    body = StepPath(points, np.gradient(points) * RATE, headings)
+    plan = step_plan.plan_steps(step_plan.find_strider(walker), (poses, 0), body, 0.0, RATE)
+    steps = step_plan.stepping_of([plan], poses, walker.card.skeleton.parents)
+    controls = walker.controls(plan.speeds, plan.turning)
+    speeds, note = np.abs(body.velocities), WalkNote(f"{SYNTHESISED}-steps", "facing", FACING_NOTE)
+    fields = walker, path, distances, plan.points, plan.headings, plan.phases, controls, speeds
+    end = int(np.flatnonzero(plan.shares < STANDS)[-1]) + 2
+    return WalkPlan(*fields, steps, (note,), True).part(0, end)
 
 
 def _route(

@@ -309,10 +309,11 @@ Motion = Literal["rolling", "standing"]
 class WalkRequest:
     """Requested walk: exactly one of `along`, `to`, `seconds`, or `end` alone.
 
-    along: waypoints (P, 2), x and z, m. to: point, x and z, m. arrive_heading: there, rad. seconds:
-    duration, s, straight ahead or with `turn`, rad/s: a number or pairs of a time, s, and a rate.
-    end: place and heading in which the walk ends; with `along` after its last waypoint. speed: m/s,
-    or pairs of a distance, m, or time, s, and a speed. labels: name or weights by label set.
+    along: waypoints (P, 2), x and z, m. to: point, x and z, m. arrive_heading: there, rad. facing:
+    heading of the body all the way to it, rad; None for that of the way. seconds: duration, s,
+    straight ahead or with `turn`, rad/s: a number or pairs of a time, s, and a rate. end: place and
+    heading in which the walk ends; with `along` after its last waypoint. speed: m/s, or pairs of a
+    distance, m, or time, s, and a speed. labels: name or weights by label set.
     controls: given controls by name. start, stop: whether the walk begins and ends in motion or
     standing. entry_speed, entry_turn: m/s and rad/s at which it begins in motion; None for those of
     the curves. acceleration: of starts, stops and from the entry speed, m/s². obstacles: discs.
@@ -325,6 +326,7 @@ class WalkRequest:
     seconds: float | None = None
     end: FloorMotion | None = None
     arrive_heading: float | None = None
+    facing: float | None = None
     turn: Curve | None = None
     speed_over: Scale = "distance"
     labels: Mapping[str, LabelValue] = field(default_factory=dict)

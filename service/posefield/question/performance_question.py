@@ -78,7 +78,8 @@ class Walk(
     along: a smooth curve through points; to: straight to a point; seconds: straight ahead or
     turning. With none of them, the walk goes where the next segment begins. speed: m/s, or a curve
     over the distance or the time; by default the mean captured speed. turn: rad/s to the left, for
-    a walk of `seconds` only.
+    a walk of `seconds` only. facing: heading that the body keeps on its way to a point, rad, from
+    standing to standing: on steps to the side or backwards, by default at 0.4 m/s.
     """
 
     model: str
@@ -88,6 +89,7 @@ class Walk(
     speed: float | Curve | None = None
     speed_over: Literal["distance", "time"] = "distance"
     turn: float | Curve | None = None
+    facing: float | None = None
     controls: dict[str, float] = {}
     performer: str | None = None
     labels: dict[str, LabelValue] = {}
@@ -101,6 +103,10 @@ class Walk(
             raise ValueError(f"{' and '.join(ways)}, expected one of them at most")
         if self.turn is not None and self.seconds is None:
             raise ValueError("turn without seconds, expected with a walk of some seconds only")
+        if self.facing is not None and (self.start, self.stop) != ("standing",) * 2:
+            raise ValueError("facing of a rolling walk, expected start and stop standing")
+        if self.facing is not None and self.to is None:
+            raise ValueError("facing without to, expected with a walk to a point only")
 
 
 class Act(

@@ -15,6 +15,7 @@ import numpy as np
 from posefield.common.units import Floats, Frames
 from posefield.locomotion.floor_plane import FloorVectors, smooth
 from posefield.motion import quat
+from posefield.performance import step_plan
 from posefield.tracks.track import Track
 
 WINDOW, LONG_WINDOW = 0.2, 0.4
@@ -27,8 +28,6 @@ MOVING = 0.25
 """Speed from which on a person has a direction of travel, m/s."""
 TRAVEL_SPEED = (0.35, 0.5)
 """Speeds between which a person turns from a stated heading to the direction of travel, m/s."""
-TURN_SPEED, TURN_EASE = 1.9, 0.5
-"""Mean rate of a turn on the spot, rad/s, and the time that it takes besides, s."""
 HEADING_WINDOW = 0.12
 """Standard deviation of the average of headings, s."""
 
@@ -130,7 +129,7 @@ def _travel_headings(
     for begin, end, before, after in zip(
         rows[gaps], rows[gaps + 1], directions[gaps], directions[gaps + 1], strict=True
     ):
-        longest = (TURN_EASE + abs(after - before) / TURN_SPEED) * rate
+        longest = step_plan.turn_seconds(after - before) * rate
         start = max(float(begin), end - longest)
         share = quat.smoothstep(np.clip((np.arange(begin, end) - start) / (end - start), 0.0, 1.0))
         headings[begin:end] = before + share * (after - before)

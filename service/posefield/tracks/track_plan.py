@@ -14,7 +14,7 @@ from posefield.common.units import Floats, Indices, PerCharacter
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.locomotion.stepping import StandingPoses, Stepping
+from posefield.locomotion.stepping import StandingPoses
 from posefield.performance import step_plan
 from posefield.performance.standing_pose import Walker
 from posefield.performance.step_plan import StepPath, StepPlan, Strider
@@ -73,7 +73,8 @@ def plan_people(
             paths, combinations, numbers, scales.tolist(), strict=True
         )
     ]
-    columns = {name: np.stack([getattr(plan, name) for plan in plans]) for name in vars(plans[0])}
+    names = "speeds", "turning", "phases", "points", "headings"
+    columns = {name: np.stack([getattr(plan, name) for plan in plans]) for name in names}
     knots = np.unique(np.append(np.arange(0, frames, max(1, int(KNOT_SECONDS * rate))), frames - 1))
     everyone = np.repeat(combinations, len(knots))
     solved = gait.controls(
@@ -86,9 +87,7 @@ def plan_people(
     controls = (1.0 - share) * solved[:, before] + share * solved[:, after]
     steps = None
     if walkers.standing is not None:
-        parents = gait.session.card.skeleton.parents
-        fields = (columns[name] for name in ("shares", "firm", "turns", "shifts"))
-        steps = Stepping(walkers.standing, parents, *fields)
+        steps = step_plan.stepping_of(plans, walkers.standing, gait.session.card.skeleton.parents)
     return LocomotionPlan(
         controls,
         combinations,
