@@ -142,6 +142,7 @@ class Walk(TypedDict, total=False):
     speed: float | Sequence[Sequence[float]] | None
     speed_over: Literal["distance", "time"]
     turn: float | Sequence[Sequence[float]] | None
+    facing: float | None
     controls: Mapping[str, float]
     performer: str | None
     labels: Mapping[str, str | Mapping[str, float]]

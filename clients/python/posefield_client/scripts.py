@@ -81,6 +81,7 @@ class Script:
         speed: Curve | None = None,
         speed_over: Literal["distance", "time"] | None = None,
         turn: Curve | None = None,
+        facing: float | None = None,
         performer: str | None = None,
         labels: Labels | None = None,
         start: GaitEnd | None = None,
@@ -92,7 +93,8 @@ class Script:
         """Add a walk: along a curve through points, to a point, or for some seconds.
 
         With none of them it goes where the act after it begins. model: by default that of the walk
-        before. speed: m/s. turn: rad/s to the left. start, stop: at full speed or at rest.
+        before. speed: m/s. turn: rad/s to the left. facing: heading of the body on its way to a
+        point, rad. start, stop: at full speed or at rest.
         """
         segment = questions.question(locals())
         walks = [segment["model"] for segment in self.segments if segment["kind"] == "walk"]

@@ -1170,6 +1170,11 @@ export interface components {
              */
             speed_over: "distance" | "time";
             turn?: components["schemas"]["Turn"];
+            /**
+             * @description Heading in radians, positive to the left of +Z, that the body keeps on its way `to` a point: on steps to the side or backwards, or on the spot if it is there, which are synthesised. From standing to standing, at 0.1 to 0.6 m/s, by default at 0.4.
+             * @default null
+             */
+            facing: number | null;
             controls?: components["schemas"]["GivenControls"];
             /**
              * @description Name of a captured performer.

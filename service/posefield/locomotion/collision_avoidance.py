@@ -352,7 +352,7 @@ def draw_paths(gait: Gait, characters: Characters, seconds: float) -> Paths:
     bends = turning / speeds
     turns = np.cumsum(0.5 * POINT_SPACING * (bends[:, 1:] + bends[:, :-1]), axis=1)
     headings = walks.headings[:, None] + np.pad(turns, ((0, 0), (1, 0)))
-    return Paths(walks.starts, headings, speeds, np.full(len(headings), along[-1]))
+    return Paths(walks.starts, headings, speeds)
 
 
 def _draw_walks(gait: Gait, characters: Characters, seconds: float) -> RandomWalks:

@@ -38,13 +38,12 @@ class Paths:
     """N paths, each known at K points that lie `POINT_SPACING` apart along it.
 
     starts: (N,), first points. headings: (N, K), rad, of the tangents, without jumps; between two
-    points a path is an arc. speeds: (N, K), m/s. lengths: (N,), m.
+    points a path is an arc. speeds: (N, K), m/s.
     """
 
     starts: Annotated[FloorVectors, "characters"]
     headings: CharacterPoints
     speeds: CharacterPoints
-    lengths: PerCharacter
 
     @property
     def curvatures(self) -> CharacterPoints:
@@ -219,8 +218,7 @@ def plan_along_paths(
 ) -> LocomotionPlan:
     """Return the plan of characters along paths, at the speed of the synthesised gait.
 
-    phases: (N,), of the cycle at the first frame. Raises InvalidField for a path that ends too
-    soon.
+    phases: (N,), of the cycle at the first frame.
     """
     shape = paths.speeds.shape
     everyone = np.repeat(combinations, shape[1])
@@ -229,7 +227,6 @@ def plan_along_paths(
     labels = stride.RowLabels(gait.labels.weights, everyone)
     speeds = stride.strides(gait.session, point_controls, labels).speeds.reshape(shape)
     gone = _distances(speeds, frames, rate)
-    _check_path_lengths(paths, gone, (frames - 1) / rate)
     controls = paths.interpolate(point_controls.reshape(*shape, -1), gone)
     cycles = _measure_strides(gait, controls, combinations)
     points, tangents = paths.at(gone)
@@ -308,15 +305,6 @@ def _distances(
     return np.interp((when + offsets).ravel(), (arrived + offsets).ravel(), ways).reshape(
         -1, frames
     )
-
-
-def _check_path_lengths(paths: Paths, gone: CharacterFrames, seconds: float) -> None:
-    for index in np.flatnonzero(gone[:, -1] >= paths.lengths)[:1]:
-        raise InvalidField(
-            f"paths/{index}",
-            f"{paths.lengths[index]:.2f} m long, which is walked in less than {seconds:g} s, "
-            "expected a longer way or a shorter time",
-        )
 
 
 TRANSITION_SECONDS = 0.25

@@ -7,7 +7,6 @@ end.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import (
     UP,
     Bones,
-    Floats,
     Frames,
     JointRotations,
     RootPath,
@@ -25,10 +23,11 @@ from posefield.common.units import (
 from posefield.feet import limbs
 from posefield.feet.limbs import Limb
 from posefield.feet.stance_rows import STANDING
-from posefield.kriging import random_field
+from posefield.locomotion import floor_plane
 from posefield.motion import quat, skeleton
 from posefield.motion.hinges import Hinge
 from posefield.motion.skeleton import Skeleton
+from posefield.performance import step_plan
 from posefield.performance.limb_targets import WorldTarget
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.performance.script import Script
@@ -149,13 +148,6 @@ class HeldBody:
         return limited
 
 
-STREAM = 4
-"""Stream of a seed, besides those of takes and details."""
-FREQUENCIES = 0.13, 0.23, 0.37, 0.61
-"""Of the waves of a movement, Hz; most of the sway of quiet standing is below 0.5 Hz (Winter,
-"Human balance and posture control during standing and walking", 1995)."""
-ROOT_SWAY = 0.004
-"""Standard deviation of the root over the floor, m, forward and to the left."""
 ANGLES = {
     "spine": 0.3,
     "chest": 0.3,
@@ -178,13 +170,13 @@ def add_sway(
     rate: float,
     seed: int,
 ) -> tuple[Rotations, RootPath]:
-    """Return poses (F, J, 4) and roots (F, 3), m, with the sway of a seed.
+    """Return poses (F, J, 4) of who stands and roots (F, 3), m, with the sway of a seed.
 
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
-    sway = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
-    swayed = roots.copy()
-    swayed[:, [2, 0]] += ROOT_SWAY * sway[:, :2]
+    sway = step_plan.waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
+    ahead = np.exp(1j * quat.twist(rotations[0, 0], UP))
+    swayed = roots + floor_plane.at_height(ahead * (sway[:, :2] @ step_plan.SWAY), np.zeros(1))
     vectors = sway[:, 2:].reshape(len(roots), -1, 3)
     turned = rotations.copy()
     for number, role in enumerate(ANGLES):
@@ -192,19 +184,6 @@ def add_sway(
             turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, number])
             turned[:, joints[role]] = quat.mul(turned[:, joints[role]], turn)
     return turned, swayed
-
-
-def waves(
-    frames: int, rate: float, channels: int, seed: int
-) -> Annotated[Floats, "frames channels"]:
-    """Return smooth random numbers (F, C) with a mean of zero and a variance of one over seeds.
-
-    rate: frames a second. Each channel is a sum of waves of `FREQUENCIES` with random coefficients.
-    """
-    angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * np.array(FREQUENCIES)
-    basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.sqrt(len(FREQUENCIES))
-    numbers: Floats = basis @ random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
-    return numbers
 
 
 REST_FRAMES = 16

@@ -12,7 +12,6 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import UP, Floats, Frames
-from posefield.feet import limbs
 from posefield.feet.footsteps import Character
 from posefield.feet.stance_rows import DECIMALS, STANDING
 from posefield.locomotion import floor_plane
@@ -262,9 +261,7 @@ def add_steps(
 
 def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames feet 3"]:
     tips = [leg.tip for leg in character.legs]
-    poses = limbs.evaluate_joints(
-        character.parents, character.bones, tips, passage.rotations, passage.roots
-    )
+    poses = passage.limbs(character, tips)
     balls = [poses.position(tip) for tip in tips]
     return np.stack(balls, axis=1) if balls else np.zeros((len(passage), 0, 3))
 

@@ -153,14 +153,7 @@ def _moved(
 
 
 def _poses(character: Character, passage: Passage, limb: Limb, rows: range) -> LimbPoses:
-    frames = slice(rows.start, rows.stop)
-    return limbs.evaluate_joints(
-        character.parents,
-        character.bones,
-        [limb.tip],
-        passage.rotations[frames],
-        passage.roots[frames],
-    )
+    return passage.part(rows.start, rows.stop).limbs(character, [limb.tip])
 
 
 def _hold(poses: LimbPoses, limb: Limb, target: WorldTarget) -> tuple[float, HeldTurns]:
@@ -252,12 +245,5 @@ def _share(frames: Frames, target: WorldTarget, before: float, after: float) -> 
 def _miss(character: Character, passage: Passage, target: WorldTarget) -> float:
     """Return the largest distance of a joint from its target while it holds, m."""
     target_frames = passage.part(target.begin, min(target.end + 1, len(passage)))
-    placed = limbs.evaluate_joints(
-        character.parents,
-        character.bones,
-        [target.joint],
-        target_frames.rotations,
-        target_frames.roots,
-    )
-    path = placed.position(target.joint)
+    path = target_frames.limbs(character, [target.joint]).position(target.joint)
     return float(np.linalg.norm(path - target.position, axis=-1).max())

@@ -10,6 +10,8 @@ from posefield.common.errors import MotionError
 from posefield.common.units import UP, Bones, Floats, RootPath, Rotations
 from posefield.common.value_cache import ValueCache
 from posefield.feet import limbs
+from posefield.feet.footsteps import Character
+from posefield.feet.limbs import LimbPoses
 from posefield.locomotion import floor_plane
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
@@ -66,6 +68,10 @@ class Passage:
     def heading(self, frame: int = 0) -> float:
         """Return the heading of the root in a frame, rad."""
         return float(quat.twist(self.rotations[frame, 0], UP))
+
+    def limbs(self, body: Character, joints: Sequence[int]) -> LimbPoses:
+        """Return the poses of joints of a body and of those above them."""
+        return limbs.evaluate_joints(body.parents, body.bones, joints, self.rotations, self.roots)
 
     def placed(self, by: FloorMotion) -> "Passage":
         """Return the passage moved over the floor."""

@@ -231,8 +231,8 @@ def _path(
     return FloorPath(complex(start.shift), averaged, float(knots[-1]) / (count - 1))
 
 
-NEAREST, AT_PLACE = 0.1, 0.01
-"""Smallest distance between two points of a walk, m, and up to which who only turns is there."""
+NEAREST = 0.1
+"""Smallest distance between two points of a walk, m."""
 POINTS_PER_SPACING = 2
 
 
@@ -277,7 +277,11 @@ def to_place(start: FloorMotion, goal: Destination, radii: Radii) -> FloorPath:
     Raises InvalidField for a place too near or too far.
     """
     away = abs(goal.place - start.shift)
-    _check_distance(goal, away, NEAREST)
+    if not NEAREST <= away <= MAX_LENGTH:
+        raise InvalidField(
+            goal.field,
+            f"{away:.2f} m from where the walk begins, expected {NEAREST:g} to {MAX_LENGTH:g} m",
+        )
     try:
         return connect(start, goal.place, goal.heading, radii)
     except ValueError as error:
@@ -286,14 +290,6 @@ def to_place(start: FloorMotion, goal: Destination, radii: Radii) -> FloorPath:
             f"{away:.2f} m away, with no room to turn there with radii of {radii.left:.1f} m to "
             f"the left and {radii.right:.1f} m to the right; expected a place further away",
         ) from error
-
-
-def straight(start: FloorMotion, goal: Destination, turns: bool) -> FloorPath:
-    """Return the straight path to a place; turns: whether it may be where the walk begins."""
-    way = goal.place - start.shift
-    _check_distance(goal, abs(way), 0.0 if turns else NEAREST)
-    count, length = point_count(abs(way)), max(abs(way), 1e-6)
-    return FloorPath(start.shift, np.full(count, np.angle(way)), length / (count - 1))
 
 
 def along_corners(start: FloorMotion, corners: Sequence[complex], goal: Destination) -> FloorPath:
@@ -310,14 +306,6 @@ def turning(
     count = point_count(gone[-1])
     even = np.interp(np.linspace(0.0, gone[-1], count), gone, turns)
     return FloorPath(complex(start.shift), start.turn + even, float(gone[-1]) / (count - 1))
-
-
-def _check_distance(goal: Destination, away: float, least: float) -> None:
-    if not least <= away <= MAX_LENGTH:
-        raise InvalidField(
-            goal.field,
-            f"{away:.2f} m from where the walk begins, expected {least:g} to {MAX_LENGTH:g} m",
-        )
 
 
 def _slope(at: FloorMotion | None) -> Annotated[Floats, "2"] | None:

@@ -155,8 +155,9 @@ DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 UNSEEN_PIVOT = 0.2
 """Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 7°
 over a foot that stands for 0.65 s, and captured pelvises turn by 9° in each stride (median)."""
-FACING_SPEEDS, STANDS = (0.1, 0.6), 0.999
-"""Speeds of walks whose body faces one way, m/s, and the share of the standing pose at rest."""
+FACING_SPEEDS, STANDS, AT_PLACE = (0.1, 0.6), 0.999, 0.01
+"""Speeds of walks whose body faces one way, m/s, the share of the standing pose at rest, and the
+distance up to which who turns is at the place, m."""
 FACING_NOTE = "steps to the side, backwards and on the spot are synthesised: none was captured"
 # Frames between the points at which controls are solved, and the most points of mean offsets.
 STEP, OFFSET_POINTS = 6, 12
@@ -228,7 +229,6 @@ def plan_walk(
     begins standing. Raises InvalidField, with the field of the request, for a walk that the model
     cannot do.
     """
-    walk_request.check_fields(request)
     walker = find_walker(gait, request.labels, request.controls)
     if request.facing is not None:
         return _plan_facing(walker, request, start or FloorMotion(), request.facing)
@@ -294,12 +294,14 @@ def _plan_facing(
         raise InvalidField("facing", f"{message}, expected a walk")
     curve = walk_request.check_speeds(request.speed, request.speed_over, FACING_SPEEDS)
     headings = step_plan.turn_on_the_spot(start.turn, check_number("facing", facing), RATE)
-    path = walk_paths.straight(start, goal, len(headings) > 1)
+    way, gone = goal.place - start.shift, np.zeros(1)
+    path = FloorPath(start.shift, np.full(3, headings[-1]), 1e-6)
+    if abs(way) > AT_PLACE or len(headings) == 1:
+        ahead = FloorMotion(float(np.angle(way)), start.shift)
+        path = walk_paths.to_place(ahead, goal, Radii(1.0, 1.0))
+        ramps, scale = SpeedRamps(0.0, 0.0, request.acceleration), request.speed_over
+        gone = walk_request.distances_over_length(curve, scale, path.length, ramps)
     walk_request.check_clear(path, request.obstacles)
-    ramps = SpeedRamps(0.0, 0.0, request.acceleration)
-    gone = np.zeros(1)
-    if path.length > walk_paths.AT_PLACE:
-        gone = walk_request.distances_over_length(curve, request.speed_over, path.length, ramps)
     distances = np.pad(gone, (len(headings), round(step_plan.LAST_STEPS * RATE)), "edge")
     headings = np.pad(headings, (0, len(distances) - len(headings)), "edge")
     points = path.at(distances)[0]
@@ -319,7 +321,9 @@ def _route(
     """Return the path of a walk, the distances (F,), m, at its frames, and notes."""
     limits = gait.region.speeds
     curve = walk_request.check_speeds(request.speed, request.speed_over, limits)
-    ramps = _ramps(request, limits)
+    first = 0.0 if request.start == "standing" else request.entry_speed
+    last = 0.0 if request.stop == "standing" else None
+    ramps = SpeedRamps(first, last, request.acceleration)
     if request.seconds is not None:
         seconds = check_number("seconds", request.seconds)
         check_range("seconds", seconds, *SECONDS_RANGE, "s")
@@ -351,18 +355,6 @@ def curve_speeds(gait: Gait, path: FloorPath) -> PerPoint:
     return limits
 
 
-def _ramps(request: WalkRequest, limits: tuple[float, float]) -> SpeedRamps:
-    first = request.entry_speed
-    if first is not None:
-        if request.start == "standing":
-            raise InvalidField("entry_speed", "given for a walk that begins standing")
-        check_range("entry_speed", check_number("entry_speed", first), *limits, "m/s")
-    if request.start == "standing":
-        first = 0.0
-    last = 0.0 if request.stop == "standing" else None
-    return SpeedRamps(first, last, request.acceleration)
-
-
 def _turns(
     request: WalkRequest, gone: Annotated[Floats, "frames"], slowest: float
 ) -> Annotated[Floats, "frames"]:
@@ -375,7 +367,7 @@ def _turns(
     rates = np.interp(times, *walk_request.check_curve("turn", turn))
     if request.entry_turn is not None:
         left = np.clip(times / TURN_EASING, 0.0, 1.0)
-        change = check_number("entry_turn", request.entry_turn) - rates[0]
+        change = request.entry_turn - rates[0]
         rates += change * 0.5 * (1.0 + np.cos(np.pi * left))
     shares = np.minimum(np.diff(gone) * RATE / slowest, 1.0)
     return np.pad(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * shares) / RATE, (1, 0))
@@ -399,7 +391,10 @@ def _path(
 
 
 def _around(request: WalkRequest, begin: FloorMotion, radii: Radii) -> FloorPath:
-    goal = _destination(request)
+    goal, count = _destination(request), len(request.obstacles)
+    if count > walk_request.MAX_DISCS:
+        message = f"{count}, expected at most {walk_request.MAX_DISCS} with a detour"
+        raise InvalidField("obstacles", message)
     for share in DETOUR_SHARES:
         clearance = share * radii.larger
         corners = walk_request.way_around(begin.shift, goal.place, request.obstacles, clearance)
@@ -419,10 +414,7 @@ def _destination(request: WalkRequest) -> Destination:
         end = request.end or FloorMotion()
         return Destination("end", end.shift, end.turn)
     x, z = (check_number(f"to/{i}", value) for i, value in enumerate(request.to))
-    heading = request.arrive_heading
-    if heading is not None:
-        heading = check_number("arrive_heading", heading)
-    return Destination("to", complex(z, x), heading)
+    return Destination("to", complex(z, x), None)
 
 
 def _radii(gait: Gait, speeds: PerPoint) -> Radii:

@@ -21,7 +21,7 @@ from posefield.common.units import Floats
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.walk_paths import FloorPath
-from posefield.question.motion_question import LabelValue, check_number, check_range
+from posefield.question.motion_question import LabelValue, check_number
 
 Curve = float | Sequence[tuple[float, float]]
 """A number, or pairs of a distance, m, or a time, s, and a value; linear between, constant after
@@ -309,11 +309,11 @@ Motion = Literal["rolling", "standing"]
 class WalkRequest:
     """Requested walk: exactly one of `along`, `to`, `seconds`, or `end` alone.
 
-    along: waypoints (P, 2), x and z, m. to: point, x and z, m. arrive_heading: there, rad. facing:
-    heading of the body all the way to it, rad; None for that of the way. seconds: duration, s,
-    straight ahead or with `turn`, rad/s: a number or pairs of a time, s, and a rate. end: place and
-    heading in which the walk ends; with `along` after its last waypoint. speed: m/s, or pairs of a
-    distance, m, or time, s, and a speed. labels: name or weights by label set.
+    along: waypoints (P, 2), x and z, m. to: point, x and z, m. facing: heading of the body all the
+    way to it, rad; None for that of the way. seconds: duration, s, straight ahead or with `turn`,
+    rad/s: a number or pairs of a time, s, and a rate. end: place and heading in which the walk
+    ends; with `along` after its last waypoint. speed: m/s, or pairs of a distance, m, or time, s,
+    and a speed. labels: name or weights by label set.
     controls: given controls by name. start, stop: whether the walk begins and ends in motion or
     standing. entry_speed, entry_turn: m/s and rad/s at which it begins in motion; None for those of
     the curves. acceleration: of starts, stops and from the entry speed, m/s². obstacles: discs.
@@ -325,7 +325,6 @@ class WalkRequest:
     to: tuple[float, float] | None = None
     seconds: float | None = None
     end: FloorMotion | None = None
-    arrive_heading: float | None = None
     facing: float | None = None
     turn: Curve | None = None
     speed_over: Scale = "distance"
@@ -347,35 +346,3 @@ class WalkNote:
     code: str
     field: str
     message: str
-
-
-def check_fields(request: WalkRequest) -> None:
-    """Raise InvalidField for fields that exclude each other or that go only with others."""
-    goals = [name for name in ("along", "to", "seconds") if getattr(request, name) is not None]
-    if len(goals) > 1 or not (goals or request.end):
-        raise InvalidField(
-            goals[-1] if goals else "along",
-            f"{' and '.join(goals) or 'none'} given, expected one of along, to and seconds",
-        )
-    if request.end and goals not in ([], ["along"]):
-        raise InvalidField("end", f"given with {goals[0]}, expected alone or with along")
-    if request.turn is not None and request.seconds is None:
-        raise InvalidField("turn", "given without seconds, expected only with seconds")
-    if request.entry_turn is not None and request.seconds is None:
-        raise InvalidField("entry_turn", "given without seconds, expected only with seconds")
-    if request.arrive_heading is not None and request.to is None:
-        raise InvalidField("arrive_heading", "given without to, expected only with to")
-    if request.detour and (request.along is not None or request.seconds is not None):
-        raise InvalidField("detour", "given with along or seconds, expected only with to or end")
-    if request.detour and len(request.obstacles) > MAX_DISCS:
-        count = len(request.obstacles)
-        raise InvalidField("obstacles", f"{count}, expected at most {MAX_DISCS} with a detour")
-    for index, disc in enumerate(request.obstacles):
-        for name in ("x", "z", "radius"):
-            check_number(f"obstacles/{index}/{name}", getattr(disc, name))
-        if disc.radius <= 0.0:
-            raise InvalidField(
-                f"obstacles/{index}/radius", f"{disc.radius:g} m, expected more than 0"
-            )
-    check_number("acceleration", request.acceleration)
-    check_range("acceleration", request.acceleration, 0.1, MAX_ACCELERATION, "m/s²")

@@ -11,7 +11,6 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Indices, PerCharacter
-from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.stepping import StandingPoses
@@ -22,9 +21,6 @@ from posefield.tracks.track_path import TrackPath
 
 KNOT_SECONDS = 0.2
 """Time between points at which controls are solved, s, with lines between."""
-SWAYS = ((0.11, 0.016, 0.006), (0.23, 0.007, 0.004), (0.41, 0.003, 0.003))
-"""Frequencies of the sway of a person who stands, 1/s, and how far it goes to the side and forward,
-m: shifts of the weight, and what keeps the balance (Winter 1995 reports some millimetres)."""
 
 
 @dataclass(frozen=True)
@@ -112,15 +108,6 @@ def _plan_person(
     standing = None if poses is None else (poses, labels)
     scaled = StepPath(path.points / scale, path.velocities / scale, path.headings)
     plan = step_plan.plan_steps(walkers.striders[labels], standing, scaled, float(numbers[0]), rate)
-    sway = plan.shares**2 * _sway(len(path), float(numbers[1]), rate)
-    return replace(plan, points=plan.points + np.exp(1j * plan.headings) * sway)
-
-
-def _sway(frames: int, number: float, rate: float) -> Annotated[FloorVectors, "frames"]:
-    """Return the sway (F,) of a person who stands, in the frame that travels."""
-    times = np.arange(frames) / rate
-    sway = np.zeros(frames, complex)
-    for index, (frequency, side, forward) in enumerate(SWAYS):
-        turn = 2.0 * np.pi * (frequency * times * (1.0 + 0.2 * number) + (index + 3.0) * number)
-        sway += forward * np.sin(1.3 * turn + 1.0) + 1j * side * np.sin(turn)
-    return sway
+    sway = step_plan.waves(len(path), rate, 2, int(numbers[1] * 2**31)) @ step_plan.SWAY
+    sway *= plan.shares**2 * np.exp(1j * plan.headings)
+    return replace(plan, points=plan.points + sway)

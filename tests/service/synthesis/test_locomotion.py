@@ -179,13 +179,6 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     assert walking_crowd.measure_foot_skate(own.session.card, slid, RATE).mean() > 2.0 * strides
 
 
-def test_a_way_that_ends_too_soon_is_refused(own):
-    starts = np.zeros(1, dtype=np.complex128)
-    ways = locomotion_plan.Paths(starts, np.zeros((1, 31)), np.ones((1, 31)), np.array([3.0]))
-    with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
-        locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
-
-
 @pytest.mark.parametrize("count", [1, 3])
 def test_the_root_alone_is_where_it_is_in_whole_poses_bit_for_bit(own, count):
     opened, phases = own.session, np.arange(8) / 8

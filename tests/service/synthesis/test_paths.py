@@ -18,7 +18,7 @@ def circle(radius):
     """One way round a circle, to the left."""
     headings = np.arange(200) * POINT_SPACING / radius
     starts = np.zeros(1, dtype=np.complex128)
-    return Paths(starts, headings[None], np.ones((1, 200)), np.array([199 * POINT_SPACING]))
+    return Paths(starts, headings[None], np.ones((1, 200)))
 
 
 def test_even_turns_are_a_circle_between_places_too():
