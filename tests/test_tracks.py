@@ -235,9 +235,9 @@ def test_a_route_leads_round_its_corner_and_ends_standing(walk):
 @pytest.mark.parametrize(
     ("waypoints", "speed", "message"),
     [
-        ([[0, 0], [0, 5]], 0.3, "paths/1/speed: 0.3 m/s, expected 0.487 to 1.79 m/s"),
-        ([[0, 0]], 1.0, "paths/1/waypoints: numbers (1, 2), expected two or more pairs"),
-        ([[0, 0], [0, 1], [0, 1]], 1.0, "paths/1/waypoints/2: less than 0.1 m from the one before"),
+        ([[0, 0], [0, 5]], 0.3, "paths/1/speed: 0.3 m/s, expected 0.487 to 1.793 m/s"),
+        ([[0, 0]], 1.0, "paths/1/waypoints: one place, expected a path"),
+        ([[0, 0], [0, 1], [0, 1]], 1.0, "paths/1/waypoints/2: 0.000 m from the one before"),
     ],
 )
 def test_a_route_that_cannot_be_walked_is_refused_by_number(walk, waypoints, speed, message):

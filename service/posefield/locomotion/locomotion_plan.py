@@ -20,7 +20,7 @@ from posefield.common.units import (
     PerCharacter,
 )
 from posefield.inference import level_selection
-from posefield.inference.level_selection import HYSTERESIS, MAX_COORDINATE, Camera, LevelTable
+from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
@@ -121,36 +121,6 @@ def _parse_route(field: str, entry: Any) -> Route:
         return Route(waypoints.astype(float), float(entry["speed"]))
     except (TypeError, ValueError) as fault:
         raise InvalidField(field, "expected pairs of numbers and a number") from fault
-
-
-def check_route(gait: Gait, index: int, route: Route) -> None:
-    """Raise InvalidField, with its number, for a route that no walker of the gait can follow."""
-    points, (low, high) = route.waypoints, gait.region.speeds
-    field = f"paths/{index}/waypoints"
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
-        raise InvalidField(
-            field, f"numbers {points.shape}, expected two or more pairs of finite ones"
-        )
-    if len(points) > MAX_WAYPOINTS or not (np.abs(points) <= MAX_COORDINATE).all():
-        raise InvalidField(
-            field,
-            f"{len(points)} up to {np.abs(points).max():g} m away, expected at most "
-            f"{MAX_WAYPOINTS} up to {MAX_COORDINATE:g} m",
-        )
-    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    if length > MAX_LENGTH:
-        raise InvalidField(field, f"{length:.0f} m from one to the last, expected {MAX_LENGTH:g} m")
-    if not low <= route.speed <= high:
-        raise InvalidField(
-            f"paths/{index}/speed", f"{route.speed:g} m/s, expected {low:.3g} to {high:.3g} m/s"
-        )
-    short = np.linalg.norm(np.diff(points, axis=0), axis=1) < POINT_SPACING
-    if short.any():
-        at = int(np.argmax(short))
-        raise InvalidField(
-            f"paths/{index}/waypoints/{at + 1}",
-            f"less than {POINT_SPACING:g} m from the one before, expected a way to it",
-        )
 
 
 Numbers = TypeVar("Numbers", Floats, FloorVectors)

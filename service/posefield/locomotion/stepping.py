@@ -95,7 +95,7 @@ def turn_legs(
     rotations: Annotated[Floats, "poses joints 4"],
     hips: tuple[int, ...],
     turns: Annotated[Floats, "poses legs"],
-    tilts: Annotated[FloorVectors, "poses legs"] | None = None,
+    tilts: Annotated[FloorVectors, "poses legs"],
 ) -> None:
     """Turn the legs of poses (K, J, 4) about the vertical through their hips (K, 2), rad.
 
@@ -105,12 +105,10 @@ def turn_legs(
         above = rotations[:, 0]
         for joint in skeleton.joint_chain(parents, hip)[1:-1]:
             above = quat.mul(above, rotations[:, joint])
-        turn = quat.from_axis_angle(UP, turns[:, leg])
-        if tilts is not None:
-            # A foot below the hip moves towards x as the leg turns about z.
-            tilt = tilts[:, leg]
-            axis = np.stack([-tilt.real, np.zeros(len(tilt)), tilt.imag], axis=-1)
-            turn = quat.mul(quat.exp(axis), turn)
+        # A foot below the hip moves towards x as the leg turns about z.
+        tilt = tilts[:, leg]
+        axis = np.stack([-tilt.real, np.zeros(len(tilt)), tilt.imag], axis=-1)
+        turn = quat.mul(quat.exp(axis), quat.from_axis_angle(UP, turns[:, leg]))
         turned = quat.mul(turn, quat.mul(above, rotations[:, hip]))
         rotations[:, hip] = quat.mul(quat.conj(above), turned)
 

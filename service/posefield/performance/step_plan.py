@@ -6,7 +6,7 @@ after a stop advance it too. All is planned in the size of the model's body.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
@@ -40,20 +40,23 @@ standing is below 0.5 Hz (Winter, "Human balance and posture control during stan
 TURN_SPEED, TURN_EASE = 1.9, 0.5
 """Mean rate of a turn on the spot, rad/s, and the time that it takes besides, s."""
 FACED = np.radians(2.0)
-"""Angle up to which nobody turns on the spot, rad."""
+"""Angle up to which a body does not turn on the spot, rad."""
 LAST_STEPS = 1.0 / SETTLING + 1.0
 """Time in which a person who stops comes to stand, s, at most."""
 
 
 @dataclass(frozen=True)
 class Strider:
-    """Strides of a walker by speed, straight forward.
+    """Standing pose of a walker, and its strides by speed, straight forward.
 
-    speeds: (S,), m/s. lengths: (S,), m. durations: (S,), s. drifts: (S,), rad. offsets: mean points
-    of the root (S,).
+    poses: standing ones, of which `row` is the walker's; None for a model without two feet. speeds:
+    (S,), m/s. lengths: (S,), m. durations: (S,), s. drifts: (S,), rad. offsets: mean points of the
+    root (S,).
     """
 
     walker: Walker
+    poses: StandingPoses | None
+    row: int
     speeds: Floats
     lengths: Floats
     durations: Floats
@@ -61,12 +64,16 @@ class Strider:
     offsets: Annotated[FloorVectors, "speeds"]
 
 
-def find_strider(walker: Walker) -> Strider:
-    """Return the strides of a walker."""
-    speeds = np.linspace(*walker.gait.region.speeds, TABLE_SPEEDS)
-    controls = walker.controls(speeds, np.zeros(TABLE_SPEEDS))
-    done, offsets = walker.strides(controls), walker.mean_offsets(controls)
-    return Strider(walker, done.speeds, np.abs(done.travels), done.durations, done.drifts, offsets)
+def find_striders(walkers: Sequence[Walker]) -> tuple[Strider, ...]:
+    """Return the strides of walkers of one model."""
+    poses, striders = find_standing_poses(walkers), []
+    speeds = np.linspace(*walkers[0].gait.region.speeds, TABLE_SPEEDS)
+    for row, walker in enumerate(walkers):
+        controls = walker.controls(speeds, np.zeros(TABLE_SPEEDS))
+        done, offsets = walker.strides(controls), walker.mean_offsets(controls)
+        tables = done.speeds, np.abs(done.travels), done.durations, done.drifts, offsets
+        striders.append(Strider(walker, poses, row, *tables))
+    return tuple(striders)
 
 
 def find_standing_poses(walkers: Sequence[Walker]) -> StandingPoses | None:
@@ -111,14 +118,6 @@ def turn_on_the_spot(start: float, facing: float, rate: float) -> Frames:
     return start + angle * quat.smoothstep(np.linspace(0.0, 1.0, count + 1))
 
 
-class StepPath(NamedTuple):
-    """Path of a body over F frames: points (F,), m, velocities (F,), m/s, headings (F,), rad."""
-
-    points: Annotated[FloorVectors, "frames"]
-    velocities: Annotated[FloorVectors, "frames"]
-    headings: Frames
-
-
 @dataclass(frozen=True)
 class StepPlan:
     """Plan of one person in F frames, as of `LocomotionPlan` and `Stepping`.
@@ -139,17 +138,16 @@ class StepPlan:
 
 def plan_steps(
     table: Strider,
-    standing: tuple[StandingPoses, int] | None,
-    path: StepPath,
+    path: tuple[Annotated[FloorVectors, "frames"], Frames],
     number: float,
     rate: float,
 ) -> StepPlan:
     """Return the plan of a person along a path.
 
-    standing: poses, and the row of the walker; None for a model without two feet. number: from 0 to
-    1, of the first phase. rate: frames a second.
+    path: points (F,), m, and headings of the body (F,), rad. number: from 0 to 1, of the first
+    phase. rate: frames a second.
     """
-    points, velocities, headings = path
+    (points, headings), velocities = path, np.gradient(path[0]) * rate
     region, frames = table.walker.gait.region, len(points)
     low, high = region.speeds
     slow = smooth(velocities, SLOW_WINDOW * rate, fixed=False)
@@ -165,7 +163,8 @@ def plan_steps(
     cadences = stepping.cadences(
         stepped.real, stepped.imag, turning - walked, (lengths, durations), low
     )
-    supports = np.zeros(2) if standing is None else standing[0].supports[standing[1]]
+    poses, row = table.poses, table.row
+    supports = np.zeros(2) if poses is None else poses.supports[row]
     phases, moving = _phases(cadences, supports, number, rate)
     steps = smooth(moving.astype(complex), EASE * rate, fixed=False).real
     speed = np.clip(np.abs(stepped.real) / low, 0.0, 1.0)
@@ -173,9 +172,8 @@ def plan_steps(
     shares = smooth(shares.astype(complex), EASE * rate, fixed=False).real
     offsets = np.interp(forward, table.speeds, table.offsets)
     turns, shifts = np.zeros((frames, 2)), np.zeros((frames, 2), complex)
-    if standing is not None:
+    if poses is not None:
         # Of the turn and the way since the middle of a stance the stride has a part in its pose.
-        poses, row = standing
         passings = poses.passings[row]
         strides = (1.0 - shares)[:, None] * stepping.stepped(phases, phases, passings)
         turns = stepping.stepped(phases, headings, passings)
@@ -199,13 +197,13 @@ def plan_steps(
     )
 
 
-def stepping_of(
-    plans: Sequence[StepPlan], poses: StandingPoses, parents: tuple[int, ...]
-) -> Stepping:
-    """Return the steps of people whose plans have equally many frames."""
+def stepping_of(strider: Strider, plans: Sequence[StepPlan]) -> Stepping | None:
+    """Return the steps of people whose plans have equally many frames; None without two feet."""
+    if strider.poses is None:
+        return None
     names = "shares", "firm", "turns", "shifts"
     fields = (np.stack([getattr(plan, name) for plan in plans]) for name in names)
-    return Stepping(poses, parents, *fields)
+    return Stepping(strider.poses, strider.walker.card.skeleton.parents, *fields)
 
 
 def _phases(

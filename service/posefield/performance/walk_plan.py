@@ -27,7 +27,6 @@ from posefield.performance import (
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.standing_pose import Walker, find_walker
 from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
-from posefield.performance.step_plan import StepPath
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import SpeedRamps, WalkNote, WalkRequest
 from posefield.question.motion_question import check_number, check_range
@@ -152,6 +151,8 @@ CURVE_SHARE, CURVE_SPEEDS = 0.95, 24
 """Share of the largest rate of turning in curves, and the number of speeds at which it is known."""
 DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 """Clearances of ways around obstacles that are tried, as shares of the larger radius."""
+TURN_GRAIN = 1e-4
+"""Excess of a rate of turning that is none, rad/s, and that refusals show."""
 UNSEEN_PIVOT = 0.2
 """Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 7°
 over a foot that stands for 0.65 s, and captured pelvises turn by 9° in each stride (median)."""
@@ -288,12 +289,12 @@ def _plan_facing(
 
     It turns on the spot first, and then goes straight to its place, from standing to standing.
     """
-    poses, goal = step_plan.find_standing_poses([walker]), _destination(request)
-    if poses is None:
+    (strider,), goal = step_plan.find_striders([walker]), _destination(request)
+    if strider.poses is None:
         message = "given for a model without two feet that step in turn"
         raise InvalidField("facing", f"{message}, expected a walk")
     curve = walk_request.check_speeds(request.speed, request.speed_over, FACING_SPEEDS)
-    headings = step_plan.turn_on_the_spot(start.turn, check_number("facing", facing), RATE)
+    headings = step_plan.turn_on_the_spot(start.turn, facing, RATE)
     way, gone = goal.place - start.shift, np.zeros(1)
     path = FloorPath(start.shift, np.full(3, headings[-1]), 1e-6)
     if abs(way) > AT_PLACE or len(headings) == 1:
@@ -304,12 +305,12 @@ def _plan_facing(
     walk_request.check_clear(path, request.obstacles)
     distances = np.pad(gone, (len(headings), round(step_plan.LAST_STEPS * RATE)), "edge")
     headings = np.pad(headings, (0, len(distances) - len(headings)), "edge")
-    points = path.at(distances)[0]
-    body = StepPath(points, np.gradient(points) * RATE, headings)
-    plan = step_plan.plan_steps(step_plan.find_strider(walker), (poses, 0), body, 0.0, RATE)
-    steps = step_plan.stepping_of([plan], poses, walker.card.skeleton.parents)
+    body = path.at(distances)[0], headings
+    plan = step_plan.plan_steps(strider, body, 0.0, RATE)
+    steps = step_plan.stepping_of(strider, [plan])
     controls = walker.controls(plan.speeds, plan.turning)
-    speeds, note = np.abs(body.velocities), WalkNote(f"{SYNTHESISED}-steps", "facing", FACING_NOTE)
+    speeds = np.gradient(distances) * RATE
+    note = WalkNote(f"{SYNTHESISED}-steps", "facing", FACING_NOTE)
     fields = walker, path, distances, plan.points, plan.headings, plan.phases, controls, speeds
     end = int(np.flatnonzero(plan.shares < STANDS)[-1]) + 2
     return WalkPlan(*fields, steps, (note,), True).part(0, end)
@@ -445,13 +446,13 @@ def _rates(
     turning = np.minimum(speeds, high) * curvatures
     right, left = _turning_limits(gait, paced)
     beyond = np.maximum(turning - left, right - turning)
-    if beyond.max() > 0.0:
+    if beyond.max() > TURN_GRAIN:
         at = int(np.argmax(beyond))
         point = path.at(gone[at : at + 1])[0][0]
         raise InvalidField(
             _field(request, path, float(gone[at])),
-            f"at x {point.imag:.2f} m, z {point.real:.2f} m it turns by {turning[at]:.2f} rad/s, "
-            f"expected {right[at]:.2f} to {left[at]:.2f} rad/s at {paced[at]:.2f} m/s; positive is "
+            f"at x {point.imag:.2f} m, z {point.real:.2f} m it turns by {turning[at]:.4f} rad/s, "
+            f"expected {right[at]:.4f} to {left[at]:.4f} rad/s at {paced[at]:.2f} m/s; positive is "
             "left. A wider turn or a lower speed mends it",
         )
     walked = np.clip(paced * curvatures, *gait.region.turning(paced))

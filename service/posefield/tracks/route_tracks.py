@@ -5,7 +5,7 @@ from math import ceil
 
 import numpy as np
 
-from posefield.locomotion import locomotion_plan
+from posefield.common.errors import InvalidField
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import Route
 from posefield.performance import walk_paths, walk_plan, walk_request
@@ -26,9 +26,12 @@ def tracks_of_routes(gait: Gait, routes: Sequence[Route], seconds: float) -> tup
     count = ceil(seconds * RATE) + 1
     tracks = []
     for index, route in enumerate(routes):
-        locomotion_plan.check_route(gait, index, route)
-        path = walk_paths.through(route.waypoints, None, None)
-        curve = np.zeros(1), np.array([route.speed])
+        try:
+            curve = walk_request.check_speeds(route.speed, "distance", gait.region.speeds)
+            path = walk_paths.through(route.waypoints, None, None)
+        except InvalidField as fault:
+            field = fault.field.replace("along", "waypoints")
+            raise InvalidField(f"paths/{index}/{field}", fault.message) from fault
         slower = path.distances, walk_plan.curve_speeds(gait, path)
         ramps = SpeedRamps(None, 0.0, ACCELERATION)
         gone = walk_request.distances_over_length(curve, "distance", path.length, ramps, slower)

@@ -17,13 +17,13 @@ from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH
 from posefield.motion.clip import CrowdClip, Motions, Placement, StandingFeet
+from posefield.performance.step_plan import Strider
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_path, track_plan
 from posefield.tracks.track import Track
 from posefield.tracks.track_path import TrackPath
-from posefield.tracks.track_plan import TrackWalkers
 
 SIZES = (0.94, 1.06)
 """Heights of people over those of the model's performers."""
@@ -86,9 +86,9 @@ class TrackCrowd:
         return sorted(limits, key=lambda limit: -limit.excess)
 
     @cached_property
-    def walkers(self) -> TrackWalkers:
-        """Walkers of the model."""
-        return TrackWalkers(self.gait)
+    def striders(self) -> tuple[Strider, ...]:
+        """Strides of the model's walkers."""
+        return track_plan.find_striders(self.gait)
 
     def motions(self, people: Sequence[Person]) -> tuple[LocomotionPlan, Motions]:
         """Return the plan and the motions of people, each from the first frame of its own path.
@@ -101,7 +101,7 @@ class TrackCrowd:
         numbers = np.array([(person.phase, person.sway) for person in people])
         scales = np.array([person.scale for person in people])
         paths = [person.path for person in people]
-        plan = track_plan.plan_people(self.walkers, paths, combinations, numbers, scales, rate)
+        plan = track_plan.plan_people(self.striders, paths, combinations, numbers, scales, rate)
         takes = walking_feet.of_question(card, structs.replace(self.question, count=len(people)))
         if takes is not None and takes.take == "index":
             takes = replace(takes, seeds=np.array([person.take for person in people]))
