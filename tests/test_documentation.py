@@ -147,7 +147,7 @@ def test_scripts_of_performances_in_the_guide_are_valid():
         json_decoding.decode_question(PerformanceQuestion, text.encode())
         for text in scripts_of_performances()[0]
     ]
-    assert len(found) == 6
+    assert len(found) == 7
     kinds = [[type(each).__name__ for each in script.segments] for script in found[-2:]]
     assert kinds == [["Walk", "Act", "Hold", "Act", "Walk"], ["Walk", "Act", "Act", "Walk"]]
 

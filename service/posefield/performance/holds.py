@@ -175,8 +175,8 @@ def add_sway(
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
     sway = step_plan.waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
-    ahead = np.exp(1j * quat.twist(rotations[0, 0], UP))
-    swayed = roots + floor_plane.at_height(ahead * (sway[:, :2] @ step_plan.SWAY), np.zeros(1))
+    direction = np.exp(1j * quat.twist(rotations[0, 0], UP))
+    swayed = roots + floor_plane.at_height(direction * (sway[:, :2] @ step_plan.SWAY), np.zeros(1))
     vectors = sway[:, 2:].reshape(len(roots), -1, 3)
     turned = rotations.copy()
     for number, role in enumerate(ANGLES):

@@ -295,11 +295,11 @@ def _plan_facing(
         raise InvalidField("facing", f"{message}, expected a walk")
     curve = walk_request.check_speeds(request.speed, request.speed_over, FACING_SPEEDS)
     headings = step_plan.turn_on_the_spot(start.turn, facing, RATE)
-    way, gone = goal.place - start.shift, np.zeros(1)
+    gap, gone = goal.place - start.shift, np.zeros(1)
     path = FloorPath(start.shift, np.full(3, headings[-1]), 1e-6)
-    if abs(way) > AT_PLACE or len(headings) == 1:
-        ahead = FloorMotion(float(np.angle(way)), start.shift)
-        path = walk_paths.to_place(ahead, goal, Radii(1.0, 1.0))
+    if abs(gap) > AT_PLACE or len(headings) == 1:
+        onward = FloorMotion(float(np.angle(gap)), start.shift)
+        path = walk_paths.to_place(onward, goal, Radii(1.0, 1.0))
         ramps, scale = SpeedRamps(0.0, 0.0, request.acceleration), request.speed_over
         gone = walk_request.distances_over_length(curve, scale, path.length, ramps)
     walk_request.check_clear(path, request.obstacles)
