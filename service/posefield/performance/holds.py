@@ -7,6 +7,7 @@ end.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from posefield.common.errors import InvalidField, did_you_mean
 from posefield.common.units import (
     UP,
     Bones,
+    Floats,
     Frames,
     JointRotations,
     RootPath,
@@ -23,11 +25,11 @@ from posefield.common.units import (
 from posefield.feet import limbs
 from posefield.feet.limbs import Limb
 from posefield.feet.stance_rows import STANDING
+from posefield.kriging import random_field
 from posefield.locomotion import floor_plane
 from posefield.motion import quat, skeleton
 from posefield.motion.hinges import Hinge
 from posefield.motion.skeleton import Skeleton
-from posefield.performance import step_plan
 from posefield.performance.limb_targets import WorldTarget
 from posefield.performance.passage import RATE, Passage, concatenate
 from posefield.performance.script import Script
@@ -148,6 +150,12 @@ class HeldBody:
         return limited
 
 
+SWAY = np.array([0.005, 0.01j])
+"""Standard deviations of the sway of a person who stands, ahead and to the left, m."""
+FREQUENCIES, STREAM = np.array([0.11, 0.23, 0.37, 0.61]), 4
+"""Frequencies of the sway, Hz, whose waves are the lower the faster they are: most of that of quiet
+standing is below 0.5 Hz (Winter, "Human balance and posture control during standing and walking",
+1995); and the stream of a seed, besides those of takes and details."""
 ANGLES = {
     "spine": 0.3,
     "chest": 0.3,
@@ -174,9 +182,9 @@ def add_sway(
 
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
-    sway = step_plan.waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
+    sway = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
     direction = np.exp(1j * quat.twist(rotations[0, 0], UP))
-    swayed = roots + floor_plane.at_height(direction * (sway[:, :2] @ step_plan.SWAY), np.zeros(1))
+    swayed = roots + floor_plane.at_height(direction * (sway[:, :2] @ SWAY), np.zeros(1))
     vectors = sway[:, 2:].reshape(len(roots), -1, 3)
     turned = rotations.copy()
     for number, role in enumerate(ANGLES):
@@ -184,6 +192,16 @@ def add_sway(
             turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, number])
             turned[:, joints[role]] = quat.mul(turned[:, joints[role]], turn)
     return turned, swayed
+
+
+def waves(
+    frames: int, rate: float, channels: int, seed: int
+) -> Annotated[Floats, "frames channels"]:
+    """Return smooth random numbers (F, C) with a mean of zero and a variance of one over seeds."""
+    angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * FREQUENCIES
+    basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.tile(FREQUENCIES, 2)
+    numbers = random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
+    return np.asarray(basis @ numbers / np.sqrt(np.sum(FREQUENCIES**-2.0)))
 
 
 REST_FRAMES = 16

@@ -11,7 +11,6 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Frames
-from posefield.kriging import random_field
 from posefield.locomotion import stepping
 from posefield.locomotion.floor_plane import FloorVectors, smooth
 from posefield.locomotion.stepping import StandingPoses, Stepping
@@ -31,12 +30,6 @@ EASE = 0.1
 """Standard deviation of the average with which standing and stepping are blended, s."""
 LEAST_WALKED = 0.4
 """Smallest share of the walk in the pose of a person who steps."""
-SWAY = np.array([0.005, 0.01j])
-"""Standard deviations of the sway of a person who stands, ahead and to the left, m."""
-FREQUENCIES, STREAM = np.array([0.11, 0.23, 0.37, 0.61]), 4
-"""Frequencies of the sway, Hz, whose waves are the lower the faster they are: most of that of quiet
-standing is below 0.5 Hz (Winter, "Human balance and posture control during standing and walking",
-1995); and the stream of a seed, besides those of takes and details."""
 TURN_SPEED, TURN_EASE = 1.9, 0.5
 """Mean rate of a turn on the spot, rad/s, and the time that it takes besides, s."""
 FACED = np.radians(2.0)
@@ -94,16 +87,6 @@ def find_standing_poses(walkers: Sequence[Walker]) -> StandingPoses | None:
         passings,
         np.stack([walker.double_supports for walker in walkers]),
     )
-
-
-def waves(
-    frames: int, rate: float, channels: int, seed: int
-) -> Annotated[Floats, "frames channels"]:
-    """Return smooth random numbers (F, C) with a mean of zero and a variance of one over seeds."""
-    angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * FREQUENCIES
-    basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.tile(FREQUENCIES, 2)
-    numbers = random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
-    return np.asarray(basis @ numbers / np.sqrt(np.sum(FREQUENCIES**-2.0)))
 
 
 def turn_seconds(angle: float) -> float:

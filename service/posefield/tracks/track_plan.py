@@ -12,7 +12,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices, PerCharacter
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.performance import step_plan
+from posefield.performance import holds, step_plan
 from posefield.performance.standing_pose import Walker
 from posefield.performance.step_plan import StepPlan, Strider
 from posefield.tracks.track_path import TrackPath
@@ -48,7 +48,7 @@ def plan_people(
     for path, labels, draw, scale in zip(paths, combinations, numbers, scales, strict=True):
         body = path.points / scale, path.headings
         plan = step_plan.plan_steps(striders[labels], body, float(draw[0]), rate)
-        sway = step_plan.waves(frames, rate, 2, int(draw[1] * 2**31)) @ step_plan.SWAY
+        sway = holds.waves(frames, rate, 2, int(draw[1] * 2**31)) @ holds.SWAY
         sway *= plan.shares**2 * np.exp(1j * plan.headings)
         plans.append(replace(plan, points=plan.points + sway))
     names = "speeds", "turning", "phases", "points", "headings"
