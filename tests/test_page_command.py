@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+from base64 import b64encode
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -32,6 +34,8 @@ def test_a_page_has_its_models_and_is_written_again_in_its_folder(tmp_path):
     site = tmp_path / "site"
     assert (site / entries[0]["model"]).read_bytes() == walk.read_bytes()
     assert (site / entries[0]["character"]).read_bytes()[:4] == b"glTF"
+    digest = b64encode(sha256(walk.read_bytes()).digest()).decode()
+    assert entries[0]["integrity"]["model"] == f"sha256-{digest}"
     index = (site / "index.html").read_text()
     assert index == MODEL_PAGE.read_text() and 'src="./assets/' in index
 

@@ -16,7 +16,6 @@ export interface Stage {
   readonly card: ModelCard;
   readonly character: Character;
   readonly panel: Panel;
-  readonly tell: (fault: unknown) => void;
 }
 
 /** Time for which the end of a motion without cycle is shown, s. */
@@ -45,7 +44,7 @@ export class ClipView implements View {
 
   change(): void {
     this.#changed = true;
-    if (!this.#computes) this.#compute().catch(this.#stage.tell);
+    if (!this.#computes) this.#compute();
   }
 
   dispose(): void {

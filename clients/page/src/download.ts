@@ -33,12 +33,3 @@ export async function glb(
   const content = await new GLTFExporter().parseAsync(mesh, { binary: true, animations });
   return content as ArrayBuffer;
 }
-
-/** Offer bytes as a file to save. */
-export function save(content: ArrayBuffer, name: string): void {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([content], { type: "model/gltf-binary" }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}

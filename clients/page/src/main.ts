@@ -3,8 +3,9 @@
 import "./page.css";
 
 import type { ModelCard } from "@posefield/client";
-import { load, type Model, RuntimeFault } from "@posefield/runtime";
+import { load, type Model } from "@posefield/runtime";
 import * as characters from "../../viewer/src/character.ts";
+import { saveFile } from "../../viewer/src/dom.ts";
 import { Scene } from "../../viewer/src/scene.ts";
 import * as theme from "../../viewer/src/theme.ts";
 import { ClipView } from "./clip-view.ts";
@@ -18,6 +19,8 @@ interface Entry {
   readonly character: string;
   /** Root of the skin at rest, m. */
   readonly root: readonly [number, number, number];
+  /** Checksums of both files, as `fetch` verifies them. */
+  readonly integrity?: Readonly<Record<"model" | "character", string>>;
 }
 
 /** A way to show a model, until it is disposed. */
@@ -33,21 +36,23 @@ const ort = import("onnxruntime-web/wasm").then((build) => {
   build.InferenceSession.create(new Uint8Array(0)).catch(() => {});
   return build;
 });
-theme.start();
 const told = document.querySelector<HTMLElement>("#told")!;
+addEventListener("error", ({ message }) => tell(message));
+addEventListener("unhandledrejection", ({ reason }) => tell(reason));
+theme.start();
 const scene = new Scene(document.querySelector<HTMLElement>("#stage")!);
 const form = document.querySelector<HTMLFormElement>("#panel")!;
 form.addEventListener("submit", (event) => event.preventDefault());
 
 function tell(fault: unknown): void {
-  told.textContent = fault instanceof RuntimeFault ? fault.message : String(fault);
+  told.textContent = fault instanceof Error ? fault.message : String(fault);
 }
 
 async function open(entries: readonly Entry[], entry: Entry): Promise<void> {
   const [build, content, skin] = await Promise.all([
     ort,
-    bytes(entry.model),
-    bytes(entry.character),
+    bytes(entry.model, entry.integrity?.model),
+    bytes(entry.character, entry.integrity?.character),
   ]);
   const model = await load(content, { ort: build });
   const character = characters.read(skin);
@@ -62,22 +67,22 @@ async function open(entries: readonly Entry[], entry: Entry): Promise<void> {
       view?.dispose();
       location.hash = name;
       const next = entries.find((one) => one.name === name)!;
-      open(entries, next).catch(tell);
+      open(entries, next);
     },
-    download: () => exported(model, panel, card, character).catch(tell),
+    download: () => exported(model, panel, card, character),
   });
   const show = () => {
     view?.dispose();
     const walks = panel.state.view === "walk";
-    const stage = { scene, model, card, character, panel, tell };
+    const stage = { scene, model, card, character, panel };
     view = walks ? new WalkView(stage) : new ClipView(stage);
     view.ready.then(() => {
       told.textContent = walks
-        ? "Arrow keys or W A D walk and turn, Shift walks slowly; click the ground to walk there."
+        ? "Arrow keys, W A D or the disc walk and turn, Shift slows; click the ground to walk there."
         : `${model.card.description}`;
       // The frame after the first drawing.
       requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("moving")));
-    }, tell);
+    });
   };
   show();
 }
@@ -88,14 +93,16 @@ async function exported(
   card: ModelCard,
   character: characters.Character,
 ) {
-  const { glb, save } = await import("./download.ts");
+  const { glb } = await import("./download.ts");
   const clip = await model.clip(panel.state.controls, { ...panel.options, fps: 60 });
-  save(await glb(card, clip, character), `${model.card.name}.glb`);
+  const content = new Blob([await glb(card, clip, character)], { type: "model/gltf-binary" });
+  saveFile(`${model.card.name}.glb`, content);
 }
 
-async function bytes(url: string): Promise<Uint8Array<ArrayBuffer>> {
-  const answer = await fetch(url);
-  if (!answer.ok) throw new Error(`${url}: status ${answer.status}`);
+async function bytes(url: string, integrity = ""): Promise<Uint8Array<ArrayBuffer>> {
+  const answer = await fetch(url, { integrity }).catch(() => null);
+  if (!answer) throw new Error(`${url} cannot be loaded, or is not the file that this page has.`);
+  if (!answer.ok) throw new Error(`${url} cannot be loaded: status ${answer.status}.`);
   return new Uint8Array(await answer.arrayBuffer());
 }
 
@@ -105,4 +112,4 @@ async function start(): Promise<void> {
   await open(entries, entries.find((entry) => entry.name === name) ?? entries[0]!);
 }
 
-start().catch(tell);
+start();

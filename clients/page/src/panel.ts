@@ -1,6 +1,7 @@
 /** The controls of a model as sliders, and the choices of the page. */
 
 import type { Model, Options } from "@posefield/runtime";
+import { chooser, el, textButton } from "../../viewer/src/dom.ts";
 
 export interface PageState {
   controls: Record<string, number>;
@@ -41,49 +42,41 @@ export class Panel {
     form.replaceChildren();
     const names = models.map(({ name }) => name);
     if (names.length > 1) this.#choice("Model", names, opened.name, listeners.open);
+    const { show, change } = listeners;
+    const put = (values: Partial<PageState>, then: () => void) => {
+      Object.assign(this.state, values);
+      then();
+    };
     if (isWalk(model))
       this.#choice("View", ["clip", "walk"], "clip", (view) => {
-        this.state.view = view as PageState["view"];
-        listeners.show();
+        // Arrow keys then steer, and choose no other view.
+        (document.activeElement as HTMLElement).blur();
+        put({ view: view as PageState["view"] }, show);
       });
-    for (const { name, description, minimum, maximum, unit } of card.controls)
-      this.#slider(`${name}${unit ? `, ${unit}` : ""}`, minimum, maximum, defaults[name]!, {
-        title: description,
-        set: (value) => {
-          this.state.controls = { ...this.state.controls, [name]: value };
-          listeners.change();
-        },
-      });
+    for (const { name, description, minimum, maximum, unit } of card.controls) {
+      const text = `${name}${unit ? `, ${unit}` : ""}`;
+      const range = [minimum, maximum, (maximum - minimum) / 200] as const;
+      const set = (value: number) =>
+        put({ controls: { ...this.state.controls, [name]: value } }, change);
+      this.#slider(text, range, defaults[name]!, set, description);
+    }
     const performers = card.labels.find(({ name }) => name === "performer")?.names ?? [];
     if (performers.length)
-      this.#choice("Performer", ["", ...performers], "", (name) => {
-        this.state.performer = name;
-        listeners.show();
-      });
+      this.#choice("Performer", ["", ...performers], "", (performer) => put({ performer }, show));
     const levels = card.levels.map((_, level) => String(level));
-    this.#choice("Level of detail", levels, "0", (level) => {
-      this.state.level = Number(level);
-      listeners.show();
-    });
-    this.#choice("Feet", ["stand", "as predicted"], "stand", (feet) => {
-      this.state.feet = feet === "stand";
-      listeners.change();
-    });
-    this.#choice("Body", ["mannequin", "stick"], "mannequin", (body) => {
-      this.state.body = body as PageState["body"];
-      listeners.show();
-    });
+    this.#choice("Level of detail", levels, "0", (level) => put({ level: Number(level) }, show));
+    const feet = ["stand", "as predicted"];
+    this.#choice("Feet", feet, feet[0]!, (word) => put({ feet: word === feet[0] }, change));
+    const bodies = ["mannequin", "stick"] as const;
+    this.#choice("Body", bodies, bodies[0], (body) =>
+      put({ body: body as PageState["body"] }, show),
+    );
     if (isWalk(model))
-      this.#slider("Walkers", 1, 200, 1, {
-        step: 1,
-        set: (count) => {
-          this.state.count = count;
-          if (this.state.view === "walk") listeners.show();
-        },
-      });
-    const download = document.createElement("button");
-    download.textContent = "Download GLB";
-    download.addEventListener("click", listeners.download);
+      this.#slider("Walkers", [1, 200, 1], 1, (count) =>
+        put({ count }, () => this.state.view === "walk" && show()),
+      );
+    const download = textButton("Download GLB", listeners.download);
+    download.title = "The clip with its skin; the command posefield clip writes VRMA, USD and BVH";
     form.append(download);
   }
 
@@ -103,31 +96,19 @@ export class Panel {
     chosen: string,
     set: (value: string) => void,
   ): void {
-    const select = document.createElement("select");
-    select.append(...values.map((value) => new Option(value || "unseen", value)));
-    select.value = chosen;
-    select.addEventListener("change", () => set(select.value));
-    this.#labelled(text, select);
+    const names = values.map((value) => [value, value || "unseen"] as const);
+    this.#form.append(el("label", {}, text, chooser(names, chosen, set)));
   }
 
   #slider(
     text: string,
-    low: number,
-    high: number,
+    [min, max, step]: readonly [number, number, number],
     value: number,
-    {
-      set,
-      title = "",
-      step = (high - low) / 200,
-    }: {
-      readonly set: (value: number) => void;
-      readonly title?: string;
-      readonly step?: number;
-    },
+    set: (value: number) => void,
+    title = "",
   ): void {
-    const input = document.createElement("input");
-    Object.assign(input, { type: "range", min: low, max: high, step, title, valueAsNumber: value });
-    const output = document.createElement("output");
+    const input = el("input", { type: "range", min, max, step, title, value });
+    const output = el("output");
     const write = () => {
       output.textContent = step === 1 ? input.value : input.valueAsNumber.toFixed(2);
     };
@@ -136,13 +117,7 @@ export class Panel {
       set(input.valueAsNumber);
     });
     write();
-    this.#labelled(text, output, input);
-  }
-
-  #labelled(text: string, ...nodes: readonly Node[]): void {
-    const label = document.createElement("label");
-    label.append(text, ...nodes);
-    this.#form.append(label);
+    this.#form.append(el("label", {}, text, output, input));
   }
 }
 

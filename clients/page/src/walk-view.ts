@@ -1,7 +1,8 @@
-/** Walkers that are steered by keys, a pad or a click on the ground; a crowd walks by itself. */
+/** Walkers that are steered by keys, a disc for a finger or a click on the ground; a crowd walks by itself. */
 
 import type { Walkers } from "@posefield/runtime";
-import { Plane, Raycaster, Vector2, Vector3 } from "three";
+import { MathUtils, Plane, Raycaster, Vector2, Vector3 } from "three";
+import { el } from "../../viewer/src/dom.ts";
 import { Figure } from "../../viewer/src/figure.ts";
 import { NOWHERE } from "../../viewer/src/playback.ts";
 import type { Stage } from "./clip-view.ts";
@@ -21,6 +22,9 @@ export class WalkView implements View {
   readonly #stage: Stage;
   readonly #end = new AbortController();
   readonly #held = new Set<string>();
+  /** Push of the disc ahead and to the left, -1 to 1. */
+  #push: readonly [ahead: number, left: number] = [0, 0];
+  readonly #disc = el("div", { class: "disc", "aria-hidden": "true" });
   #walkers: Walkers | null = null;
   #figures: readonly Figure[] = [];
   #goals: (readonly [number, number] | null)[] = [];
@@ -32,14 +36,19 @@ export class WalkView implements View {
     const { signal } = this.#end;
     addEventListener("keydown", (event) => this.#key(event, true), { signal });
     addEventListener("keyup", (event) => this.#key(event, false), { signal });
+    addEventListener("blur", () => this.#held.clear(), { signal });
     const canvas = stage.scene.renderer.domElement;
     canvas.addEventListener("click", (event) => this.#click(event), { signal });
+    if (matchMedia("(hover: none)").matches) canvas.after(this.#disc);
+    for (const kind of ["pointerdown", "pointermove", "lostpointercapture"] as const)
+      this.#disc.addEventListener(kind, (event) => this.#drag(event));
   }
 
   change(): void {}
 
   dispose(): void {
     this.#end.abort();
+    this.#disc.remove();
     for (const figure of this.#figures) figure.dispose();
   }
 
@@ -72,7 +81,7 @@ export class WalkView implements View {
     this.#steer(walkers);
     walkers
       .step(seconds)
-      .then(() => this.#show(), this.#stage.tell)
+      .then(() => this.#show())
       .finally(() => {
         this.#computes = false;
       });
@@ -81,10 +90,11 @@ export class WalkView implements View {
 
   #steer(walkers: Walkers): void {
     const { speed = walkers.speeds[1] } = this.#stage.panel.state.controls;
-    const keys = [...this.#held].map((code) => KEYS[code]!);
+    const keys = [...[...this.#held].map((code) => KEYS[code]!), this.#push];
+    const steered = keys.some(([ahead, left]) => ahead || left);
     for (const [index, goal] of this.#goals.entries()) {
       if (index > 0 && !goal) this.#goals[index] = this.#somewhere();
-      if (index === 0 && keys.length) this.#goals[0] = null;
+      if (index === 0 && steered) this.#goals[0] = null;
       if (goal && walkers.steerTo(index, goal, speed) < 0.4) this.#goals[index] = null;
     }
     if (this.#goals[0]) return;
@@ -114,11 +124,22 @@ export class WalkView implements View {
   }
 
   #key(event: KeyboardEvent, down: boolean): void {
-    if (!(event.code in KEYS) || event.target instanceof HTMLInputElement) return;
+    // Wherever a key is released.
+    if (!down) this.#held.delete(event.code);
+    if (!down || !(event.code in KEYS) || event.target instanceof HTMLInputElement) return;
     if (event.target instanceof HTMLSelectElement) return;
     event.preventDefault();
-    if (down) this.#held.add(event.code);
-    else this.#held.delete(event.code);
+    this.#held.add(event.code);
+  }
+
+  /** Follow a finger on the disc until it leaves. */
+  #drag({ type, pointerId, buttons, clientX, clientY }: PointerEvent): void {
+    if (type === "pointerdown") this.#disc.setPointerCapture(pointerId);
+    const { left, top, width, height } = this.#disc.getBoundingClientRect();
+    const place = buttons ? [(clientX - left) / width, (clientY - top) / height] : [0.5, 0.5];
+    const [x, y] = place.map((share) => MathUtils.clamp(share, 0, 1)) as [number, number];
+    this.#disc.style.backgroundPosition = `${100 * x}% ${100 * y}%`;
+    this.#push = [1 - 2 * y, 1 - 2 * x];
   }
 
   #click({ offsetX, offsetY, target }: MouseEvent): void {

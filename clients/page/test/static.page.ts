@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { createReadStream, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { createReadStream, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer, type Server } from "node:http";
 import type { AddressInfo } from "node:net";
 import { tmpdir } from "node:os";
@@ -20,6 +20,7 @@ const TYPES: Record<string, string> = {
 };
 /** Time until a character moves, with WebAssembly in the browser's cache, ms. */
 const SOON = 1500;
+const PHONE = { width: 400, height: 700 };
 const folder = mkdtempSync(`${tmpdir()}/posefield-page-`);
 
 let chromium: Browser;
@@ -58,9 +59,19 @@ after(async () => {
 /** Milliseconds from the navigation until a character moves. */
 async function moving(): Promise<number> {
   await page.goto("about:blank");
-  await page.goto(address);
+  await page.goto(`${address}?from=test`);
   await page.waitForFunction(() => performance.getEntriesByName("moving").length > 0);
   return page.evaluate(() => performance.getEntriesByName("moving")[0]!.startTime);
+}
+
+/** True as soon as two pictures of a page are the same. */
+async function stands(shown: Page, tries = 60): Promise<boolean> {
+  for (let again = 0; again < tries; again++) {
+    const before = await shown.screenshot();
+    await shown.waitForTimeout(100);
+    if (before.equals(await shown.screenshot())) return true;
+  }
+  return false;
 }
 
 async function pictures(name: string): Promise<Buffer> {
@@ -106,14 +117,51 @@ test("a walker goes where keys send it, and a crowd walks", async (context) => {
     await page.waitForTimeout(350);
     await pictures(name);
   }
+  assert.ok(!(await stands(page, 3)));
+  // A key that is released elsewhere is no longer pressed.
+  await page.locator("input[type=range]").first().focus();
   await page.keyboard.up("ArrowUp");
-  await page.waitForTimeout(1200);
-  const still = await pictures("walk-stopped");
-  assert.ok(still.length > 10_000);
+  assert.ok(await stands(page));
+  await pictures("walk-stopped");
   await page.locator("input[type=range]").last().fill("40");
   await page.waitForTimeout(1500);
   await pictures("crowd");
   context.diagnostic(`${requests.length} requests`);
+});
+
+test("a finger on the disc steers a walker", async () => {
+  const phone = await chromium.newPage({ hasTouch: true, isMobile: true, viewport: PHONE });
+  await phone.goto(address);
+  await phone.getByLabel("View").selectOption("walk");
+  const disc = (await phone.locator(".disc").boundingBox())!;
+  assert.ok(await stands(phone));
+  await phone.mouse.move(disc.x + disc.width / 2, disc.y + 4);
+  await phone.mouse.down();
+  await phone.waitForTimeout(1000);
+  const path = process.env["POSEFIELD_PICTURES"];
+  await phone.screenshot(path ? { path: `${path}/disc.png` } : {});
+  assert.ok(!(await stands(phone, 3)));
+  await phone.mouse.up();
+  assert.ok(await stands(phone));
+  await phone.close();
+});
+
+test("a file that is missing, or another one, is told in a sentence", async () => {
+  const site = `${folder}/any/where`;
+  for (const [change, sentence] of [
+    [
+      () => writeFileSync(`${site}/models/cmu_walk.glb`, "?"),
+      /^models\/cmu_walk\.glb .* not the file/,
+    ],
+    [() => rmSync(`${site}/models.json`), /^models\.json cannot be loaded: status 404\.$/],
+  ] as const) {
+    change();
+    // Without the cache of another page.
+    const fresh = await chromium.newPage();
+    await fresh.goto(address);
+    await fresh.locator("#told", { hasText: sentence }).waitFor();
+    await fresh.close();
+  }
 });
 
 test("nothing is loaded from elsewhere, and nothing goes wrong", () => {

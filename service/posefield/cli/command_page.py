@@ -1,6 +1,8 @@
 """The `posefield page` command: a page without a service, which computes with its models."""
 
 import shutil
+from base64 import b64encode
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated
 
@@ -49,14 +51,21 @@ def page(
     for model in opened:
         skin = glb.character_glb(model.session.card.skeleton, model.identity)
         files = {"model": f"{model.name}.onnx", "character": f"{model.name}.glb"}
-        atomic_files.write(model.session.content, folder / files["model"])
-        atomic_files.write(skin, folder / files["character"])
+        contents = {"model": model.session.content, "character": skin}
+        for kind, content in contents.items():
+            atomic_files.write(content, folder / files[kind])
         entries.append(
             {"name": model.name, "root": model.rest_position.tolist()}
             | {kind: f"models/{name}" for kind, name in files.items()}
+            | {"integrity": {kind: integrity(content) for kind, content in contents.items()}}
         )
     atomic_files.write(orjson.dumps(entries), output / LIST)
     size = sum(path.stat().st_size for path in output.rglob("*") if path.is_file())
     facts = {"page": str(output / "index.html"), "models": len(entries), "bytes": size}
     written = f"{facts['page']}: {len(entries)} models, {size / 1e6:.1f} MB; serve the folder"
     typer.echo(as_json(facts) if json else written)
+
+
+def integrity(content: bytes) -> str:
+    """Return a checksum in the form in which browsers verify it."""
+    return f"sha256-{b64encode(sha256(content).digest()).decode()}"
