@@ -13,12 +13,13 @@ from posefield import __version__
 
 ROOT = Path(__file__).parents[1]
 PROJECTS = ("service", "model_export", "clients/python")
-PACKAGES = ("typescript", "viewer")
+PACKAGES = ("page", "runtime", "typescript", "viewer")
 PLACES = {
     "CITATION.cff": r"^version: (\S+)$",
     "Dockerfile": r'image\.version="(.+?)"',
     "clients/blender/README.md": r"posefield-blender-(\d.*?)\.zip",
     "clients/blender/addon/blender_manifest.toml": r'^version = "(.+)"$',
+    "clients/runtime/README.md": r"posefield-runtime-(\d.*?)\.tgz",
     "clients/typescript/README.md": r"posefield-client-(\d.*?)\.tgz",
     "compose.yaml": r"image: ghcr\.io/posefield/posefield:(\S+)",
     "service/deploy/README.md": r"posefield:(\d[\d.]*\d)",
@@ -64,17 +65,24 @@ def test_the_changelog_has_the_version_below_what_is_unreleased():
 
 def test_no_other_file_names_a_version_of_the_image_or_of_an_archive():
     """Completeness of PLACES, by the names that stand before a version."""
-    named = re.compile(r"posefield(?::|-blender-|-client-|-train==|==)v?\d+\.\d+\.\d+")
+    named = re.compile(r"posefield(?::|-blender-|-client-|-runtime-|-train==|==)v?\d+\.\d+\.\d+")
     known = {*PLACES, *(f"{folder}/pyproject.toml" for folder in PROJECTS)}
-    # The reference repeats the README of the client.
-    known.add("docs/reference/typescript.md")
+    # These pages repeat the READMEs of packages.
+    known |= {"docs/guide/run-time.md", "docs/reference/typescript.md"}
     found = {name for name, text in _texts() if named.search(text)}
     assert found <= known
 
 
 def _texts() -> Iterator[tuple[str, str]]:
     """Yield names and contents of documents, manifests and configurations that are not built."""
-    for folder in ("docs", "service/deploy", "clients/blender", "clients/typescript", "."):
+    for folder in (
+        "docs",
+        "service/deploy",
+        "clients/blender",
+        "clients/runtime",
+        "clients/typescript",
+        ".",
+    ):
         within = "*" if folder == "." else "**/*"
         for path in (ROOT / folder).glob(within):
             name = path.relative_to(ROOT)
