@@ -167,7 +167,7 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer service/posefield/http/pages/model clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-older .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer service/posefield/http/pages/model clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-older .venv-engines .venv-mink .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # Every family is held out take by take; finished folds are kept, so that a run that was stopped goes on.
 EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop hdm05_squat bandai_raise_hand

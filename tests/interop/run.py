@@ -36,6 +36,7 @@ import godot
 import lint
 import numpy as np
 import page
+import people
 import programs
 import slow_clients
 from compare import Characters, Row, compare
@@ -102,6 +103,7 @@ def main() -> int:
         page=lambda: page.faults(node),
         addon=addon.faults,
         godot=godot.faults,
+        people=people.faults,
     )
 
 

@@ -116,6 +116,23 @@ def test_a_format_is_recognised_and_gives_the_motion_back(name, robot, tmp_path)
     np.testing.assert_allclose(alike, 1.0, atol=1e-9)
 
 
+def test_a_trajectory_of_locomujoco_has_what_its_loader_needs(file, robot, tmp_path):
+    """Its loader makes the joints' places of their types, which are MuJoCo's."""
+    model = mujoco.MjModel.from_xml_path(str(file))
+    with np.load(save(tmp_path, motion_of(robot), robot, "locomujoco.npz")) as fields:
+        assert fields["njnt"] == model.njnt
+        np.testing.assert_array_equal(fields["jnt_type"], model.jnt_type)
+        assert fields["qpos"].shape[1] == model.nq
+        assert fields["qvel"].shape[1] == model.nv
+
+
+def test_a_capture_of_people_is_refused_with_the_way_out(robot, tmp_path):
+    capture = tmp_path / "walk.bvh"
+    capture.write_text("HIERARCHY")
+    with pytest.raises(MotionFileError, match="carried onto a robot first: see 'People on a"):
+        robot_formats.read(capture, Conventions(robot))
+
+
 def test_an_order_of_joints_is_told_by_the_bodies_and_never_guessed(robot, tmp_path):
     breadth = save(tmp_path, motion_of(robot), robot, "beyondmimic.npz")
     told = robot_formats.read(breadth, Conventions(robot)).evidence["joints"]

@@ -115,6 +115,9 @@ def write_loco(motion: RobotMotion, robot: Robot) -> bytes:
     speeds = velocities(motion.angles, motion.rate)
     return _npz(
         joint_names=np.array(["root", *robot.hinges]),
+        njnt=np.array(1 + len(robot.hinges)),
+        # MuJoCo's types of joints: free, and hinges.
+        jnt_type=np.array([0] + [3] * len(robot.hinges)),
         frequency=np.array(motion.rate),
         qpos=_qpos(motion),
         qvel=np.hstack([_base_velocities(motion), speeds]),

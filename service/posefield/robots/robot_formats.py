@@ -158,6 +158,7 @@ def of_file(name: str) -> RobotFormat | None:
     return next(endings, None)
 
 
+PEOPLE = "captures of people are carried onto a robot first: see 'People on a robot' of the guide"
 SUFFIXES = (".csv", ".npz", ".pkl", ".json", ".txt")
 
 
@@ -188,7 +189,8 @@ def read(path: RobotFile, conventions: Conventions) -> RobotMotion:
 def _content(path: RobotFile) -> Content:
     suffix = PurePosixPath(path.name).suffix.lower()
     if suffix not in SUFFIXES:
-        raise MotionFileError(str(path), f"found {suffix!r}, expected one of {', '.join(SUFFIXES)}")
+        expected = f"expected one of {', '.join(SUFFIXES)}; {PEOPLE}"
+        raise MotionFileError(str(path), f"found {suffix!r}, {expected}")
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
