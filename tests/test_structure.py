@@ -19,7 +19,7 @@ BUDGETS = {
     "clients/blender": 1_280,
     "clients/viewer/src": 8_190,
     "clients/typescript/src": 1_350,
-    "clients/runtime/src": 2_805,
+    "clients/runtime/src": 2_803,
     "clients/page/src": 600,
 }
 """Most lines of each part, without generated ones: who needs more takes lines away elsewhere."""

@@ -13,18 +13,25 @@ import {
   roll,
   runs,
 } from "./stances.ts";
-import { type Complex, conj, roundEven, scaled, sum, times, type Vector } from "./vectors.ts";
+import {
+  type Complex,
+  conj,
+  difference,
+  roundEven,
+  scaled,
+  sum,
+  times,
+  type Vector,
+} from "./vectors.ts";
 
 /** The path of a foot that stands in stances, and rolls there. */
 export function planPath(foot: Foot, stances: readonly Run[]): Vector[] {
   const { grid, contact } = foot;
   const rolled = roll(foot, stances);
   // A foot that rolls keeps its place but for the offset of its ball.
-  const flat = foot.floor.map(
-    ([z, x], frame): Complex => [z - rolled.floor[frame]![0], x - rolled.floor[frame]![1]],
-  );
-  const floor = smoothPath(grid, flat, stances).map(
-    ([z, x], frame): Complex => [z + rolled.floor[frame]![0], x + rolled.floor[frame]![1]],
+  const flat = foot.floor.map((point, frame) => difference(point, rolled.floor[frame]!));
+  const floor = smoothPath(grid, flat, stances).map((point, frame) =>
+    sum(point, rolled.floor[frame]!),
   );
   const level = foot.heights.map((height, frame): Complex => [height - rolled.heights[frame]!, 0]);
   const still = { ...grid, way: ORIGIN, factor: UNTURNED };
@@ -116,7 +123,7 @@ function smoothPath(
   const { count, cyclic } = grid;
   const terms = termsOf(grid, stances, fixed);
   const changes = terms.map((term, frame): Term => {
-    return { ...term, offset: sum(term.offset, scaled(path[frame]!, -1)) };
+    return { ...term, offset: difference(term.offset, path[frame]!) };
   });
   const squares = new LeastSquares(count);
   for (const change of changes) squares.add(1, [change]);
@@ -187,8 +194,7 @@ class LeastSquares {
     }
     for (const [pivot, row] of [...this.#rows.entries()].toReversed()) {
       for (const [column, value] of row)
-        if (column > pivot)
-          right[pivot] = sum(right[pivot]!, times(scaled(value, -1), right[column]!));
+        if (column > pivot) right[pivot] = difference(right[pivot]!, times(value, right[column]!));
       if (row.size) right[pivot] = scaled(right[pivot]!, 1 / row.get(pivot)![0]);
     }
     return right;

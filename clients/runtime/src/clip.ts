@@ -12,11 +12,13 @@ import { cycleOf, lineOf, relativeRoot, type Stride } from "./strides.ts";
 import {
   arcFactor,
   clamp,
+  difference,
   direction,
   multiply,
   times as product,
   type Quaternion,
   roundEven,
+  sum,
   turn,
 } from "./vectors.ts";
 
@@ -81,7 +83,7 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
     const bones = outputs.bone_offsets;
     const grid = gridOf(stride, count, (count - Number(!cyclic)) / whole, cyclic);
     const legs = findLegs(card, bones);
-    const tips = legs.map(({ leg }) => leg.tip);
+    const tips = legs.map(({ tip }) => tip);
     const { parents } = card.skeleton;
     const planPoses = {
       frames: count,
@@ -91,11 +93,11 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
     };
     const plan = planFeet(
       new LimbPoses(parents, tips, planPoses),
-      legs.map(({ contact, leg }) => ({
-        limb: leg,
-        contact: card.contacts[contact]!,
+      legs.map((limb) => ({
+        limb,
+        contact: card.contacts[limb.contact]!,
         likely: planTimes.map(
-          (_, step) => outputs.contacts![(frames + step) * card.contacts.length + contact]!,
+          (_, step) => outputs.contacts![(frames + step) * card.contacts.length + limb.contact]!,
         ),
       })),
       grid,
@@ -142,16 +144,9 @@ function gridOf(
   cyclic: boolean,
 ): Grid {
   if (!cyclic) return { count, rate, cyclic, way: [0, 0], factor: [1, 0] };
-  const gap = product(way, arcFactor(turned));
   const factor = direction(turned);
-  const moved = product(factor, start);
-  return {
-    count,
-    rate,
-    cyclic,
-    way: [start[0] + gap[0] - moved[0], start[1] + gap[1] - moved[1]],
-    factor,
-  };
+  const end = sum(start, product(way, arcFactor(turned)));
+  return { count, rate, cyclic, way: difference(end, product(factor, start)), factor };
 }
 
 function stancesOf({ feet, grid }: FeetPlan): Stance[] {

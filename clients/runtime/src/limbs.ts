@@ -6,6 +6,8 @@ import { add, multiply, norm, type Quaternion, rotate, subtract, type Vector } f
 
 /** Joints by index: hip, knee, ankle, and the ball, which is placed. */
 export interface Limb {
+  /** Place of the ball in the card's contacts. */
+  readonly contact: number;
   readonly upper: number;
   readonly middle: number;
   readonly lower: number;
@@ -103,27 +105,25 @@ export function quaternionAt(numbers: ArrayLike<number>, index: number): Quatern
 }
 
 /**
- * Legs of the feet whose contacts the model knows, each with its place in the card's contacts; a
- * foot without two bones above it, or whose leg moves another one, has none.
+ * Legs of the feet whose contacts the model knows; a foot without two bones above it, or whose leg
+ * moves another one, has none.
  */
-export function findLegs(
-  card: ModelCard,
-  bones: ArrayLike<number>,
-): { readonly contact: number; readonly leg: Limb }[] {
-  const legs: { contact: number; leg: Limb }[] = [];
+export function findLegs(card: ModelCard, bones: ArrayLike<number>): Limb[] {
+  const legs: Limb[] = [];
   const used = new Set<number>();
   for (const [contact, { joint }] of card.contacts.entries()) {
     if (!card.feet.includes(joint)) continue;
-    const leg = findLimb(card, bones, joint);
+    const leg = findLimb(card, bones, contact);
     const joints = leg ? [leg.upper, leg.middle, leg.lower] : [];
-    if (leg && !joints.some((one) => used.has(one))) legs.push({ contact, leg });
+    if (leg && !joints.some((one) => used.has(one))) legs.push(leg);
     for (const one of joints) used.add(one);
   }
   return legs;
 }
 
-/** The limb that ends at a joint; null if the chain above it has no two bones. */
-function findLimb(card: ModelCard, bones: ArrayLike<number>, tip: number): Limb | null {
+/** The limb that ends at the joint of a contact; null if the chain above it has no two bones. */
+function findLimb(card: ModelCard, bones: ArrayLike<number>, contact: number): Limb | null {
+  const tip = card.contacts[contact]!.joint;
   const { parents, tip_joints, tip_offsets } = card.skeleton;
   const joints = chain(parents, tip).toReversed();
   let best: Limb | null = null;
@@ -141,7 +141,8 @@ function findLimb(card: ModelCard, bones: ArrayLike<number>, tip: number): Limb 
     highest = score;
     const end = tip_joints.lastIndexOf(tip);
     const toe = first === 1 && end >= 0 ? tip_offsets[end]! : null;
-    best = { upper, middle, lower, tip, hinge: known ? new HingeLimits(known) : null, toe };
+    const hinge = known ? new HingeLimits(known) : null;
+    best = { contact, upper, middle, lower, tip, hinge, toe };
   }
   return best;
 }

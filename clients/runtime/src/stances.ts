@@ -7,11 +7,11 @@ import {
   clamp,
   conj,
   cross,
+  difference,
   dot,
   norm,
   type Quaternion,
   roundEven,
-  scaled,
   sum,
   times,
   turn,
@@ -57,7 +57,7 @@ function place(grid: Grid, floor: readonly Complex[], frame: number): Complex {
 
 /** A floor point some cycles later, or one earlier. */
 export function inCycle({ way, factor }: Grid, point: Complex, cycle: number): Complex {
-  if (cycle < 0) return times(conj(factor), sum(point, scaled(way, -1)));
+  if (cycle < 0) return times(conj(factor), difference(point, way));
   let later = point;
   for (let number = 0; number < cycle; number++) later = sum(way, times(factor, later));
   return later;
@@ -173,8 +173,7 @@ export function distance(
   before: number,
   after: number,
 ): number {
-  const [a, b] = [place(grid, floor, before), place(grid, floor, after)];
-  return Math.hypot(b[0] - a[0], b[1] - a[1]);
+  return Math.hypot(...difference(place(grid, floor, after), place(grid, floor, before)));
 }
 
 /** Stances without the frames beyond reach: of each the longest run that is left. */
@@ -260,7 +259,7 @@ export function roll(foot: Foot, stances: readonly Run[]): Roll {
     const last = places[Math.min(flat, stance.end - 1) - stance.begin]!;
     for (const [index, frame] of frames.entries()) {
       if (frame >= flat) continue;
-      const offset: Complex = [places[index]![0] - last[0], places[index]![1] - last[1]];
+      const offset = difference(places[index]!, last);
       floor[frame % grid.count] = frame >= grid.count ? times(offset, conj(grid.factor)) : offset;
     }
   }

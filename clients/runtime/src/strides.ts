@@ -1,10 +1,15 @@
 /** One cycle of a motion, or its straight line, and poses relative to the travel. */
 
+import { vectorAt } from "./limbs.ts";
 import {
   arcFactor,
   type Complex,
+  conj,
+  difference,
   direction,
   type Quaternion,
+  scaled,
+  sum,
   times,
   turn,
   type Vector,
@@ -24,23 +29,18 @@ export function cycleOf(
   row: number,
   duration: number,
 ): Stride {
-  const [left, ahead, turned] = [0, 1, 2].map((axis) => travel[3 * row + axis]!) as [
-    number,
-    number,
-    number,
-  ];
-  const [re, im] = arcFactor(turned);
-  const size = re ** 2 + im ** 2;
-  const end = floorAt(root_position, row);
+  const [left, ahead, turned] = vectorAt(travel, row);
+  const arc = arcFactor(turned);
+  const way = scaled(times([ahead, left], conj(arc)), 1 / (arc[0] ** 2 + arc[1] ** 2));
   // A cycle without its travel ends at its start.
-  const start: Complex = [end[0] - ahead, end[1] - left];
-  return { duration, way: times([ahead, left], [re / size, -im / size]), turned, start };
+  const start = difference(floorAt(root_position, row), [ahead, left]);
+  return { duration, way, turned, start };
 }
 
 /** The straight line of a motion between two rows of roots. */
 export function lineOf(roots: Float32Array, first: number, duration: number): Stride {
   const [start, end] = [floorAt(roots, first), floorAt(roots, first + 1)];
-  return { duration, way: [end[0] - start[0], end[1] - start[1]], turned: 0, start };
+  return { duration, way: difference(end, start), turned: 0, start };
 }
 
 /** A root relative to the travel at a phase, 0 to 1, and the turn that its rotation takes. */
@@ -50,12 +50,8 @@ export function relativeRoot(
   roots: ArrayLike<number>,
   row: number,
 ): { readonly root: Vector; readonly heading: Quaternion } {
-  const gone = times([phase * way[0], phase * way[1]], arcFactor(phase * turned));
-  const place = floorAt(roots, row);
-  const [z, x] = times(
-    [place[0] - start[0] - gone[0], place[1] - start[1] - gone[1]],
-    direction(-phase * turned),
-  );
+  const gone = sum(start, times(scaled(way, phase), arcFactor(phase * turned)));
+  const [z, x] = times(difference(floorAt(roots, row), gone), direction(-phase * turned));
   return { root: [x, roots[3 * row + 1]!, z], heading: turn([0, 1, 0], -phase * turned) };
 }
 

@@ -82,6 +82,10 @@ export function sum(a: Complex, b: Complex): Complex {
   return [a[0] + b[0], a[1] + b[1]];
 }
 
+export function difference(a: Complex, b: Complex): Complex {
+  return [a[0] - b[0], a[1] - b[1]];
+}
+
 export function scaled(a: Complex, factor: number): Complex {
   return [a[0] * factor, a[1] * factor];
 }

@@ -103,7 +103,7 @@ export class Walkers {
   readonly poses: Pick<Poses, "names" | "parents" | "rotations" | "rootPosition" | "boneOffsets">;
   readonly #model: Model;
   readonly #gait: Gait;
-  readonly #legs: readonly { readonly contact: number; readonly leg: Limb }[];
+  readonly #legs: readonly Limb[];
   readonly #walkers: readonly WalkerState[];
 
   private constructor(model: Model, gait: Gait, count: number) {
@@ -153,7 +153,8 @@ export class Walkers {
     });
     const poses = this.#pose(index, this.#gait.rotations, this.#gait.root);
     for (const [leg, foot] of state.feet.entries()) {
-      const { limb, contact } = this.#limb(leg);
+      const limb = this.#legs[leg]!;
+      const contact = this.#model.card.contacts[limb.contact]!;
       const [ballX, , ballZ] = poses.position(limb.tip, 0);
       const place: Vector = [ballX, contact.height, ballZ];
       const yaw = yawOf(poses.between(limb.lower, limb.tip, 0));
@@ -240,7 +241,7 @@ export class Walkers {
     rootPosition.set([place[1] + x, root[1], place[0] + z], 3 * index);
     return new LimbPoses(
       parents,
-      this.#legs.map(({ leg }) => leg.tip),
+      this.#legs.map(({ tip }) => tip),
       {
         frames: 1,
         rotations: rotations.subarray(at),
@@ -255,7 +256,8 @@ export class Walkers {
     const walker = this.#walkers[index]!;
     const { parents, rotations, rootPosition } = this.poses;
     const balls = walker.feet.map((foot, leg) => {
-      const { limb, contact } = this.#limb(leg);
+      const limb = this.#legs[leg]!;
+      const contact = this.#model.card.contacts[limb.contact]!;
       const predicted = poses.position(limb.tip, 0);
       const yaw = yawOf(poses.between(limb.lower, limb.tip, 0));
       const others = walker.feet.every((other) => other === foot || other.standing);
@@ -279,11 +281,6 @@ export class Walkers {
         rotations.set(local, 4 * (parents.length * index + joint));
     }
     rootPosition[3 * index + 1]! -= walker.lowered;
-  }
-
-  #limb(leg: number) {
-    const { contact, leg: limb } = this.#legs[leg]!;
-    return { limb, contact: this.#model.card.contacts[contact]! };
   }
 }
 
