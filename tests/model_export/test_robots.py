@@ -316,6 +316,8 @@ def test_a_file_of_another_robot_is_refused_with_both_counts(robot, tmp_path):
 
 BAD_ROBOTS = {
     "'left_knee' is a slide joint": ('name="left_knee"', 'name="left_knee" type="slide"'),
+    "'neck_yaw' is a ball joint": ('neck_yaw" axis="0 0 1"', 'neck_yaw" type="ball"'),
+    "Error opening file 'gone.xml'": ("<worldbody>", '<include file="gone.xml"/><worldbody>'),
     "Error opening file .*gone.stl": (
         "<worldbody>",
         '<asset><mesh name="gone" file="gone.stl"/></asset><worldbody>',
@@ -712,6 +714,124 @@ def test_commands_are_swept_into_a_folder_of_reference_motions(family, robot, tm
         angles = numbers(robot, content, "mjlab.npz", tmp_path).angles
         expected = gait(robot, entry["controls"]["pace"]).angles
         np.testing.assert_allclose(np.degrees(angles[:40]), np.degrees(expected[:40]), atol=0.3)
+
+
+def grounded(motion, robot):
+    """The motion with its lowest sole on the floor."""
+    soles = robot.foot_points(*motion.body_poses(robot))
+    return raised(motion, -min(float(points[..., 2].min()) for points in soles))
+
+
+def without(name):
+    return lambda fields: {key: value for key, value in fields.items() if key != name}
+
+
+def edited(path, edit):
+    """Write the fields of an NPZ, JSON or PKL file anew."""
+    if path.suffix == ".npz":
+        with np.load(path) as fields:
+            np.savez(path, **edit({**fields}))
+    elif path.suffix == ".json":
+        path.write_text(json.dumps(edit(json.loads(path.read_text()))))
+    else:
+        path.write_bytes(pickle.dumps(edit(pickle.loads(path.read_bytes()))))
+
+
+Y_UP = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(-np.pi / 2))
+# Format, change of the motion or of the file's fields, and the words of the refusal.
+BAD_MOTIONS = {
+    "Y up": (
+        "awd.json",
+        lambda motion: replace(
+            motion,
+            base_path=quat.rotate(Y_UP, motion.base_path),
+            base_rotations=quat.mul(Y_UP, motion.base_rotations),
+        ),
+        "if the file has Y up: expected metres with Z up",
+    ),
+    "swapped": (
+        "gmr.pkl",
+        lambda motion: replace(
+            motion,
+            base_path=motion.base_path[:, [1, 2, 0]],
+            base_rotations=motion.base_rotations[:, [0, 2, 3, 1]],
+        ),
+        "if the file has Y up and swapped axes",
+    ),
+    "one frame": (
+        "gmr.pkl",
+        lambda motion: replace(
+            motion,
+            angles=motion.angles[:1],
+            base_path=motion.base_path[:1],
+            base_rotations=motion.base_rotations[:1],
+        ),
+        "found 1 frame, expected two or more",
+    ),
+    "no rate": ("mjlab.npz", without("fps"), "states no frame rate: say --rate"),
+    "no rates": ("isaaclab.npz", lambda fields: fields | {"fps": []}, "states no frame rate"),
+    "pickle": ("gmr.pkl", without("fps"), "states no frame rate"),
+    "layout": ("awd.json", without("Frame_size"), "'Frame_size' is None, expected one object"),
+    "field": ("locomujoco.npz", without("frequency"), "states no frame rate"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD_MOTIONS)
+def test_a_bad_motion_is_refused_by_all_commands_with_one_sentence(
+    fault, robot, file, tmp_path, command
+):
+    form, change, message = BAD_MOTIONS[fault]
+    motion = grounded(gait(robot, 0.5), robot)
+    whole = fault in ("Y up", "swapped", "one frame")
+    sound = save(tmp_path, motion, robot, form)
+    path = sound.rename(tmp_path / f"bad{sound.suffix}")
+    save(tmp_path, motion, robot, form)
+    if whole:
+        path.write_bytes(robot_formats.WRITTEN[form].write(change(motion), robot))
+    else:
+        edited(path, change)
+    (tmp_path / "clips.csv").write_text(f"file,pace\n{sound.name},0.4\n{path.name},0.5\n")
+    (tmp_path / "biped.xml").write_text(BIPED)
+    (tmp_path / "recipe.toml").write_text(RECIPE)
+    told = ["doctor", sound, path, "--robot", file]
+    converted, model = tmp_path / "converted", tmp_path / "model.onnx"
+    for words in (
+        told,
+        [*told, "--to", "mimickit.pkl", "-o", converted],
+        ["train", tmp_path / "recipe.toml", "-o", model],
+    ):
+        code, _, errors = command(*words)
+        sentence = " ".join(errors.split())
+        assert code
+        assert path.name in sentence
+        assert message in sentence
+    assert not converted.exists()
+    assert not model.exists()
+
+
+def test_a_clip_that_is_no_cycle_is_refused_by_a_recipe_of_cycles(family, robot, command, tmp_path):
+    drift = np.linspace(0.0, 0.6, 41)
+    open_gait = changed(
+        gait(robot, 0.5), "left_knee", lambda angles: np.add(angles, drift, out=angles)
+    )
+    for name in ("biped.xml", "0.json", "recipe.toml"):
+        (tmp_path / name).write_bytes((family / name).read_bytes())
+    save(tmp_path, open_gait, robot, "awd.json").rename(tmp_path / "open.json")
+    (tmp_path / "clips.csv").write_text("file,pace\n0.json,0.2\nopen.json,0.5\n")
+    code, _, errors = command("train", tmp_path / "recipe.toml", "-o", tmp_path / "model.onnx")
+    sentence = " ".join(errors.split())
+    assert code
+    assert "open.json: joint 'left_shin' turns by 34.4 degrees from the last frame" in sentence
+
+
+def test_two_robots_in_one_call_are_told_apart(robot, tmp_path, command):
+    sound = save(tmp_path, motion_of(robot), robot, "gmr.pkl").rename(tmp_path / "one.pkl")
+    other = save(tmp_path, motion_of(robot), robot, "gmr.pkl")
+    edited(other, lambda fields: fields | {"dof_pos": fields["dof_pos"][:, :-2]})
+    code, out, errors = command("doctor", sound, other)
+    assert code == 1
+    assert "found 7 joints, expected the 9 of" in " ".join(errors.split())
+    assert "1 motions" in out
 
 
 def test_a_clip_of_no_robot_is_no_reference_motion(walk_path, tmp_path, command):

@@ -74,10 +74,11 @@ def doctor(
     Format, rate, order of joints and quaternions are told with how they were known. Faults are told
     with joint or foot, frame and size: limits, sunk, floating and sliding feet, jumps, the seam of
     a loop, and motions that are unlike the others. Files that cannot be read are named with the
-    reason, and the exit status is then 1.
+    reason; none is then converted, and the exit status is 1.
     """
     from posefield.robots import robot_formats
     from posefield.robots.file_conventions import Conventions
+    from posefield_train.robots import doctor as motion_doctor
     from posefield_train.robots import doctor_report, robot_file
     from posefield_train.source import motion_readers
 
@@ -86,14 +87,17 @@ def doctor(
         raise InvalidField("--picture", f"found {picture.name!r}, expected a .png or .svg file")
     body = robot_file.read(robot) if robot else None
     conventions = Conventions(body, rate, quaternions, order, degrees)
-    motions, refused = [], []
+    motions: list[RobotMotion] = []
+    refused = []
     for file in files:
         try:
-            motions.append(robot_formats.read(file, conventions))
+            motion = robot_formats.read(file, conventions)
+            motion_doctor.expect_same_robot(motion, motions[0] if motions else motion)
+            motions.append(motion)
         except MotionFileError as fault:
             refused.append((str(file), motion_readers.reason(fault, file)))
     diagnoses = _diagnose(motions, body)
-    if target and output and body:
+    if target and output and body and not refused:
         _convert(diagnoses, target, body, output)
     if picture and diagnoses:
         content = doctor_report.picture(diagnoses, body, picture.suffix[1:])
@@ -131,7 +135,7 @@ def _target(to: str | None, output: Path | None, robot: Path | None) -> "RobotFo
 def _diagnose(motions: "list[RobotMotion]", body: "Robot | None") -> "list[Diagnosis]":
     from posefield_train.robots import doctor
 
-    unlike = doctor.outliers(motions)
+    unlike = doctor.outliers(motions, body)
     diagnoses = [doctor.diagnose(motion, body) for motion in motions]
     return [
         replace(diagnosis, findings=(*diagnosis.findings, unlike[index]))

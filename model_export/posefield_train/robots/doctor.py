@@ -22,11 +22,17 @@ JUMP, JUMP_RATIO = np.radians(5.0), 8.0
 many times its 90th percentile in the motion."""
 SEAM_RATIO = 3.0
 """Step from the last frame to the first over the largest of the motion at which a seam is told."""
-OUTLIER = 13.0
-"""Residual of a joint, in standard deviations, at which a motion is told as an outlier."""
-FEWEST_COMPARED, COMPONENTS, ROUNDS = 12, 10, 5
-"""Motions from which on they are compared; components at most, and rounds, of the regression."""
-LEAST_DEVIATION = np.radians(0.15)
+FALSE_ALARMS, LEAST_OUTLIER = 0.001, 6.0
+"""Share of sound motions that may be told as outliers, which sets the residual of each folder from
+which they are, and the least such residual, in standard deviations."""
+FEWEST_COMPARED, COMPONENTS, CURVED, ROUNDS = 12, 10, 4, 5
+"""Motions from which on they are compared; components at most, those with products, and rounds, of
+the regression."""
+LEAST_DEVIATION, LEAST_HEIGHT, LEAST_SPEED = np.radians(0.15), 2.5e-4, 1.25e-3
+"""Deviations that are none: of angles, rad, heights of soles, m, and their speeds, m/s."""
+RIDGE, STANCE = 3e-3, 0.4
+"""Weight of the regression's ridge, and share of the frames in which a sole is the lowest, whose
+heights and speeds are compared."""
 RHYTHMS = np.arange(0.3, 4.0, 0.02)
 """Frequencies, a second, among which that of a motion's cycle is searched."""
 HARMONICS, SHIFTS, MATCHES = np.array([1.0, 2.0]), 120, 4
@@ -221,30 +227,71 @@ def sliding_speeds(points: Annotated[Floats, "frames points 3"], rate: float) ->
     return np.asarray(np.linalg.norm(velocities(points, rate)[..., :2], axis=-1).min(axis=1))
 
 
-def outliers(motions: Sequence[RobotMotion]) -> dict[int, Finding]:
+def expect_same_robot(motion: RobotMotion, first: RobotMotion) -> None:
+    """Raise MotionFileError for a motion of other joints than the first of the same call."""
+    counts = motion.angles.shape[1], first.angles.shape[1]
+    names = set(motion.hinges) ^ set(first.hinges) if motion.hinges and first.hinges else set()
+    if counts[0] != counts[1] or names:
+        difference = f", without {min(names)!r} in both" if names else ""
+        raise motion.error(
+            f"found {counts[0]} joints{difference}, expected the {counts[1]} of {first.source}: "
+            "files of one robot"
+        )
+
+
+def outliers(motions: Sequence[RobotMotion], robot: Robot | None = None) -> dict[int, Finding]:
     """Return a finding for each motion that breaks what the others have in common, by its index.
 
     How far each joint turns, how fast and when in the cycle is predicted from the other joints of
-    the same motion, by a regression over all motions in which odd ones count little. The residual
-    is told in standard deviations. Fewer than a dozen motions, or
-    other joints, are not compared.
+    the same motion, by a regression over all motions in which odd ones count little; so are, with a
+    robot, heights and speeds of its low soles. Residuals of motions left out are told in standard
+    deviations. The tail of a folder's residuals sets the one from which a motion is an outlier.
+    Fewer than a dozen motions, or other joints, are not compared.
     """
-    if len(motions) < FEWEST_COMPARED or len({motion.angles.shape[1] for motion in motions}) > 1:
+    if len(motions) < FEWEST_COMPARED:
         return {}
     features = _features(motions)
-    residuals = np.stack(
-        [_residuals(features, hinge) for hinge in range(features.shape[1])], axis=-1
+    hinges = features.shape[1]
+    names = [joint_name(motions[0], hinge) for hinge in range(hinges)]
+    if robot and robot.feet:
+        soles = np.array([_sole_features(motion, robot) for motion in motions])
+        features = np.concatenate([features, soles], axis=1)
+        names += [robot.bodies[foot.body] for foot in robot.feet]
+    scores = np.stack([_residuals(features, part) for part in range(len(names))], axis=-1)
+    findings: dict[int, Finding] = {}
+    # A joint that is odd moves a sole, so that joints are named before feet.
+    for first, last in ((0, hinges), (hinges, len(names))):
+        largest = scores[:, first:last].max(axis=1, initial=0.0)
+        for index in np.flatnonzero(largest > _bound(largest)).tolist():
+            name = names[first + int(np.argmax(scores[index, first:last]))]
+            value, unit = float(largest[index]), "standard deviations"
+            findings.setdefault(index, Finding("outlier", name, 0, value, unit))
+    return dict(sorted(findings.items()))
+
+
+def _bound(scores: Annotated[Floats, "motions"]) -> float:
+    """Return the score beyond which FALSE_ALARMS of sound motions lie, by an exponential tail.
+
+    The tail passes through the median and the 90th percentile, so that a tenth may be broken.
+    """
+    middle, high = np.quantile(scores, (0.5, 0.9))
+    return max(
+        LEAST_OUTLIER, float(middle + (high - middle) * np.log(0.5 / FALSE_ALARMS) / np.log(5.0))
     )
-    return {
-        index: Finding(
-            "outlier",
-            joint_name(motions[index], int(np.argmax(residuals[index]))),
-            0,
-            float(residuals[index].max()),
-            "standard deviations",
-        )
-        for index in np.flatnonzero(residuals.max(axis=1) > OUTLIER).tolist()
-    }
+
+
+def _sole_features(motion: RobotMotion, robot: Robot) -> Annotated[Floats, "feet features"]:
+    """Return heights and speeds of each foot while it is low, scaled to compare with angles."""
+    features = []
+    for points in robot.foot_points(*motion.body_poses(robot)):
+        heights = points[..., 2].min(axis=1)
+        low = heights <= np.quantile(heights, STANCE)
+        speeds = np.linalg.norm(velocities(points, motion.rate)[low, :, :2], axis=-1)
+        slowest, mean = speeds.min(axis=1), speeds.mean(axis=1)
+        quantiles = np.quantile(heights, (0.0, 0.5 * STANCE, STANCE, 1.0)) / LEAST_HEIGHT
+        slides = [slowest.mean(), np.quantile(slowest, 0.9), *np.quantile(mean, (0.5, 0.8))]
+        features.append([*quantiles, *(np.array(slides) / LEAST_SPEED)])
+    return LEAST_DEVIATION * np.array(features)
 
 
 def _features(motions: Sequence[RobotMotion]) -> Annotated[Floats, "motions hinges features"]:
@@ -287,22 +334,27 @@ def _in_phase(waves: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def _residuals(
-    features: Annotated[Floats, "motions hinges features"], hinge: int
+    features: Annotated[Floats, "motions parts features"], part: int
 ) -> Annotated[Floats, "motions"]:
-    """Return the largest residual of a hinge's features in each motion, in standard deviations."""
+    """Return the largest residual of a part's features in each motion, in standard deviations."""
     count = len(features)
-    others = np.delete(features, hinge, axis=1).reshape(count, -1)
+    others = np.delete(features, part, axis=1).reshape(count, -1)
     others -= np.median(others, axis=0)
     # An odd motion must not become a component of its own.
     limits = 3.0 * _deviations(others)
     others = np.clip(others, -limits, limits)
     left, _, _ = np.linalg.svd(others - others.mean(axis=0), full_matrices=False)
-    components = left[:, : min(count // 6, COMPONENTS)]
-    terms = np.hstack([np.ones((count, 1)), components * np.sqrt(count)])
-    values, weights = features[:, hinge], np.ones(count)
+    components = left[:, : min(count // 6, COMPONENTS)] * np.sqrt(count)
+    rows, columns = np.triu_indices(min(count // 12, CURVED))
+    products = 0.5 * components[:, rows] * components[:, columns]
+    terms = np.hstack([np.ones((count, 1)), components, products])
+    values, weights = features[:, part], np.ones(count)
     for _ in range(ROUNDS):
-        normal = terms.T @ (weights[:, None] * terms) + 1e-4 * count * np.eye(terms.shape[1])
-        residuals = values - terms @ np.linalg.solve(normal, terms.T @ (weights[:, None] * values))
+        normal = terms.T @ (weights[:, None] * terms) + RIDGE * count * np.eye(terms.shape[1])
+        solved = np.linalg.solve(normal, terms.T * weights)
+        # Of a prediction from all other motions: an odd one does not pull the fit to itself.
+        left_out = np.maximum(1.0 - np.einsum("mk,km->m", terms, solved), 0.05)
+        residuals = (values - terms @ (solved @ values)) / left_out[:, None]
         scores = (np.abs(residuals) / _deviations(residuals)).max(axis=1)
         weights = 1.0 / np.maximum(1.0, 0.5 * scores) ** 2
     return np.asarray(scores)

@@ -9,6 +9,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError, did_you_mean
 from posefield.common.units import Floats, Positions
+from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.joint_roles import Role
 from posefield.robots.file_conventions import Conventions as RobotConventions
@@ -237,6 +238,8 @@ def _example(
 ) -> Example:
     motion, has_facing = recipe.motion, facing is not None
     in_place = motion.root == "in_place"
+    if recipe.robot and motion.cyclic:
+        expect_cycle(captured, row)
     opened, jumps = canonical.without_jumps(captured, motion.cyclic, has_facing)
     clip = canonical.closed(opened, motion.cyclic, in_place)
     before = canonical.closed(opened, False, in_place) if motion.cyclic else None
@@ -249,6 +252,25 @@ def _example(
     values = measured_controls.control_values(recipe, row, clip, marks)
     spans = measured_controls.contact_spans(row, last, recipe.contacts.columns)
     return Example(row, clip, values, marks, jumps, facing=facing, captured=before, contacts=spans)
+
+
+SEAM, SEAM_RATIO = np.radians(15.0), 3.0
+"""Turn of a robot's joint from the last frame to the first, alone and over its largest step."""
+
+
+def expect_cycle(clip: Clip, row: ClipRow) -> None:
+    """Raise RecipeError for a robot's clip whose last frame is not the first of its next cycle."""
+    rotations = clip.rotations[:, 1:]
+    ahead = np.concatenate([rotations[1:], rotations[:1]])
+    steps = np.linalg.norm(quat.log(quat.mul(quat.conj(rotations), ahead)), axis=-1)
+    largest = steps[:-1].max(initial=0.0)
+    joint = int(np.argmax(steps[-1]))
+    if steps[-1, joint] > max(SEAM, SEAM_RATIO * largest):
+        raise row.error(
+            f"{row.file}: joint {clip.skeleton.names[joint + 1]!r} turns by "
+            f"{np.degrees(steps[-1, joint]):.1f} degrees from the last frame to the first, and by "
+            f"{np.degrees(largest):.1f} at most between others: expected a cycle (motion.cyclic)"
+        )
 
 
 def clip_of_file(file: MotionFile, source: Source) -> Clip:

@@ -28,8 +28,13 @@ UPRIGHT = 0.5
 
 WITHIN, WITHIN_NOT = 0.95, 0.1
 """Shares of angles: within the limits as degrees at least, and beyond them as radians."""
+NEAR_FLOOR, LOW_SHARES = 0.15, (0.5, 0.9)
+"""Height of the lowest sole, in heights of the robot, of one that stands or steps; shares of frames
+of those that do not as they are, and do in other axes."""
 MOST_HIGH, MOST_DEEP = 1.5, 0.5
 """Height and depth of the lowest sole in all frames, in heights of the robot, that are told."""
+UP_TURN = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(0.5 * np.pi))
+"""Turn of a world with Y up to one with Z up."""
 
 Content = Mapping[str, Any]
 """Fields of a file by name; the numbers of a CSV file are the field "rows"."""
@@ -65,6 +70,8 @@ class File:
 
     def array(self, name: str, *shape: int | None) -> Floats:
         """Return a field as numbers of a shape, in which None stands for any size."""
+        if name not in self.content:
+            raise self.error(f"lacks the field {name!r}, expected numbers")
         try:
             values = np.asarray(self.content[name], dtype=float)
         except (TypeError, ValueError):
@@ -86,6 +93,15 @@ class File:
         if not (np.isfinite(stated) and stated > 0):
             raise self.error(f"states {stated} frames a second, expected a positive number")
         return float(stated), "the file"
+
+    def mapping(self, name: str) -> Mapping[str, Any]:
+        """Return a field with one object, alone or in a list."""
+        value = self.content.get(name)
+        if isinstance(value, list) and len(value) == 1:
+            (value,) = value
+        if not isinstance(value, Mapping):
+            raise self.error(f"field {name!r} is {str(value)[:40]}, expected one object")
+        return value
 
     def names(self, field: str) -> tuple[str, ...]:
         """Return the names in a field."""
@@ -176,16 +192,42 @@ def expect_floor(motion: RobotMotion, robot: Robot) -> None:
     if not robot.feet:
         return
     still = np.zeros((1, motion.angles.shape[1]))
-    positions, turns = robot.body_poses(np.zeros((1, 3)), quat.IDENTITY[None], still)
-    rest = min(float(points[..., 2].min()) for points in robot.foot_points(positions, turns))
-    tall = float(positions[..., 2].max()) - rest
-    soles = robot.foot_points(*motion.body_poses(robot))
-    heights = np.stack([points[..., 2].min(axis=1) for points in soles]).min(axis=0)
-    if heights.min() > MOST_HIGH * tall or heights.max() < -MOST_DEEP * tall:
+    upright_base = quat.IDENTITY[None]
+    rest = float(_lowest_soles(robot, np.zeros((1, 3)), upright_base, still)[0])
+    tall = float(robot.body_poses(np.zeros((1, 3)), upright_base, still)[0][..., 2].max()) - rest
+
+    def heights(path: Floats, rotations: Floats) -> Floats:
+        return _lowest_soles(robot, path, rotations, motion.angles) / tall
+
+    path, rotations = motion.base_path, motion.base_rotations
+    lowest = heights(path, rotations)
+    expected = "expected metres with Z up and the floor at 0"
+    if lowest.min() > MOST_HIGH or lowest.max() < -MOST_DEEP:
         raise motion.error(
-            f"the lowest sole is {heights.min():.2f} to {heights.max():.2f} m high, and "
-            f"{robot.name} is {tall:.2f} m tall: expected metres with Z up and the floor at 0"
+            f"the lowest sole is {tall * lowest.min():.2f} to {tall * lowest.max():.2f} m high, "
+            f"and {robot.name} is {tall:.2f} m tall: {expected}"
         )
+    share = float((np.abs(lowest) < NEAR_FLOOR).mean())
+    if share > LOW_SHARES[0]:
+        return
+    readings = {
+        "Y up": (quat.rotate(UP_TURN, path), quat.mul(UP_TURN, rotations)),
+        "Y up and swapped axes": (path[:, [2, 0, 1]], rotations[:, [0, 3, 1, 2]]),
+        "the path's Y up": (path[:, [2, 0, 1]], rotations),
+    }
+    for axes, reading in readings.items():
+        near = float((np.abs(heights(*reading)) < NEAR_FLOOR).mean())
+        if near > LOW_SHARES[1]:
+            raise motion.error(
+                f"the lowest sole is near the floor in {share:.0%} of the frames, and in "
+                f"{near:.0%} of them if the file has {axes}: {expected}"
+            )
+
+
+def _lowest_soles(robot: Robot, path: Floats, rotations: Floats, angles: HingeAngles) -> Floats:
+    """Return the height (F,) of the lowest point of all feet, m."""
+    soles = robot.foot_points(*robot.body_poses(path, rotations, angles))
+    return np.asarray(np.stack([points[..., 2].min(axis=1) for points in soles]).min(axis=0))
 
 
 def tell_order(
