@@ -99,6 +99,9 @@ def test_bodies_are_where_mujoco_puts_them(file, robot):
         alike = np.abs(np.einsum("bk,bk->b", rotations[frame], state.xquat[1:]))
         np.testing.assert_allclose(alike, 1.0, atol=1e-12)
     assert [robot.bodies[foot.body] for foot in robot.feet] == ["left_foot", "right_foot"]
+    for foot in robot.feet:
+        np.testing.assert_allclose(np.abs(foot.points), [[0.08, 0.04, 0.02]] * 8)
+        assert len(np.unique(foot.points, axis=0)) == 8
 
 
 @pytest.mark.parametrize("name", robot_formats.WRITTEN)
@@ -282,7 +285,7 @@ def test_wrong_numbers_are_named_with_their_frame(message, robot, tmp_path):
 UNITS = {
     "if they are degrees": lambda motion: replace(motion, angles=np.degrees(motion.angles)),
     "expected metres with Z up": lambda motion: raised(motion, 90.0),
-    "-0.67 to -0.67 m high": lambda motion: replace(
+    "-0.71 to -0.71 m high": lambda motion: replace(
         motion, base_path=motion.base_path[:, [1, 2, 0]] * [1, 1, 0]
     ),
 }

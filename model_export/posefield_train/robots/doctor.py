@@ -22,7 +22,7 @@ JUMP, JUMP_RATIO = np.radians(5.0), 8.0
 many times its 90th percentile in the motion."""
 SEAM_RATIO = 3.0
 """Step from the last frame to the first over the largest of the motion at which a seam is told."""
-FALSE_ALARMS, LEAST_OUTLIER = 0.001, 6.0
+FALSE_ALARMS, LEAST_OUTLIER = 0.002, 6.0
 """Share of sound motions that may be told as outliers, which sets the residual of each folder from
 which they are, and the least such residual, in standard deviations."""
 FEWEST_COMPARED, COMPONENTS, CURVED, ROUNDS = 12, 10, 4, 5

@@ -115,7 +115,7 @@ def _shape_points(model: "mujoco.MjModel", shape: int) -> Floats:
     size = np.asarray(model.geom_size[shape], dtype=float)
     directions = _directions()
     if kind == 6:
-        return np.sign(directions[: DIRECTIONS // 2]) * size
+        return np.sign(directions) * size
     if kind in (3, 5):
         # Capsules end in half spheres, cylinders in discs.
         ends = np.sign(directions[:, 2:]) * np.array([0.0, 0.0, size[1]])
