@@ -257,7 +257,7 @@ def outliers(motions: Sequence[RobotMotion], robot: Robot | None = None) -> dict
         soles = np.array([_sole_features(motion, robot) for motion in motions])
         features = np.concatenate([features, soles], axis=1)
         names += [robot.bodies[foot.body] for foot in robot.feet]
-    scores = np.stack([_residuals(features, part) for part in range(len(names))], axis=-1)
+    scores = np.stack([_residuals(features, group) for group in range(len(names))], axis=-1)
     findings: dict[int, Finding] = {}
     # A joint that is odd moves a sole, so that joints are named before feet.
     for first, last in ((0, hinges), (hinges, len(names))):
@@ -334,11 +334,11 @@ def _in_phase(waves: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def _residuals(
-    features: Annotated[Floats, "motions parts features"], part: int
+    features: Annotated[Floats, "motions groups features"], group: int
 ) -> Annotated[Floats, "motions"]:
-    """Return the largest residual of a part's features in each motion, in standard deviations."""
+    """Return the largest residual of a group's features in each motion, in standard deviations."""
     count = len(features)
-    others = np.delete(features, part, axis=1).reshape(count, -1)
+    others = np.delete(features, group, axis=1).reshape(count, -1)
     others -= np.median(others, axis=0)
     # An odd motion must not become a component of its own.
     limits = 3.0 * _deviations(others)
@@ -348,7 +348,7 @@ def _residuals(
     rows, columns = np.triu_indices(min(count // 12, CURVED))
     products = 0.5 * components[:, rows] * components[:, columns]
     terms = np.hstack([np.ones((count, 1)), components, products])
-    values, weights = features[:, part], np.ones(count)
+    values, weights = features[:, group], np.ones(count)
     for _ in range(ROUNDS):
         normal = terms.T @ (weights[:, None] * terms) + RIDGE * count * np.eye(terms.shape[1])
         solved = np.linalg.solve(normal, terms.T * weights)
