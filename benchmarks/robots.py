@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import robot_recipe
 from numpy.typing import NDArray
+from robot_recipe import COMMANDS, PERIOD, RATE
 from rows import Row, compact, record, table
 from scipy.interpolate import RBFInterpolator, RegularGridInterpolator
 from scipy.linalg import cho_factor, cho_solve
@@ -37,33 +39,10 @@ from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
 Numbers = NDArray[np.float64]
-COMMANDS = {"forward": "dx", "left": "dy", "turning": "dtheta"}
-FIRST, PERIOD, RATE = 240, 99, 60.0
-"""First frame of the cycle, behind the robot's start, its frames, and frames a second."""
 FOLDS, NODES, DEGREE = 10, 3, 15
 """Parts that are left out in turn, nodes of the grid along each command, and the degree of the
 polynomials in time with which tables of gaits are stored."""
 RESULTS = Path(__file__).parents[1] / "docs/results"
-RECIPE = """schema = 1
-name = "go_bdx"
-description = "Gaits of a biped"
-licence = "NVIDIA, not commercial"
-[robot]
-model = "go_bdx.xml"
-[clips]
-table = "clips.csv"
-file = "file"
-first_frame = "first"
-last_frame = "last"
-[motion]
-frames = 60
-cyclic = true
-root = "travelling"
-[alignment]
-warp = "identity"
-[size]
-rms_budget_cm = 0.02
-"""
 
 
 @dataclass(frozen=True)
@@ -87,18 +66,7 @@ def read(folder: Path, work: Path) -> Gaits:
     """Return the gaits of a folder with a robot and JSON files; work: empty folder."""
     for entry in ("go_bdx.xml", "gaits", "meshes"):
         (work / entry).symlink_to((folder / entry).absolute())
-    rows = ["file,dx,dy,dtheta,first,last"]
-    for path in sorted((folder / "gaits").glob("*.json"), key=lambda path: int(path.stem)):
-        stated = json.loads(path.read_text())["Placo"]
-        command = ",".join(str(stated[column]) for column in COMMANDS.values())
-        rows.append(f"gaits/{path.name},{command},{FIRST},{FIRST + PERIOD}")
-    (work / "clips.csv").write_text("\n".join(rows) + "\n")
-    controls = [
-        f'[[controls]]\nname = "{name}"\ncolumn = "{column}"\nunit = "m/s"\ndescription = "Command"'
-        for name, column in COMMANDS.items()
-    ]
-    (work / "recipe.toml").write_text("\n".join([RECIPE, *controls]))
-    family = recipe.read(work / "recipe.toml")
+    family = recipe.read(robot_recipe.write(work))
     examples, _ = ingest.ingest(family, work)
     robot = robot_file.read(work / "go_bdx.xml")
     body = robot_clip.of(robot)

@@ -23,6 +23,11 @@ from posefield_train import training
 from posefield_train.robots import doctor, robot_file
 from posefield_train.source import ingest, recipe
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import robot_recipe
+from robot_recipe import PERIOD
+
 pytestmark = pytest.mark.system
 TRACKER = Path(__file__).parents[1] / "examples/track_in_mujoco.py"
 
@@ -86,48 +91,14 @@ def test_gaits_of_a_biped_stand_within_limits_and_an_altered_one_is_found(files)
     assert len(set(found) - sound - {7, 30}) <= 1
 
 
-RECIPE = """schema = 1
-name = "go_bdx"
-description = "Gaits of a biped"
-licence = "NVIDIA, not commercial"
-[robot]
-model = "go_bdx.xml"
-[clips]
-table = "clips.csv"
-file = "file"
-first_frame = "first"
-last_frame = "last"
-[motion]
-frames = 60
-cyclic = true
-root = "travelling"
-[alignment]
-warp = "identity"
-[size]
-rms_budget_cm = 0.02
-"""
 FEET = {"left_foot_link", "right_foot_link"}
-COMMANDS = {"forward": "dx", "left": "dy", "turning": "dtheta"}
-FIRST, PERIOD = 240, 99
-"""First frame of the cycle that is cut, behind the robot's start, and its length."""
 
 
 @pytest.fixture(scope="module")
 def biped(files):
     """Return the recipe of the biped's gaits, the folder of its files, and its examples."""
     folder = files / "robot_go_bdx"
-    rows = ["file,dx,dy,dtheta,first,last"]
-    for path in sorted((folder / "gaits").glob("*.json"), key=lambda path: int(path.stem)):
-        stated = json.loads(path.read_text())["Placo"]
-        values = [str(stated[column]) for column in COMMANDS.values()]
-        rows.append(",".join([f"gaits/{path.name}", *values, str(FIRST), str(FIRST + PERIOD)]))
-    (folder / "clips.csv").write_text("\n".join(rows) + "\n")
-    controls = [
-        f'[[controls]]\nname = "{name}"\ncolumn = "{column}"\nunit = "m/s"\ndescription = "Command"'
-        for name, column in COMMANDS.items()
-    ]
-    (folder / "recipe.toml").write_text("\n".join([RECIPE, *controls]))
-    family = recipe.read(folder / "recipe.toml")
+    family = recipe.read(robot_recipe.write(folder))
     return family, folder, ingest.ingest(family, folder)[0]
 
 
@@ -151,7 +122,7 @@ def measured(biped, tmp_path_factory):
         f'[[controls]]\nname = "{name}"\nauto = {{ quantity = "{quantity}" }}\ndescription = "Mean"'
         for name, quantity in QUANTITIES.items()
     ]
-    (folder / "measured.toml").write_text("\n".join([RECIPE, *controls]))
+    (folder / "measured.toml").write_text("\n".join([robot_recipe.RECIPE, *controls]))
     family = recipe.read(folder / "measured.toml")
     examples = ingest.ingest(family, folder)[0]
     # Commands of the files are not the velocities of their gaits.

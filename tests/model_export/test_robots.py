@@ -3,7 +3,9 @@
 import json
 import os
 import pickle
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -29,6 +31,7 @@ from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.report import robot_feasibility
 from posefield_train.robots import doctor, robot_dynamics, robot_file
 
+EXAMPLE = Path(__file__).parents[2] / "examples/biped_gaits.py"
 # A biped whose left leg branches before its right, with a hinge beside its body's origin, a body
 # with two hinges, and a neck behind both legs: its orders depth first and breadth first differ.
 LEG = """<body name="{side}_hip" pos="0 {y} -0.1" quat="0.9 0.1 0 0">
@@ -242,6 +245,24 @@ def test_a_motion_unlike_the_others_is_found_and_no_other(robot):
     assert {index: found.where for index, found in doctor.outliers(motions).items()} == {
         7: "left_ankle"
     }
+
+
+def test_the_example_writes_gaits_that_stand_and_follow_their_commands(tmp_path):
+    gaits = runpy.run_path(str(EXAMPLE))
+    gaits["main"](tmp_path / "biped")
+    body = robot_file.read(tmp_path / "biped/biped.xml")
+    rows = (tmp_path / "biped/clips.csv").read_text().splitlines()[1:]
+    assert len(rows) == gaits["COUNT"]
+    for row in rows[::12]:
+        name, *command = row.split(",")
+        motion = robot_formats.read(tmp_path / "biped" / name, Conventions(body))
+        assert not doctor.diagnose(motion, body).findings
+        forward, left, turning = map(float, command)
+        turn = 2.0 * np.arctan2(motion.base_rotations[-1, 3], motion.base_rotations[-1, 0])
+        assert turn == pytest.approx(turning * motion.duration)
+        way = np.linalg.norm((motion.base_path[-1] - motion.base_path[0])[:2])
+        arc = np.hypot(forward, left) * motion.duration
+        assert way == pytest.approx(arc, rel=0.2, abs=0.01)
 
 
 class Hostile:

@@ -57,7 +57,7 @@ QUANTITIES = (
     Quantity("torque_share", "torque over the actuator's limit", "", 1.0, 1.0),
     Quantity("zero_moment_m", "zero-moment point beyond the soles", "cm", 100.0, 0.01),
     Quantity("lacking_share", "force that soles cannot give", "% of the weight", 100.0, 0.05),
-    Quantity("skate_m_s", "speed of standing feet", "cm/s", 100.0, 0.01),
+    Quantity("skate_m_s", "median speed of standing feet", "cm/s", 100.0, 0.01),
     Quantity("penetration_m", "soles below the floor", "mm", 1000.0, 0.002),
     Quantity("seam_rad", "step at the seam", "rad", 1.0, 1e-6),
 )
@@ -203,10 +203,13 @@ def _high(values: np.ndarray[Any, Any]) -> float | None:
 
 
 def _skate(motion: RobotMotion, dynamics: Dynamics, contacts: np.ndarray[Any, Any]) -> float | None:
-    """Return the mean speed over the floor of feet while they stand, m/s."""
+    """Return the median speed over the floor of feet while they stand, m/s.
+
+    A mean would tell how they touch down and lift off, which no frame separates from standing.
+    """
     soles = dynamics.robot.foot_points(*motion.body_poses(dynamics.robot))
     speeds = np.stack([doctor.sliding_speeds(points, motion.rate) for points in soles], axis=1)
-    return float(speeds[contacts].mean()) if contacts.any() else None
+    return float(np.median(speeds[contacts])) if contacts.any() else None
 
 
 def _largest(rows: Sequence[dict[str, Any]], key: str) -> float | None:

@@ -40,7 +40,11 @@ def from_tracking(file: File) -> RobotMotion:
 
 
 def _number(file: File, field: str) -> float | None:
-    return float(np.ravel(file.array(field, *([None] * np.ndim(file.content[field]))))[0])
+    """Return the first number of a field; None without the field, or without a number in it."""
+    if field not in file.content:
+        return None
+    values = np.ravel(file.array(field, *([None] * np.ndim(file.content[field]))))
+    return float(values[0]) if len(values) else None
 
 
 def _rate(file: File, field: str = "fps") -> tuple[float, str]:
@@ -102,8 +106,7 @@ def from_qpos(file: File) -> RobotMotion:
     if "joint_names" in file.content:
         # The first joint of a trajectory is the free one of the base.
         hinges, joints = file.names("joint_names")[1:], NAMED
-    field = next((name for name in ("frequency", "fps") if name in file.content), None)
-    rate = file.rate(_number(file, field) if field else None, "")
+    rate = file.rate(_number(file, "frequency") or _number(file, "fps"), "")
     name = "locomujoco.npz" if "split_points" in file.content else "qpos.npz"
     return file.motion(name, _split(columns), rate, joints, "wxyz: MuJoCo's", hinges=hinges)
 
@@ -223,14 +226,13 @@ def _loops(file: File) -> bool:
 
 def _frame_rate(file: File) -> tuple[float, str]:
     duration = _number(file, "FrameDuration")
-    field = _number(file, "FPS") if "FPS" in file.content else None
-    return file.rate(field or (1.0 / duration if duration else None), "")
+    return file.rate(_number(file, "FPS") or (1.0 / duration if duration else None), "")
 
 
 def from_awd(file: File) -> RobotMotion:
     """Return the motion of rows whose layout the file states, with names of joints."""
     rows, hinges = file.array("Frames", None, None), file.names("Joints")
-    (starts,), (sizes,) = file.content["Frame_offset"], file.content["Frame_size"]
+    starts, sizes = (file.mapping(name) for name in ("Frame_offset", "Frame_size"))
     parts = {}
     for name, size in zip(AWD_FIELDS, (3, 4, len(hinges)), strict=True):
         if sizes.get(name) != size or starts.get(name, -1) + size > rows.shape[1]:
