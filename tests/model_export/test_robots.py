@@ -795,7 +795,7 @@ BAD_MOTIONS = {
     "no rate": ("mjlab.npz", without("fps"), "states no frame rate: say --rate"),
     "no rates": ("isaaclab.npz", lambda fields: fields | {"fps": []}, "states no frame rate"),
     "pickle": ("gmr.pkl", without("fps"), "states no frame rate"),
-    "layout": ("awd.json", without("Frame_size"), "'Frame_size' is None, expected one object"),
+    "layout": ("awd.json", without("Frame_size"), "Frame_size hold no object each"),
     "field": ("locomujoco.npz", without("frequency"), "states no frame rate"),
 }
 

@@ -247,7 +247,8 @@ def _robot_encoder(form: RobotFormat) -> ClipEncoder:
         if len(single.clip) < 2:
             raise InvalidField("end", "1 frame, expected two or more: files have velocities")
         source = single.trust.model.partition("@")[0]
-        return form.content(robot_clip.of(robot).motion(single.clip, source, single.loops), robot)
+        assert form.write is not None
+        return form.write(robot_clip.of(robot).motion(single.clip, source, single.loops), robot)
 
     return ClipEncoder(
         form.name,

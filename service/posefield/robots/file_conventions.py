@@ -17,15 +17,10 @@ from posefield.robots.robot import BodyPositions, HingeAngles, Order, Robot, upr
 from posefield.robots.robot_motion import RobotMotion
 
 QuaternionOrder = Literal["wxyz", "xyzw"]
-
-
 MATCH = 0.01
 """Largest mean distance of bodies, m, from those of the file for an order of joints."""
-
-
 UPRIGHT = 0.5
 """Least vertical component of the base's own vertical axis of a robot that does not lie."""
-
 WITHIN, WITHIN_NOT = 0.95, 0.1
 """Shares of angles: within the limits as degrees at least, and beyond them as radians."""
 NEAR_FLOOR, LOW_SHARES = 0.15, (0.5, 0.9)
@@ -93,15 +88,6 @@ class File:
         if not (np.isfinite(stated) and stated > 0):
             raise self.error(f"states {stated} frames a second, expected a positive number")
         return float(stated), "the file"
-
-    def mapping(self, name: str) -> Mapping[str, Any]:
-        """Return a field with one object, alone or in a list."""
-        value = self.content.get(name)
-        if isinstance(value, list) and len(value) == 1:
-            (value,) = value
-        if not isinstance(value, Mapping):
-            raise self.error(f"field {name!r} is {str(value)[:40]}, expected one object")
-        return value
 
     def names(self, field: str) -> tuple[str, ...]:
         """Return the names in a field."""
@@ -191,43 +177,34 @@ def expect_floor(motion: RobotMotion, robot: Robot) -> None:
     """Raise MotionFileError for a robot that is never near the floor: another unit or up axis."""
     if not robot.feet:
         return
-    still = np.zeros((1, motion.angles.shape[1]))
-    upright_base = quat.IDENTITY[None]
-    rest = float(_lowest_soles(robot, np.zeros((1, 3)), upright_base, still)[0])
-    tall = float(robot.body_poses(np.zeros((1, 3)), upright_base, still)[0][..., 2].max()) - rest
-
-    def heights(path: Floats, rotations: Floats) -> Floats:
-        return _lowest_soles(robot, path, rotations, motion.angles) / tall
-
     path, rotations = motion.base_path, motion.base_rotations
-    lowest = heights(path, rotations)
+
+    def lowest_soles(path: Floats, rotations: Floats, angles: HingeAngles) -> Floats:
+        soles = robot.foot_points(*robot.body_poses(path, rotations, angles))
+        return np.asarray(np.min([points[..., 2].min(axis=1) for points in soles], axis=0))
+
+    still = np.zeros((1, 3)), quat.IDENTITY[None], np.zeros((1, motion.angles.shape[1]))
+    tall = float(robot.body_poses(*still)[0][..., 2].max() - lowest_soles(*still)[0])
+    lowest = lowest_soles(path, rotations, motion.angles)
     expected = "expected metres with Z up and the floor at 0"
-    if lowest.min() > MOST_HIGH or lowest.max() < -MOST_DEEP:
+    if lowest.min() > MOST_HIGH * tall or lowest.max() < -MOST_DEEP * tall:
         raise motion.error(
-            f"the lowest sole is {tall * lowest.min():.2f} to {tall * lowest.max():.2f} m high, "
-            f"and {robot.name} is {tall:.2f} m tall: {expected}"
+            f"the lowest sole is {lowest.min():.2f} to {lowest.max():.2f} m high, and "
+            f"{robot.name} is {tall:.2f} m tall: {expected}"
         )
-    share = float((np.abs(lowest) < NEAR_FLOOR).mean())
-    if share > LOW_SHARES[0]:
-        return
+    share = (np.abs(lowest) < NEAR_FLOOR * tall).mean()
     readings = {
         "Y up": (quat.rotate(UP_TURN, path), quat.mul(UP_TURN, rotations)),
         "Y up and swapped axes": (path[:, [2, 0, 1]], rotations[:, [0, 3, 1, 2]]),
         "the path's Y up": (path[:, [2, 0, 1]], rotations),
     }
-    for axes, reading in readings.items():
-        near = float((np.abs(heights(*reading)) < NEAR_FLOOR).mean())
+    for axes, reading in readings.items() if share < LOW_SHARES[0] else ():
+        near = (np.abs(lowest_soles(*reading, motion.angles)) < NEAR_FLOOR * tall).mean()
         if near > LOW_SHARES[1]:
             raise motion.error(
                 f"the lowest sole is near the floor in {share:.0%} of the frames, and in "
                 f"{near:.0%} of them if the file has {axes}: {expected}"
             )
-
-
-def _lowest_soles(robot: Robot, path: Floats, rotations: Floats, angles: HingeAngles) -> Floats:
-    """Return the height (F,) of the lowest point of all feet, m."""
-    soles = robot.foot_points(*robot.body_poses(path, rotations, angles))
-    return np.asarray(np.stack([points[..., 2].min(axis=1) for points in soles]).min(axis=0))
 
 
 def tell_order(

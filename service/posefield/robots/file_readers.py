@@ -232,7 +232,12 @@ def _frame_rate(file: File) -> tuple[float, str]:
 def from_awd(file: File) -> RobotMotion:
     """Return the motion of rows whose layout the file states, with names of joints."""
     rows, hinges = file.array("Frames", None, None), file.names("Joints")
-    starts, sizes = (file.mapping(name) for name in ("Frame_offset", "Frame_size"))
+    layout = [
+        np.ravel(file.content.get(name, [])).tolist() for name in ("Frame_offset", "Frame_size")
+    ]
+    if not all(len(entry) == 1 and isinstance(entry[0], dict) for entry in layout):
+        raise file.error("Frame_offset and Frame_size hold no object each, expected one")
+    (starts,), (sizes,) = layout
     parts = {}
     for name, size in zip(AWD_FIELDS, (3, 4, len(hinges)), strict=True):
         if sizes.get(name) != size or starts.get(name, -1) + size > rows.shape[1]:

@@ -11,7 +11,9 @@ from typing import IO, Any, Literal, Protocol
 import numpy as np
 
 from posefield.common.errors import MotionFileError
-from posefield.robots import file_conventions, file_readers, file_writers, restricted_pickle
+from posefield.robots import file_conventions, restricted_pickle
+from posefield.robots import file_readers as readers
+from posefield.robots import file_writers as writers
 from posefield.robots.file_conventions import Content, Conventions, File
 from posefield.robots.robot import Robot
 from posefield.robots.robot_motion import RobotMotion
@@ -50,104 +52,90 @@ class RobotFormat:
         """Return the suffix of its files."""
         return PurePosixPath(self.name).suffix
 
-    def content(self, motion: RobotMotion, robot: Robot) -> bytes:
-        """Return a file of a motion; only for formats that are written."""
-        assert self.write is not None
-        return self.write(motion, robot)
-
 
 FORMATS = (
     RobotFormat(
-        "unitree.csv",
-        "Unitree, LAFAN1, mjlab",
-        ("rows",),
-        file_readers.from_rows,
-        file_writers.write_unitree,
+        "unitree.csv", "Unitree, LAFAN1, mjlab", ("rows",), readers.from_rows, writers.write_unitree
     ),
-    RobotFormat("qpos.csv", "MuJoCo, Kimodo", (), file_readers.from_rows, file_writers.write_qpos),
+    RobotFormat("qpos.csv", "MuJoCo, Kimodo", (), readers.from_rows, writers.write_qpos),
     RobotFormat(
         "holosoma.npz",
         "holosoma",
         ("joint_pos", "body_pos_w", "joint_names"),
-        file_readers.from_holosoma,
-        file_writers.write_holosoma,
+        readers.from_holosoma,
+        writers.write_holosoma,
     ),
     RobotFormat(
         "mjlab.npz",
         "mjlab",
         ("joint_pos", "body_pos_w", "body_quat_w"),
-        file_readers.from_tracking,
-        lambda motion, robot: file_writers.write_tracking(motion, robot, "depth"),
+        readers.from_tracking,
+        lambda motion, robot: writers.write_tracking(motion, robot, "depth"),
     ),
     RobotFormat(
         "beyondmimic.npz",
         "BeyondMimic",
         (),
-        file_readers.from_tracking,
-        lambda motion, robot: file_writers.write_tracking(motion, robot, "breadth"),
+        readers.from_tracking,
+        lambda motion, robot: writers.write_tracking(motion, robot, "breadth"),
     ),
     RobotFormat(
         "isaaclab.npz",
         "Isaac Lab",
         ("dof_names", "body_names", "dof_positions"),
-        file_readers.from_isaaclab,
-        file_writers.write_isaaclab,
+        readers.from_isaaclab,
+        writers.write_isaaclab,
     ),
     RobotFormat(
         "locomujoco.npz",
         "LocoMuJoCo",
         ("qpos", "split_points"),
-        file_readers.from_qpos,
-        file_writers.write_loco,
+        readers.from_qpos,
+        writers.write_loco,
     ),
     RobotFormat(
-        "qpos.npz",
-        "any4hdmi, OmniRetarget",
-        ("qpos",),
-        file_readers.from_qpos,
-        file_writers.write_qpos_npz,
+        "qpos.npz", "any4hdmi, OmniRetarget", ("qpos",), readers.from_qpos, writers.write_qpos_npz
     ),
-    RobotFormat("loco-joints.npz", "LocoMuJoCo 0", ("q_pelvis_tx",), file_readers.from_loco_joints),
-    RobotFormat("kimodo.npz", "Kimodo", ("posed_joints",), file_readers.from_kimodo),
+    RobotFormat("loco-joints.npz", "LocoMuJoCo 0", ("q_pelvis_tx",), readers.from_loco_joints),
+    RobotFormat("kimodo.npz", "Kimodo", ("posed_joints",), readers.from_kimodo),
     RobotFormat(
         "gmr.pkl",
         "GMR, TWIST",
         ("root_pos", "root_rot", "dof_pos"),
-        file_readers.from_gmr,
-        file_writers.write_gmr,
+        readers.from_gmr,
+        writers.write_gmr,
     ),
     RobotFormat(
         "mimickit.pkl",
         "MimicKit",
         ("loop_mode", "frames"),
-        file_readers.from_mimickit,
-        file_writers.write_mimickit,
+        readers.from_mimickit,
+        writers.write_mimickit,
     ),
     RobotFormat(
         "asap.pkl",
         "ASAP, PBHC",
         ("root_trans_offset", "dof", "root_rot"),
-        file_readers.from_asap,
-        file_writers.write_asap,
+        readers.from_asap,
+        writers.write_asap,
     ),
     RobotFormat(
         "awd.json",
         "AWD, Open Duck",
         ("Frames", "Joints", "Frame_offset"),
-        file_readers.from_awd,
-        file_writers.write_awd,
+        readers.from_awd,
+        writers.write_awd,
     ),
     RobotFormat(
         "amp.txt",
         "AMP, DeepMimic",
         ("Frames", "FrameDuration"),
-        file_readers.from_amp,
-        file_writers.write_amp,
+        readers.from_amp,
+        writers.write_amp,
     ),
-    RobotFormat("tienkung.txt", "TienKung", (), file_readers.from_amp),
+    RobotFormat("tienkung.txt", "TienKung", (), readers.from_amp),
 )
 """Formats in the order in which they are tried; one without fields is told by its numbers."""
-
 
 WRITTEN = {form.name: form for form in FORMATS if form.write}
 

@@ -13,8 +13,6 @@ from posefield.robots.robot import BodyPositions, BodyRotations, HingeAngles, Ro
 
 NORM_TOLERANCE = 1e-3
 """Deviation from a unit quaternion's norm that digits cut off explain."""
-
-
 LIMIT_TOLERANCE = np.radians(0.1)
 """Angle beyond a limit that rounding explains."""
 
