@@ -97,8 +97,14 @@ def angular_velocities(
     turns: Annotated[Floats, "frames *rows 4"], rate: float
 ) -> Annotated[Floats, "frames *rows 3"]:
     """Return angular velocities (F, ..., 3), rad/s, about the axes of the parent's frame."""
-    frames = np.arange(len(turns))
-    after, before = np.minimum(frames + 1, len(turns) - 1), np.maximum(frames - 1, 0)
-    steps = quat.log(quat.mul(turns[after], quat.conj(turns[before])))
-    seconds = np.maximum(after - before, 1) / rate
-    return steps / seconds.reshape(-1, *[1] * (turns.ndim - 1))
+    planes = np.moveaxis(turns, -1, 0)
+    back, steps = quat.conj(turns), np.zeros_like(planes)
+    steps[0] = 1.0
+    seconds = np.full(len(turns), 2.0 / rate)
+    seconds[[0, -1]] = 1.0 / rate
+    if len(turns) > 1:
+        for at, after, before in ((np.s_[1:-1], np.s_[2:], np.s_[:-2]), (0, 1, 0), (-1, -1, -2)):
+            earlier = np.moveaxis(back[before], -1, 0)
+            quat.product_planes(planes[:, after], earlier, steps[:, at])
+    turned = quat.log(np.moveaxis(steps, 0, -1))
+    return turned / seconds.reshape(-1, *[1] * (turns.ndim - 1))

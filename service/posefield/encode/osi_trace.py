@@ -18,6 +18,7 @@ import os
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Annotated
@@ -64,7 +65,6 @@ MARGIN = 0.1
 """Distance, m, from the joints to the sides of the box: of the skin."""
 TOGETHER = 16
 """People whose parts are written together: 4.5 MB each for a minute at 30 frames a second."""
-FRAMES_PER_BLOCK = 128
 
 
 @dataclass(frozen=True)
@@ -110,20 +110,22 @@ def text(field: int, value: str) -> Layout:
     return message(field, Layout(value.encode()))
 
 
-def moving_object(index: int, person: str) -> Layout:
-    """Return the field of one person in a `GroundTruth`, with gaps for its numbers."""
+@cache
+def _base_and_skeleton() -> tuple[Layout, Layout]:
+    """Return the parts of a person that are equal for all but for their numbers."""
     bones = [
         message(2, whole(1, kind), numbers(2), numbers(3), numbers(6), numbers(7))
         for kind in (ROOT[1], *(kind for _, kind, _ in BONES))
     ]
-    return message(
-        5,
-        message(1, whole(1, index)),
-        message(2, *(numbers(field) for field in range(1, 7))),
-        whole(3, PEDESTRIAN),
-        message(10, text(2, IDENTIFIER_TYPE), text(3, person)),
-        message(12, numbers(1), *bones),
-    )
+    return message(2, *(numbers(field) for field in range(1, 7))), message(12, numbers(1), *bones)
+
+
+def moving_object(index: int, person: str) -> Layout:
+    """Return the field of one person in a `GroundTruth`, with gaps for its numbers."""
+    base, bones = _base_and_skeleton()
+    identity = message(1, whole(1, index))
+    source = message(10, text(2, IDENTIFIER_TYPE), text(3, person))
+    return message(5, identity, base, whole(3, PEDESTRIAN), source, bones)
 
 
 def frame_head(time: float, size: int) -> bytes:
@@ -163,18 +165,24 @@ def person_numbers(
     """Return the numbers (F, G) of one person, in the order of the gaps of its part."""
     frames, rate = len(motion), motion.rate
     headings = np.unwrap(quat.twist(motion.rotations[:, 0], UP))
-    turns, places = np.empty((frames, len(paths), 4)), np.empty((frames, len(paths), 3))
-    for bone, path in enumerate(paths):
-        turn, offset = motion.rotations[:, path[0]], motion.offsets[path[0]]
+    rotations, arms = np.ascontiguousarray(motion.rotations.transpose(1, 2, 0)), motion.offsets
+    back = np.ascontiguousarray(quat.from_axis_angle(UP, -headings).T)
+    turns, places = np.empty((len(paths), 4, frames)), np.empty((len(paths), 3, frames))
+    for turn, place, path in zip(turns, places, paths, strict=True):
+        turn[:], place[:] = rotations[path[0]], arms[path[0]][:, None]
         if path[0] == 0:
-            turn = quat.mul(quat.from_axis_angle(UP, -headings), turn)
-            offset = motion.roots * UP
+            quat.product_planes(back, rotations[0], turn)
+            place[:] = (motion.roots * UP).T
         for joint in path[1:]:
-            offset = offset + quat.rotate(turn, motion.offsets[joint])
-            turn = quat.mul(turn, motion.rotations[:, joint])
-        turns[:, bone], places[:, bone] = turn, offset
+            step = np.empty_like(place)
+            quat.rotate_planes(turn, arms[joint][:, None], step)
+            place += step
+            quat.product_planes(turn.copy(), rotations[joint], turn)
     # Ahead, left and up are Z, X and Y of the model.
-    turns, places = turns[..., [0, 3, 1, 2]], places[..., [2, 0, 1]]
+    turns, places = (
+        planes[:, order].transpose(2, 0, 1)
+        for planes, order in ((turns, [0, 3, 1, 2]), (places, [2, 0, 1]))
+    )
     box = _box(motion)
     middle, still = 0.5 * box[2], np.zeros((frames, 3))
     centre = np.stack([motion.roots[:, 0], -motion.roots[:, 2], still[:, 0] + middle], axis=-1)
@@ -290,17 +298,19 @@ def write_people(
     for run in runs:
         together = [motions[number] for number in run]
         begins = trace.people_begins(together[0].index)
-        records = [person_parts(motion, trace.layouts[motion.index], paths) for motion in together]
-        first = min(motion.first for motion in together)
-        end = max(motion.first + len(motion) for motion in together)
-        for frame in range(first, end):
+        spans = [
+            (
+                motion.first,
+                motion.first + len(motion),
+                person_parts(motion, trace.layouts[motion.index], paths),
+            )
+            for motion in together
+        ]
+        firsts, ends, _ = zip(*spans, strict=True)
+        for frame in range(min(firsts), max(ends)):
             os.pwritev(
                 file,
-                [
-                    rows[frame - motion.first]
-                    for motion, rows in zip(together, records, strict=True)
-                    if 0 <= frame - motion.first < len(motion)
-                ],
+                [rows[frame - first] for first, end, rows in spans if first <= frame < end],
                 int(begins[frame]),
             )
 
@@ -309,15 +319,19 @@ def person_parts(
     motion: BoneMotion, layout: Layout, paths: Sequence[tuple[int, ...]]
 ) -> Annotated[npt.NDArray[np.uint8], "frames bytes"]:
     """Return the bytes (F, size) of a person in each of its frames."""
-    size = len(layout.data)
-    records = np.empty((len(motion), size), np.uint8)
+    frames, size, gaps = len(motion), len(layout.data), layout.gaps
+    records = np.empty((frames, size), np.uint8)
     records[:] = np.frombuffer(layout.data, np.uint8)
     values = person_numbers(motion, paths)
-    # Blocks that stay in a core's cache while their columns are filled.
-    for first in range(0, len(motion), FRAMES_PER_BLOCK):
-        block = np.ascontiguousarray(values[first : first + FRAMES_PER_BLOCK].T)
-        for gap, numbers_of_gap in zip(layout.gaps, block, strict=True):
-            at = first * size + gap
-            column: Floats = np.ndarray(block.shape[1], "<f8", records, at, (size,))
-            column[:] = numbers_of_gap
+    for first in range(0, BASE, 3):
+        vector: Floats = np.ndarray(
+            (frames, 3), "<f8", records, gaps[first], (size, gaps[1] - gaps[0])
+        )
+        vector[:] = values[:, first : first + 3]
+    # All bones take equally many bytes, and so do their vectors.
+    steps = (gaps[BASE + step] - gaps[BASE] for step in (12, 3, 1))
+    bones: Floats = np.ndarray(
+        (frames, len(paths) + 1, 4, 3), "<f8", records, gaps[BASE], (size, *steps)
+    )
+    bones[:] = values[:, BASE:].reshape(bones.shape)
     return records

@@ -73,10 +73,11 @@ def exp(v: Vectors) -> Quaternions:
 
 def log(q: Quaternions) -> Vectors:
     """Return the rotation vector (..., 3) of q, rad, of length at most pi."""
-    q = np.where(q[..., :1] < 0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, q[..., :1])
-    return np.where(sine < 1e-12, 2.0, angle / np.maximum(sine, 1e-12)) * q[..., 1:]
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    sine = np.sqrt(x * x + y * y + z * z)
+    angle = 2.0 * np.arctan2(sine, np.abs(w))
+    factor = np.where(sine < 1e-12, 2.0, angle / np.maximum(sine, 1e-12))
+    return np.where(w < 0, -factor, factor)[..., None] * q[..., 1:]
 
 
 def slerp(a: Quaternions, b: Quaternions, t: Scalars) -> Quaternions:
