@@ -23,7 +23,6 @@ from posefield.model import load, perform
 from posefield.model_file.model_card import mean_accelerations
 from posefield.motion import quat, skeleton
 from posefield.question.walk_question import WalkQuestion
-from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track, track_crowd
 from posefield.tracks.track import Track
@@ -111,9 +110,11 @@ def walk(model: Synthesizer) -> list[Walked]:
     card, done = crowd.gait.session.card, []
     for group, plan, motions in crowd.batches():
         levels = walking_crowd.build_schedule(model, plan, order)
-        likely = walking_feet.contact_probabilities(
+        _, likely = walking_crowd.motions_with_contacts(
             crowd.gait.session, plan, np.arange(len(group)), levels
         )
+        if plan.stepping is not None:
+            likely += plan.stepping.firm[..., None] * (1.0 - likely)
         for index, person in enumerate(group):
             rows = slice(0, len(person.path))
             rotations = motions.rotations[index, rows].astype(float)

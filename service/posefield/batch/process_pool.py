@@ -20,6 +20,8 @@ from multiprocessing import connection
 from multiprocessing.connection import Connection
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from posefield.batch.job import VERSIONED_PACKAGES
 from posefield.common import cancellation
 from posefield.common.cancellation import SINGLE_THREAD_ENV, Cancellation, Cancelled
@@ -76,6 +78,18 @@ def runner(workers: int, resumes: str = RESUMES) -> Runner:
 def usable_cores() -> int:
     """Return the number of cores that this process may run on."""
     return len(os.sched_getaffinity(0))
+
+
+def limit_threads() -> None:
+    """Limit BLAS to one thread, unless the environment sets its number of threads.
+
+    Idle BLAS threads spin: with two threads a grid of sigma takes 1.5 to 8 times the CPU time,
+    and a crowd of takes twice as much.
+    The last bits of results depend on the number of threads, and worker processes
+    and exports have one.
+    """
+    if not SINGLE_THREAD_ENV.keys() & os.environ.keys():
+        threadpool_limits(1, user_api="blas")
 
 
 def run_here(

@@ -156,8 +156,10 @@ def crowd(
 
     Each character walks on its own path at its own varying speed, or follows a trajectory.
     """
+    from posefield.batch import process_pool
     from posefield.cli import crowd_files
 
+    process_pool.limit_threads()
     if people_per_file is not None:
         if trajectories is None or paths or count is not None:
             raise InvalidField("people_per_file", "expected with trajectories alone")

@@ -165,10 +165,11 @@ class _FootSkateMeter:
 
     def measure(self, motions: Motions) -> None:
         card = self.gait.session.card
-        if card.feet:
-            self.samples.append(walking_crowd.measure_foot_skate(card, motions, self.rate).ravel())
         if motions.feet:
             self.standing.append(motions.feet)
+            self.samples.append(motions.feet.skate)
+        elif card.feet:
+            self.samples.append(walking_crowd.measure_foot_skate(card, motions, self.rate).ravel())
 
     def facts(self) -> dict[str, float]:
         if not self.samples:

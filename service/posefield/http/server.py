@@ -27,11 +27,11 @@ from types import FrameType
 from typing import Any, NoReturn
 
 import uvicorn
-from threadpoolctl import threadpool_limits
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 from uvicorn.supervisors import Multiprocess
 from uvicorn.supervisors.multiprocess import Process
 
+from posefield.batch import process_pool
 from posefield.common.cancellation import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
 from posefield.http import batching, metrics, telemetry
@@ -217,7 +217,7 @@ def serve(sources: Sequence[str | Path], settings: Settings) -> None:
             )
             WorkerSupervisor(_config(app, settings, count), sockets).run_until_signalled()
         else:
-            limit_threads()
+            process_pool.limit_threads()
             app = partial(_application, models, settings, announcement)
             uvicorn.Server(_config(app, settings, 1)).run(sockets)
 
@@ -398,14 +398,3 @@ def _raise_open_files() -> None:
 
 def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:
     raise SystemExit(0)
-
-
-def limit_threads() -> None:
-    """Limit BLAS to one thread, unless the environment sets its number of threads.
-
-    Idle BLAS threads spin: with two threads a grid of sigma takes 1.5 to 8 times the CPU time.
-    The last bits of results depend on the number of threads, and worker processes
-    and exports have one.
-    """
-    if not SINGLE_THREAD_ENV.keys() & os.environ.keys():
-        threadpool_limits(1, user_api="blas")

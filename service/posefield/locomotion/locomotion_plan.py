@@ -234,7 +234,7 @@ def place_poses(
         poses = plan.stepping.apply(pair, plan.who[pair[0]], poses)
     roots = plan.places[pair] + poses.places * floor_plane.unit_vectors(headings)
     rotations = floor_plane.turn_roots(poses.rotations, headings)
-    return RelativePoses(rotations, poses.heights, roots, poses.curves)
+    return replace(poses, rotations=rotations, places=roots)
 
 
 def _measure_strides(

@@ -78,16 +78,20 @@ class Stepping:
     ) -> RelativePoses:
         """Return walked poses (K) of pairs of a character and a frame with steps and standing.
 
-        combinations: of labels of each pose (K,).
+        combinations: of labels of each pose (K,). The rotations are overwritten.
         """
         share, poses = self.shares[pair], self.poses
-        rotations = quat.nlerp(walked.rotations, poses.rotations[combinations], share)
+        rotations = walked.rotations
+        # Who walks has no share of the standing pose: most do.
+        some = np.flatnonzero(share)
+        standing = poses.rotations[combinations[some]]
+        rotations[some] = quat.nlerp(rotations[some], standing, share[some])
         heights = walked.heights + share * (poses.heights[combinations] - walked.heights)
         points = walked.places + share * (poses.points[combinations] - walked.places)
         lengths = LEG_SHARE * poses.heights[combinations]
         shifts = self.shifts[pair] / lengths[:, None]
         turn_legs(self.parents, rotations, poses.hips, self.turns[pair], shifts)
-        return RelativePoses(rotations, heights, points, walked.curves)
+        return replace(walked, heights=heights, places=points)
 
 
 def turn_legs(

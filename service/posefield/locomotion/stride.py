@@ -73,13 +73,15 @@ class RelativePoses:
     """K poses in frames that travel with the characters.
 
     rotations: (K, J, 4). heights: (K,), of the root, m. places: (K,), of the root over the floor.
-    curves: values (K, C); None for a model without curves.
+    curves: values (K, C); None for a model without curves. contacts: their probabilities (K, C);
+    None for a model without contacts.
     """
 
     rotations: Annotated[Floats, "poses joints 4"]
     heights: Annotated[Floats, "poses"]
     places: Annotated[FloorVectors, "poses"]
     curves: Annotated[Floats, "poses curves"] | None = None
+    contacts: Annotated[Floats, "poses contacts"] | None = None
 
     @property
     def arrays(self) -> dict[str, Any]:
@@ -142,10 +144,13 @@ def poses_of_strides(
     """
     controls, labels = controls_and_labels
     times = (phases * cycles.durations)[:, None]
-    outputs = ["rotations", "root_position"] + [onnx_runtime.CURVES] * bool(session.card.curves)
-    rotations, roots, *curves = _run_batches(session, controls, times, labels, level, *outputs)
+    optional = (onnx_runtime.CURVES, onnx_runtime.CONTACTS)
+    more = [name for name in optional if getattr(session.card, name)]
+    outputs = ["rotations", "root_position", *more]
+    rotations, roots, *others = _run_batches(session, controls, times, labels, level, *outputs)
     posed = relative_poses(cycles, phases, rotations[:, 0], roots[:, 0])
-    return replace(posed, curves=curves[0][:, 0]) if curves else posed
+    arrays: dict[str, Any] = {name: array[:, 0] for name, array in zip(more, others, strict=True)}
+    return replace(posed, **arrays)
 
 
 def root_places(

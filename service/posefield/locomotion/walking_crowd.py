@@ -143,61 +143,70 @@ def motions(
 
     pose: computes the poses, which are those of the prediction by default.
     """
+    return motions_with_contacts(session, plan, characters, levels, pose)[0]
+
+
+def motions_with_contacts(
+    session: Session,
+    plan: LocomotionPlan,
+    characters: Annotated[Indices, "motions"],
+    levels: LevelSchedule,
+    pose: PoseMaker = locomotion_plan.synthesize_poses,
+) -> tuple[Motions, Annotated[Floats, "motions frames contacts"]]:
+    """Return motions as `motions` does, and the probabilities (M, F, C) of the contacts."""
     shape = (len(characters), plan.phases.shape[1])
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
     rotations = np.empty((count, joints, 4), np.float32)
     roots = np.empty((count, 3), np.float32)
     values = np.empty((count, len(session.card.curves)), np.float32)
+    likely = np.empty((count, len(session.card.contacts)))
     for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
         character, frame = np.divmod(np.arange(count)[rows], shape[1])
         pose_pairs = partial(pose, session, plan)
-        posed = _blended_poses(
-            session.card, pose_pairs, (characters[character], frame), levels.rows(rows)
-        )
+        posed = _blended_poses(pose_pairs, (characters[character], frame), levels.rows(rows))
         rotations[rows] = posed.rotations
         roots[rows] = floor_plane.at_height(posed.places, posed.heights)
         if posed.curves is not None:
             values[rows] = curves.clamp(session.card.curves, posed.curves)
+        if posed.contacts is not None:
+            likely[rows] = posed.contacts
     # Bone lengths must not vary with the speed: they are those at the mean controls.
     mean_controls = plan.controls[characters].mean(axis=1)
     bones = stride.bones(session, mean_controls, plan.labels.weights[plan.who[characters]])
     turns = rotations.reshape(*shape, joints, 4)
     motion_curves = values.reshape(*shape, -1) if values.size else None
-    return Motions(turns, roots.reshape(*shape, 3), bones, levels.levels, motion_curves)
+    made = Motions(turns, roots.reshape(*shape, 3), bones, levels.levels, motion_curves)
+    return made, likely.reshape(*shape, -1)
 
 
-def _blended_poses(
-    card: ModelCard, pose: _PoseMaker, pairs: Pairs, levels: LevelSchedule
-) -> RelativePoses:
+def _blended_poses(pose: _PoseMaker, pairs: Pairs, levels: LevelSchedule) -> RelativePoses:
     """Return the poses of K pairs of a character and a frame, blended where levels change.
 
     levels: levels of the pairs, in arrays (K,).
     """
-    after, shares = _at_levels(card, pose, pairs, levels.levels), levels.shares
+    after, shares = _at_levels(pose, pairs, levels.levels), levels.shares
     between = np.flatnonzero(shares < 1.0)
     if len(between):
         some = pairs[0][between], pairs[1][between]
-        before = _at_levels(card, pose, some, levels.previous[between])
+        before = _at_levels(pose, some, levels.previous[between])
         for name, blended in after.arrays.items():
             mix = quat.nlerp if name == "rotations" else quat.lerp
             blended[between] = mix(getattr(before, name), blended[between], shares[between])
     return after
 
 
-def _at_levels(card: ModelCard, pose: _PoseMaker, pairs: Pairs, levels: Indices) -> RelativePoses:
-    joints, channels, count = len(card.skeleton), len(card.curves), len(levels)
-    poses = RelativePoses(
-        np.empty((count, joints, 4)),
-        np.empty(count),
-        np.empty(count, dtype=complex),
-        np.empty((count, channels)) if channels else None,
-    )
+def _at_levels(pose: _PoseMaker, pairs: Pairs, levels: Indices) -> RelativePoses:
+    by_level = []
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        level_poses = pose(pairs[0][rows], pairs[1][rows], level)
-        for name, array in poses.arrays.items():
-            array[rows] = getattr(level_poses, name)
-    return poses
+        by_level.append((rows, pose(pairs[0][rows], pairs[1][rows], level).arrays))
+    if len(by_level) == 1:
+        return RelativePoses(**by_level[0][1])
+    order = np.argsort(np.concatenate([rows for rows, _ in by_level]))
+    names = by_level[0][1]
+    return RelativePoses(
+        **{name: np.concatenate([arrays[name] for _, arrays in by_level])[order] for name in names}
+    )
 
 
 def measure_foot_skate(

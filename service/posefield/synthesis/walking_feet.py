@@ -11,6 +11,7 @@ from posefield.common.units import Floats, Indices
 from posefield.constraints import take_variation
 from posefield.feet import body_plans, foot_placement, footsteps
 from posefield.feet.footsteps import Character, FeetPlan, PlanRequest
+from posefield.inference.onnx_runtime import CONTACTS
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.session import Session
 from posefield.kriging import random_field
@@ -19,9 +20,7 @@ from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
 from posefield.locomotion.stride import RelativePoses
 from posefield.locomotion.walking_crowd import (
-    POSES_PER_CALL,
     MotionMaker,
-    Pairs,
     PoseMaker,
 )
 from posefield.model_file.model_card import ModelCard
@@ -148,21 +147,23 @@ def _relative_poses(
 ) -> RelativePoses:
     """Return K poses relative to the travel, of pairs of a character (K,) and a frame (K,)."""
     labels, phases = plan.labels.weights[plan.who[pair[0]]], plan.phases[pair]
-    strides = stride.strides(model.session, plan.controls[pair], labels, level)
+    controls = plan.controls[pair]
+    strides = stride.strides(model.session, controls, labels, level)
     corrector = model.solver.corrector(level)
     rows = np.searchsorted(deviations.chosen, pair[0])
     card = model.session.card
-    shapes = ((len(card.skeleton), 4), (3,), (len(card.curves),))
+    counts = len(card.curves), len(card.contacts)
+    shapes = ((len(card.skeleton), 4), (3,), *((count,) for count in counts))
     posed = [np.empty((len(phases), *shape)) for shape in shapes]
+    names = ("coefficients", "frame", "way", *[CONTACTS] * bool(card.contacts))
     limits = hinges.from_card(card.hinges)
     for batch in stride.batches(len(phases)):
         cancellation.check()
         times = (phases[batch] * strides.durations[batch])[:, None]
-        inputs = plan.controls[pair][batch], times
-        coefficients, canonical, travel = (
+        coefficients, canonical, travel, *contacts = (
             array.astype(float)
             for array in model.session.run(
-                *inputs, "coefficients", "frame", "way", labels=labels[batch], level=level
+                controls[batch], times, *names, labels=labels[batch], level=level
             )
         )
         frames = canonical[:, 0]
@@ -176,11 +177,12 @@ def _relative_poses(
         if len(limits):
             turns = corrector.reduced.joint_turns(predicted, limits.joints)
             poses = limits.within(poses[0], limits.turn_angles(turns)), *poses[1:]
-        for column, values in zip(posed, poses, strict=True):
-            column[batch] = values
-    rotations, roots, values = posed
+        for column, values in zip(posed, (*poses, *contacts), strict=False):
+            column[batch] = values.reshape(column[batch].shape)
+    rotations, roots, *others = posed
     relative = stride.relative_poses(strides, phases, rotations, roots)
-    return replace(relative, curves=values) if values.shape[1] else relative
+    curves, likely = (array if array.shape[1] else None for array in others)
+    return replace(relative, curves=curves, contacts=likely)
 
 
 def _poses(
@@ -289,8 +291,10 @@ def standing_motions(
 
     Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
     """
-    motions = walking_crowd.motions(session, plan, walkers, schedule, pose)
-    plans = _plan_feet(session, plan, walkers, schedule, motions)
+    motions, likely = walking_crowd.motions_with_contacts(session, plan, walkers, schedule, pose)
+    if plan.stepping is not None:
+        likely += plan.stepping.firm[walkers][..., None] * (1.0 - likely)
+    plans = _plan_feet(session.card, plan.rate, motions, likely)
     count, frames, *shape = motions.rotations.shape
     # The rotations of the legs are written into those of the motions.
     shift, *paths = foot_placement.place_grids(plans, motions.rotations.reshape(-1, *shape))
@@ -310,17 +314,15 @@ def standing_motions(
 
 
 def _plan_feet(
-    session: Session,
-    plan: LocomotionPlan,
-    walkers: Indices,
-    schedule: LevelSchedule,
+    card: ModelCard,
+    rate: float,
     motions: Motions,
+    probabilities: Annotated[Floats, "motions frames contacts"],
 ) -> list[FeetPlan]:
-    card = session.card
     character, feet = choose_legs(card)
     contacts = [foot_contacts(card)[index] for index in feet]
     columns = [card.contacts.index(contact) for contact in contacts]
-    likely = contact_probabilities(session, plan, walkers, schedule)[..., columns]
+    likely = probabilities[..., columns]
     doubles = (motions.bone_offsets, motions.rotations, motions.root_position)
     bones, rotations, roots = (array.astype(np.float64) for array in doubles)
     return body_plans.plan_motions(
@@ -329,66 +331,10 @@ def _plan_feet(
                 replace(character, bones=bones[walker]),
                 rotations[walker],
                 roots[walker],
-                plan.rate,
+                rate,
                 contacts,
                 likely[walker],
             )
             for walker in range(len(bones))
         ]
     )
-
-
-def contact_probabilities(
-    session: Session,
-    plan: LocomotionPlan,
-    walkers: Annotated[Indices, "motions"],
-    schedule: LevelSchedule,
-) -> Annotated[Floats, "motions frames contacts"]:
-    """Return the probabilities (M, F, C) of the contacts of characters (M,) of the plan.
-
-    schedule: levels (M, F); where they change, probabilities are blended as the poses are.
-    """
-    shape = (len(walkers), plan.phases.shape[1])
-    count = shape[0] * shape[1]
-    probabilities = np.empty((count, len(session.card.contacts)))
-    for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
-        character, frame = np.divmod(np.arange(count)[rows], shape[1])
-        probabilities[rows] = _blended_contacts(
-            session, plan, (walkers[character], frame), schedule.rows(rows)
-        )
-    probabilities = probabilities.reshape(*shape, -1)
-    if plan.stepping is not None:
-        firm = plan.stepping.firm[walkers][..., None]
-        probabilities += firm * (1.0 - probabilities)
-    return probabilities
-
-
-def _blended_contacts(
-    session: Session, plan: LocomotionPlan, pairs: Pairs, schedule: LevelSchedule
-) -> Annotated[Floats, "pairs contacts"]:
-    """Return the probabilities of K pairs of a character and a frame."""
-    probabilities, shares = (
-        _contacts_at_levels(session, plan, pairs, schedule.levels),
-        schedule.shares,
-    )
-    between = np.flatnonzero(shares < 1.0)
-    if len(between):
-        some = pairs[0][between], pairs[1][between]
-        before = _contacts_at_levels(session, plan, some, schedule.previous[between])
-        probabilities[between] = before + shares[between, None] * (probabilities[between] - before)
-    return probabilities
-
-
-def _contacts_at_levels(
-    session: Session, plan: LocomotionPlan, pairs: Pairs, levels: Indices
-) -> Annotated[Floats, "pairs contacts"]:
-    """Return the probabilities of K pairs, each at its level (K,)."""
-    probabilities = np.empty((len(levels), len(session.card.contacts)))
-    for level in np.unique(levels).tolist():
-        rows = np.flatnonzero(levels == level)
-        pair = pairs[0][rows], pairs[1][rows]
-        labels = plan.labels.weights[plan.who[pair[0]]]
-        probabilities[rows] = stride.contact_probabilities(
-            session, plan.controls[pair], labels, plan.phases[pair], level
-        )
-    return probabilities

@@ -3,8 +3,8 @@
 import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from posefield.batch import process_pool
 from posefield.common.cancellation import SINGLE_THREAD_ENV
-from posefield.http import server
 
 
 def threads():
@@ -18,5 +18,5 @@ def test_blas_keeps_to_one_thread(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     with threadpool_limits(2, user_api="blas"):
         assert threads() == {2}
-        server.limit_threads()
+        process_pool.limit_threads()
         assert threads() == {1}
