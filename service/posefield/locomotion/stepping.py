@@ -82,8 +82,8 @@ class Stepping:
         """
         share, poses = self.shares[pair], self.poses
         rotations = walked.rotations
-        # Who walks has no share of the standing pose: most do.
-        some = np.flatnonzero(share)
+        # Who walks has no share of the standing pose, but for rounding.
+        some = np.flatnonzero(share > 1e-12)
         standing = poses.rotations[combinations[some]]
         rotations[some] = quat.nlerp(rotations[some], standing, share[some])
         heights = walked.heights + share * (poses.heights[combinations] - walked.heights)

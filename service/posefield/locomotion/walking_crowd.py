@@ -175,8 +175,8 @@ def motions_with_contacts(
     bones = stride.bones(session, mean_controls, plan.labels.weights[plan.who[characters]])
     turns = rotations.reshape(*shape, joints, 4)
     motion_curves = values.reshape(*shape, -1) if values.size else None
-    made = Motions(turns, roots.reshape(*shape, 3), bones, levels.levels, motion_curves)
-    return made, likely.reshape(*shape, -1)
+    synthesized = Motions(turns, roots.reshape(*shape, 3), bones, levels.levels, motion_curves)
+    return synthesized, likely.reshape(*shape, -1)
 
 
 def _blended_poses(pose: _PoseMaker, pairs: Pairs, levels: LevelSchedule) -> RelativePoses:

@@ -263,7 +263,7 @@ def _dot(
 ) -> Annotated[Numbers, "*batch"]:
     """Return the inner products; sums of four columns take a fifth of the time of a reduction."""
     products = a * b
-    w, x, y, z = (products[..., part] for part in range(4))
+    w, x, y, z = (products[..., axis] for axis in range(4))
     total: Numbers = w + x + y + z
     return total
 
