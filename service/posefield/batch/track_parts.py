@@ -211,10 +211,10 @@ def _tracks(job: PartsJob, shard: TrackShard) -> Iterator[Track]:
     """Yield the tracks of a part, in the order of its people."""
     rows = np.fromfile(shard.spool, ROW)
     rows = rows[np.argsort(rows["person"], kind="stable")]
-    ends = np.searchsorted(
+    stops = np.searchsorted(
         rows["person"], shard.index * job.people + np.arange(len(shard.names)), "right"
     )
-    for name, some in zip(shard.names, np.split(rows, ends[:-1]), strict=True):
+    for name, some in zip(shard.names, np.split(rows, stops[:-1]), strict=True):
         times, points, headings, lines = (
             some[column].copy() for column in ("time", "point", "heading", "line")
         )

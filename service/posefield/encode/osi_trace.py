@@ -167,21 +167,21 @@ def person_numbers(
     headings = np.unwrap(quat.twist(motion.rotations[:, 0], UP))
     rotations, arms = np.ascontiguousarray(motion.rotations.transpose(1, 2, 0)), motion.offsets
     back = np.ascontiguousarray(quat.from_axis_angle(UP, -headings).T)
-    turns, places = np.empty((len(paths), 4, frames)), np.empty((len(paths), 3, frames))
-    for turn, place, path in zip(turns, places, paths, strict=True):
-        turn[:], place[:] = rotations[path[0]], arms[path[0]][:, None]
+    turns, offsets = np.empty((len(paths), 4, frames)), np.empty((len(paths), 3, frames))
+    for turn, offset, path in zip(turns, offsets, paths, strict=True):
+        turn[:], offset[:] = rotations[path[0]], arms[path[0]][:, None]
         if path[0] == 0:
             quat.product_planes(back, rotations[0], turn)
-            place[:] = (motion.roots * UP).T
+            offset[:] = (motion.roots * UP).T
         for joint in path[1:]:
-            step = np.empty_like(place)
+            step = np.empty_like(offset)
             quat.rotate_planes(turn, arms[joint][:, None], step)
-            place += step
+            offset += step
             quat.product_planes(turn.copy(), rotations[joint], turn)
     # Ahead, left and up are Z, X and Y of the model.
     turns, places = (
         planes[:, order].transpose(2, 0, 1)
-        for planes, order in ((turns, [0, 3, 1, 2]), (places, [2, 0, 1]))
+        for planes, order in ((turns, [0, 3, 1, 2]), (offsets, [2, 0, 1]))
     )
     box = _box(motion)
     middle, still = 0.5 * box[2], np.zeros((frames, 3))
@@ -306,8 +306,8 @@ def write_people(
             )
             for motion in together
         ]
-        firsts, ends, _ = zip(*spans, strict=True)
-        for frame in range(min(firsts), max(ends)):
+        firsts, stops, _ = zip(*spans, strict=True)
+        for frame in range(min(firsts), max(stops)):
             os.pwritev(
                 file,
                 [rows[frame - first] for first, end, rows in spans if first <= frame < end],

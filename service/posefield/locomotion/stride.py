@@ -147,9 +147,9 @@ def poses_of_strides(
     optional = (onnx_runtime.CURVES, onnx_runtime.CONTACTS)
     more = [name for name in optional if getattr(session.card, name)]
     outputs = ["rotations", "root_position", *more]
-    rotations, roots, *others = _run_batches(session, controls, times, labels, level, *outputs)
+    rotations, roots, *values = _run_batches(session, controls, times, labels, level, *outputs)
     posed = relative_poses(cycles, phases, rotations[:, 0], roots[:, 0])
-    arrays: dict[str, Any] = {name: array[:, 0] for name, array in zip(more, others, strict=True)}
+    arrays: dict[str, Any] = {name: array[:, 0] for name, array in zip(more, values, strict=True)}
     return replace(posed, **arrays)
 
 

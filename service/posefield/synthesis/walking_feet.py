@@ -179,9 +179,9 @@ def _relative_poses(
             poses = limits.within(poses[0], limits.turn_angles(turns)), *poses[1:]
         for column, values in zip(posed, (*poses, *contacts), strict=False):
             column[batch] = values.reshape(column[batch].shape)
-    rotations, roots, *others = posed
+    rotations, roots, *rest = posed
     relative = stride.relative_poses(strides, phases, rotations, roots)
-    curves, likely = (array if array.shape[1] else None for array in others)
+    curves, likely = (array if array.shape[1] else None for array in rest)
     return replace(relative, curves=curves, contacts=likely)
 
 
