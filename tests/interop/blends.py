@@ -7,7 +7,6 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import document_pages
 import environment
 
 import posefield
@@ -21,14 +20,14 @@ CONTROL = "elsewhere"
 
 def faults(node: Path) -> list[str]:
     """Return the faults of blending, a line each; print the distances."""
-    (program,) = (b for b in document_pages.blocks(GUIDE.read_text()) if b.language == "js")
+    program = GUIDE.read_text().partition("```js\n")[2].partition("```\n")[0]
     modules = environment.THREE / "node_modules"
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         words = ("bake", "cmu_walk", "--grid", "speed=0.6:1.7:5", "--grid", "turn=-4:20:5")
-        posefields = Path(sys.executable).with_name("posefield")
-        subprocess.run([posefields, *words, "-o", folder], check=True, capture_output=True)
-        (folder / "walker.mjs").write_text(program.text)
+        command = Path(sys.executable).with_name("posefield")
+        subprocess.run([command, *words, "-o", folder], check=True, capture_output=True)
+        (folder / "walker.mjs").write_text(program)
         (folder / "node_modules").symlink_to(modules)
         space = json.loads((folder / "blendspace.json").read_text())
         points = {**POINTS, CONTROL: POINTS["between"]}
