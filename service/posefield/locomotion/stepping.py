@@ -78,20 +78,17 @@ class Stepping:
     ) -> RelativePoses:
         """Return walked poses (K) of pairs of a character and a frame with steps and standing.
 
-        combinations: of labels of each pose (K,). The rotations are overwritten.
+        combinations: of labels of each pose (K,).
         """
         share, poses = self.shares[pair], self.poses
-        rotations = walked.rotations
-        # Who walks has no share of the standing pose, but for rounding.
-        some = np.flatnonzero(share > 1e-12)
-        standing = poses.rotations[combinations[some]]
-        rotations[some] = quat.nlerp(rotations[some], standing, share[some])
+        # All get unit length in double precision, also who walks.
+        rotations = quat.nlerp(walked.rotations, poses.rotations[combinations], share)
         heights = walked.heights + share * (poses.heights[combinations] - walked.heights)
         points = walked.places + share * (poses.points[combinations] - walked.places)
         lengths = LEG_SHARE * poses.heights[combinations]
         shifts = self.shifts[pair] / lengths[:, None]
         turn_legs(self.parents, rotations, poses.hips, self.turns[pair], shifts)
-        return replace(walked, heights=heights, places=points)
+        return replace(walked, rotations=rotations, heights=heights, places=points)
 
 
 def turn_legs(
