@@ -67,9 +67,17 @@ WISHES = {
     "found_families": {"clips of families: wrong": 5.0, "all actions: cuts missed": 5.0},
     "robot_gaits": {
         "tenths: joints": 0.6,
-        "travel": 0.5,
+        "measured tenths: joints": 0.6,
+        "command tracked": 0.5,
         "seam": 1e-7,
+        "skate": 0.2,
+        "penetration": 0.5,
+        "beyond limits": 0.0,
+        "evaluator, angles": 1e-6,
+        "evaluator, sigma": 1e-6,
         "factor between error and sigma": 1.1,
+        "4,096 environments, a step": 2.0,
+        "4,096 environments, a step with eight new commands": 2.0,
     },
     "scaled": {
         "92 clips: processor time": 8.0,

@@ -77,6 +77,10 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "stride_speeds": lambda: (measured_tables.STRIDE_COLUMNS, measured_tables.stride_speeds()),
     "robots_tenths": lambda: (measured_tables.GAIT_COLUMNS, measured_tables.gaits("tenths")),
     "robots_grid": lambda: (measured_tables.GAIT_COLUMNS, measured_tables.gaits("grid")),
+    "robots_measured": lambda: (
+        measured_tables.GAIT_COLUMNS,
+        measured_tables.gaits("measured tenths"),
+    ),
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
     **{
@@ -99,6 +103,7 @@ REMARKS: dict[str, Callable[[], str]] = {
 ORIGINS: dict[str, str] = {name: name for name in (*SPEED, *JUDGED)} | {
     "robots_tenths": "robot_gaits",
     "robots_grid": "robot_gaits",
+    "robots_measured": "robot_gaits",
     "recipes": "models",
     "levels": "models",
     "stride_speeds": "strides",

@@ -204,10 +204,9 @@ def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(kind, 
         rotations = signs[:, None] * reference.base_rotations
         np.testing.assert_allclose(rotations, motion.base_rotations, atol=1e-5)
         np.testing.assert_allclose(1.0 / reference.phase_rates, trust.duration, atol=1e-6)
-        # The service squares small differences of large numbers in single precision.
-        np.testing.assert_allclose(plan.sigmas[row], trust.sigma, atol=1e-4)
+        np.testing.assert_allclose(plan.sigmas[row], trust.sigma, atol=2e-6)
         sigmas = np.array(trust.joint_sigma)[joints]
-        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=2e-4)
+        np.testing.assert_allclose(reference.sigmas[0], sigmas, atol=5e-6)
         assert plan.supported[row] == trust.supported
         # Negative control: feet as predicted differ.
         predicted = opened.clip(feet="as_predicted", fps=97, extrapolate="ok", **question)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from onnx import TensorProto
 
 from posefield.common.units import Floats
 from posefield.kriging import kriging_model
@@ -298,10 +299,15 @@ def _sigma(
     form = net("Slice", form, tables["curved_from"], tables["curved_to"], net.indices(0, 1))
     # Two columns: see `GraphBuilder.row_sums`.
     pairs = net("Expand", net.weights("sill", np.array([bank.sill])), tables["pairs"])
+    # Large terms cancel: single precision would leave no digits of a small sigma.
+    level_basis, form, pairs, sill = (
+        net("Cast", value, to=TensorProto.DOUBLE)
+        for value in (level_basis, form, pairs, net("Exp", logarithm))
+    )
     terms = net("Mul", net("MatMul", level_basis, form), level_basis)
+    variance = net("Cast", net("Add", net("MatMul", terms, pairs), sill), to=TensorProto.FLOAT)
     # Not Relu, which onnxruntime-web 1.23 fuses with Gemm into an operator that it lacks.
-    variance = net("Max", net("Gemm", terms, pairs, net("Exp", logarithm)), net.number(0.0))
-    return net("Sqrt", variance)
+    return net("Sqrt", net("Max", variance, net.number(0.0)))
 
 
 def _log_sill(bank: KrigingBank) -> float:
