@@ -15,7 +15,7 @@ from posefield.locomotion import floor_plane
 from posefield.locomotion.locomotion_plan import Route
 from posefield.motion import skeleton
 from posefield.question.walk_question import WalkQuestion
-from posefield.tracks import route_tracks, track_crowd, track_files
+from posefield.tracks import route_tracks, track_crowd, track_files, track_path
 from posefield.tracks.track import MAX_PEOPLE, of_arrays
 from posefield.tracks.track_files import TrackReading
 
@@ -235,7 +235,7 @@ def test_a_route_leads_round_its_corner_and_ends_standing(walk):
 @pytest.mark.parametrize(
     ("waypoints", "speed", "message"),
     [
-        ([[0, 0], [0, 5]], 0.3, "paths/1/speed: 0.3 m/s, expected 0.487 to 1.793 m/s"),
+        ([[0, 0], [0, 5]], 0.3, "paths/1/speed: 0.3 m/s, expected 0.487 to 1.791 m/s"),
         ([[0, 0]], 1.0, "paths/1/waypoints: one place, expected a path"),
         ([[0, 0], [0, 1], [0, 1]], 1.0, "paths/1/waypoints/2: 0.000 m from the one before"),
     ],
@@ -327,3 +327,43 @@ def test_few_people_of_a_long_clock_are_in_memory_at_once(walk):
         assert np.array_equal(batch.bone_offsets[0], short[0].bone_offsets[index])
     with pytest.raises(InvalidField, match="27000000031 frames from the first sample"):
         track_crowd.find_people(walk, walk.gait, order, [tracks[0], people(9e8)])
+
+
+def path_of(points, headings=None):
+    times = 0.1 * np.arange(len(points))
+    return track_path.follow(of_arrays("a", times, np.asarray(points), headings), 0.0, 60.0)
+
+
+def test_a_corner_at_constant_speed_is_cut_by_a_hand_s_breadth_and_the_time_is_kept(monkeypatch):
+    gone = 1.3 * 0.1 * np.arange(60) - 4.0
+    points = np.column_stack([np.minimum(gone, 0.0), np.maximum(gone, 0.0)])
+    path = path_of(points)
+    assert path.errors.max() < 0.08
+    assert path.errors.mean() < 0.01
+    speeds = np.abs(path.velocities)
+    assert speeds.min() < 1.0
+    # The negative control: averaged over longer, as what no walker does.
+    monkeypatch.setattr(track_path, "MOST_ACCELERATION", 3.0)
+    assert path_of(points).errors.max() > 0.2
+
+
+def steps_of(walk, points):
+    """Return the cycles that a person steps along a track at 10 Hz, and the joints' skate."""
+    track = of_arrays("a", 0.1 * np.arange(len(points)), np.asarray(points))
+    crowd = track_crowd.find_people(walk, walk.gait, WalkQuestion(count=1, fps=30.0), [track])
+    ((_, plan, motions),) = crowd.batches()
+    return np.unwrap(plan.phases[0], period=1.0)[[0, -1]] @ [-1.0, 1.0], motions.feet.skate[0]
+
+
+def test_who_creeps_steps_and_who_trembles_does_not_tramp(walk):
+    """At 2 cm/s feet follow; noise of 3 cm moves feet seldom; a still person's never."""
+    still = np.zeros((200, 2))
+    noise = np.random.default_rng(0).normal(0.0, 0.03, still.shape)
+    east = still + np.linspace(0.0, 0.4, 200)[:, None] * (1.0, 0.0)
+    assert steps_of(walk, still)[0] == 0.0
+    assert steps_of(walk, noise)[0] < 3.0
+    cycles, skate = steps_of(walk, east)
+    assert 1.0 < cycles < 6.0
+    assert skate < 0.01
+    # Faces the way it creeps: +X.
+    assert path_of(east).headings == pytest.approx(np.pi / 2, abs=0.02)

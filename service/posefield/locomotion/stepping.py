@@ -37,14 +37,16 @@ class StandingPoses:
     """Standing poses of C combinations of labels, in the frames that travel.
 
     rotations: (C, J, 4). heights: of the roots (C,), m. points: of the roots over the floor (C,).
-    hips: upper joint of each leg. passings: phase at which each foot swings past the other (C, 2).
-    supports: phases of double support (C, 2).
+    hips: upper joint of each leg. sides: 1 for the left foot, -1 for the right one (2,). passings:
+    phase at which each foot swings past the other (C, 2). supports: phases of double support (C,
+    2).
     """
 
     rotations: Annotated[Floats, "combinations joints 4"]
     heights: Annotated[Floats, "combinations"]
     points: Annotated[FloorVectors, "combinations"]
     hips: tuple[int, ...]
+    sides: Annotated[Floats, "2"]
     passings: Annotated[Floats, "combinations 2"]
     supports: Annotated[Floats, "combinations 2"]
 
@@ -135,21 +137,23 @@ def cadences(
 
 
 def stepped(
-    phases: Frames, beyond: Annotated[Numbers, "frames"], passings: Annotated[Floats, "2"]
+    phases: Frames, beyond: Annotated[Numbers, "*frames"], passings: Annotated[Floats, "2"]
 ) -> Annotated[Numbers, "frames 2"]:
     """Return the changes of both legs (F, 2) with which feet keep their places in stances.
 
     phases: of the cycle (F,), without wrapping. beyond: turns, rad, or ways, m, of the body beyond
-    those of the model (F,). passings: phase at which each foot swings past the other one. A foot
-    has the place of the body in the middle of its stance, and goes to the next one while it swings.
+    those of the model (F,), or of each foot (F, 2). passings: phase at which each foot swings past
+    the other one. A foot has the place of the body in the middle of its stance, and goes to the
+    next one while it swings.
     """
     changes = np.empty((len(phases), 2), beyond.dtype)
     # Phases may rest, where the body does, too.
     rising = phases + 1e-9 * np.arange(len(phases))
-    for foot, passing in enumerate(passings.tolist()):
+    of_feet = np.broadcast_to(beyond.T, changes.T.shape)
+    for foot, (passing, way) in enumerate(zip(passings.tolist(), of_feet, strict=True)):
         cycles = phases - passing
         swing = np.round(cycles)
-        before, after = (np.interp(passing + swing + half, rising, beyond) for half in (-0.5, 0.5))
+        before, after = (np.interp(passing + swing + half, rising, way) for half in (-0.5, 0.5))
         share = quat.smoothstep(np.clip((cycles - swing) / SWING + 0.5, 0.0, 1.0))
-        changes[:, foot] = before + share * (after - before) - beyond
+        changes[:, foot] = before + share * (after - before) - way
     return changes

@@ -6,6 +6,7 @@ after a stop advance it too. All is planned in the size of the model's body.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -30,6 +31,9 @@ EASE = 0.1
 """Standard deviation of the average with which standing and stepping are blended, s."""
 LEAST_WALKED = 0.4
 """Smallest share of the walk in the pose of a person who steps."""
+TOES, DRIFT = 0.1, 0.1
+"""Distance of the balls of feet ahead of the axis about which they turn, and the way after which
+who hardly moves steps, m."""
 TURN_SPEED, TURN_EASE = 1.9, 0.5
 """Mean rate of a turn on the spot, rad/s, and the time that it takes besides, s."""
 FACED = np.radians(2.0)
@@ -84,6 +88,7 @@ def find_standing_poses(walkers: Sequence[Walker]) -> StandingPoses | None:
         np.array([pose.height for pose in poses_of_all]),
         np.array([pose.place for pose in poses_of_all]),
         tuple(leg.upper for leg in poses_of_all[0].legs),
+        np.sign(poses_of_all[0].balls.imag),
         passings,
         np.stack([walker.double_supports for walker in walkers]),
     )
@@ -148,7 +153,12 @@ def plan_steps(
     )
     poses, row = table.poses, table.row
     supports = np.zeros(2) if poses is None else poses.supports[row]
-    phases, moving = _phases(cadences, supports, number, rate)
+    first = int(np.argmax(cadences > QUIET))
+    if poses is not None and abs(stepped.imag[first]) > abs(stepped.real[first]):
+        # Who sets off to a side steps with the foot there.
+        lead = poses.passings[row, np.argmax(poses.sides * stepped.imag[first])]
+        number = 0.5 * float(np.argmin((lead - supports) % 1.0))
+    phases, moving = _phases(cadences, supports, number, rate, points)
     steps = smooth(moving.astype(complex), EASE * rate, fixed=False).real
     speed = np.clip(np.abs(stepped.real) / low, 0.0, 1.0)
     shares = 1.0 - steps * np.maximum(LEAST_WALKED, np.sqrt(speed))
@@ -161,7 +171,12 @@ def plan_steps(
         strides = (1.0 - shares)[:, None] * stepping.stepped(phases, phases, passings)
         turns = stepping.stepped(phases, headings, passings)
         turns -= (walked * durations)[:, None] * strides
-        shifts = stepping.stepped(phases, points, passings) * np.exp(-1j * headings)[:, None]
+        # Feet are wider apart by half a step to the side, or where toes turn in: none crosses.
+        aside = np.abs(stepped.imag) + TOES * np.abs(turning - walked)
+        apart = 0.25 * steps * aside / np.maximum(cadences, QUIET)
+        placed = points[:, None] + np.outer(apart * np.exp(1j * headings), 1j * poses.sides)
+        shifts = stepping.stepped(phases, placed, passings) + placed - points[:, None]
+        shifts *= np.exp(-1j * headings)[:, None]
         shifts -= lengths[:, None] * strides
         offsets = offsets + shares * (poses.points[row] - offsets)
     else:
@@ -190,19 +205,29 @@ def stepping_of(strider: Strider, plans: Sequence[StepPlan]) -> Stepping | None:
 
 
 def _phases(
-    cadences: Frames, supports: Annotated[Floats, "2"], number: float, rate: float
+    cadences: Frames,
+    supports: Annotated[Floats, "2"],
+    number: float,
+    rate: float,
+    points: Annotated[FloorVectors, "frames"],
 ) -> tuple[Frames, np.ndarray]:
     """Return phases (F,), without wrapping, and whether a person steps (F,).
 
-    supports: phases in which both feet stand. number: from 0 to 1. After a stop each foot takes one
-    more step, to its place under the body, if there is time.
+    supports: phases in which both feet stand. number: from 0 to 1. points: of the body (F,), m.
+    After a stop each foot takes one more step, to its place under the body, if there is time, and
+    again each time that the body has left it behind.
     """
     moving = cadences > QUIET
     steps = np.where(moving, cadences, 0.0) / rate
-    edges = np.flatnonzero(np.diff(moving)) + 1
+    edges = [0, *(np.flatnonzero(np.diff(moving)) + 1).tolist(), len(cadences)]
+    for begin, end in list(pairwise(edges)):
+        at = end if moving[begin] else begin
+        while (far := np.abs(points[at:end] - points[min(at, len(points) - 1)]) > DRIFT).any():
+            at += int(np.argmax(far))
+            edges.append(at)
     phases = np.empty(len(cadences))
     phase = number if moving[0] else float(supports[int(number * 2.0) % 2])
-    for begin, end in zip([0, *edges], [*edges, len(cadences)], strict=True):
+    for begin, end in pairwise(sorted(edges)):
         if moving[begin]:
             phases[begin:end] = phase + np.cumsum(steps[begin:end])
         elif begin == 0:

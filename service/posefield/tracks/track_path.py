@@ -2,9 +2,9 @@
 
 Between samples a path is a cubic without overshoot, so a person who stops does not swing beyond the
 place. It is averaged with a kernel that keeps parabolas: noise goes, and starts, stops and curves
-of walkers stay. Where the path still changes its velocity as no walker does, such as at the corner
-of a route that a simulator walks at constant speed, it is averaged over longer. The distance from
-the track is told.
+of walkers stay. At the corner of a route that a simulator walks at constant speed a person slows
+down, cuts it by some centimetres, and catches up. Where the path still changes its velocity as no
+walker does, it is averaged over longer. The distance from the track is told.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from posefield.motion import quat
 from posefield.performance import step_plan
 from posefield.tracks.track import Track
 
-WINDOW, LONG_WINDOW = 0.2, 0.4
+WINDOW, LONG_WINDOW = 0.18, 0.4
 """Standard deviations of the averages, s."""
-MOST_ACCELERATION = 3.0
+MOST_ACCELERATION = 7.0
 """Acceleration from which on a path is averaged over the longer window, m/s²."""
 SPREAD = 0.3
 """Time over which the longer window is blended in, s."""
-MOVING = 0.25
-"""Speed from which on a person has a direction of travel, m/s."""
+MOVING, CREEPING = 0.25, 0.05
+"""Speed from which on a person has a direction of travel, m/s, and mean speed: noise has less."""
 TRAVEL_SPEED = (0.35, 0.5)
 """Speeds between which a person turns from a stated heading to the direction of travel, m/s."""
 HEADING_WINDOW = 0.12
@@ -112,7 +112,10 @@ def _headings(
         ways = velocities / np.maximum(speeds, 1e-9)
         headings = np.unwrap(np.angle(share * ways + (1.0 - share) * stated))
     else:
-        headings = _travel_headings(velocities, speeds > MOVING, rate)
+        slow = smooth(velocities, step_plan.SLOW_WINDOW * rate, fixed=False)
+        creeps = (speeds <= MOVING) & (np.abs(slow) > CREEPING)
+        ways = np.where(creeps, slow, velocities)
+        headings = _travel_headings(ways, creeps | (speeds > MOVING), rate)
     return smooth(headings.astype(complex), HEADING_WINDOW * rate, sharp=True, fixed=False).real
 
 
@@ -121,7 +124,7 @@ def _travel_headings(
 ) -> Frames:
     """Return the directions of travel (F,), rad; who stands turns before setting off."""
     if not moving.any():
-        return np.zeros(len(velocities))
+        return np.full(len(velocities), np.angle(velocities.sum()))
     rows = np.flatnonzero(moving)
     directions = np.unwrap(np.angle(velocities[rows]))
     headings = np.interp(np.arange(len(velocities)), rows, directions)
