@@ -260,9 +260,8 @@ def add_steps(
 
 
 def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames feet 3"]:
-    tips = [leg.tip for leg in character.legs]
-    poses = passage.limbs(character, tips)
-    balls = [poses.position(tip) for tip in tips]
+    poses = passage.limbs(character, [leg.tip for leg in character.legs])
+    balls = [poses.position(leg.tip) for leg in character.legs]
     return np.stack(balls, axis=1) if balls else np.zeros((len(passage), 0, 3))
 
 

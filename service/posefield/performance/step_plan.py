@@ -19,27 +19,22 @@ from posefield.motion import quat
 from posefield.performance import standing_pose
 from posefield.performance.standing_pose import Walker
 
-TABLE_SPEEDS = 9
-"""Speeds at which strides and mean places of the root are known; lines between."""
-QUIET = 0.12
-"""Cadence up to which a person stands, cycles a second."""
+TABLE_SPEEDS, QUIET = 9, 0.12
+"""Speeds at which strides and mean places of the root are known, with lines between, and the
+cadence up to which a person stands, cycles a second."""
 SLOW, SLOW_WINDOW = 0.2, 0.5
 """Speed below which steps follow the average velocity, m/s, and its standard deviation, s."""
-SETTLING, LEAST_SETTLED = 0.6, 0.5
-"""Mean cadence of the last steps after a stop, cycles a second, and their fewest cycles."""
-EASE = 0.1
-"""Standard deviation of the average with which standing and stepping are blended, s."""
-LEAST_WALKED = 0.4
-"""Smallest share of the walk in the pose of a person who steps."""
+SETTLING, LEAST_SETTLED, LAST_STEPS = 0.6, 0.5, 2.7
+"""Mean cadence of the last steps after a stop, cycles a second, their fewest cycles, and the time
+in which a person comes to stand, s, at most."""
+EASE, LEAST_WALKED = 0.1, 0.4
+"""Standard deviation of the average with which standing and stepping are blended, s, and smallest
+share of the walk in the pose of a person who steps."""
 TOES, DRIFT = 0.1, 0.1
 """Distance of the balls of feet ahead of the axis about which they turn, and the way after which
 who hardly moves steps, m."""
-TURN_SPEED, TURN_EASE = 1.9, 0.5
-"""Mean rate of a turn on the spot, rad/s, and the time that it takes besides, s."""
-FACED = np.radians(2.0)
-"""Angle up to which a body does not turn on the spot, rad."""
-LAST_STEPS = 1.0 / SETTLING + 1.0
-"""Time in which a person who stops comes to stand, s, at most."""
+TURN_SPEED, TURN_EASE, FACED = 1.9, 0.5, 0.035
+"""Mean rate of a turn on the spot, rad/s, the time that it takes besides, s, and least turn."""
 
 
 @dataclass(frozen=True)

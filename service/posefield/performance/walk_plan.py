@@ -29,7 +29,7 @@ from posefield.performance.standing_pose import Walker, find_walker
 from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import SpeedRamps, WalkNote, WalkRequest
-from posefield.question.motion_question import check_number, check_range
+from posefield.question.motion_question import check_number
 
 MAX_SCALING, SHORT_SCALING = 0.06, 0.15
 """Largest changes of the stride length, as shares, with which a walk stops at a phase: of a walk
@@ -151,8 +151,6 @@ CURVE_SHARE, CURVE_SPEEDS = 0.95, 24
 """Share of the largest rate of turning in curves, and the number of speeds at which it is known."""
 DETOUR_SHARES = (0.1, 0.2, 0.4, 0.7, 1.0, 1.4)
 """Clearances of ways around obstacles that are tried, as shares of the larger radius."""
-TURN_GRAIN = 1e-4
-"""Excess of a rate of turning that is none, rad/s, and that refusals show."""
 UNSEEN_PIVOT = 0.2
 """Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 7°
 over a foot that stands for 0.65 s, and captured pelvises turn by 9° in each stride (median)."""
@@ -162,7 +160,6 @@ distance up to which who turns is at the place, m."""
 FACING_NOTE = "steps to the side, backwards and on the spot are synthesised: none was captured"
 # Frames between the points at which controls are solved, and the most points of mean offsets.
 STEP, OFFSET_POINTS = 6, 12
-SECONDS_RANGE = (0.1, walk_request.MAX_SECONDS)
 TURN_EASING = 1.0
 """Time in which the rate of turning changes from the one at the start to that of the curve, s."""
 
@@ -270,10 +267,7 @@ def _stepping_cadences(walked: Frames, beyond: Frames) -> Frames:
 
 
 def _turning_steps(walker: Walker, phases: Frames, beyond: Frames) -> Stepping | None:
-    """Return the turns of the legs so that feet stand while a walker turns.
-
-    None for a model without two feet that step in turn.
-    """
+    """Return turns of the legs with which feet stand in turns; None without two that step."""
     poses = step_plan.find_standing_poses([walker])
     if poses is None:
         return None
@@ -285,10 +279,7 @@ def _turning_steps(walker: Walker, phases: Frames, beyond: Frames) -> Stepping |
 def _plan_facing(
     walker: Walker, request: WalkRequest, start: FloorMotion, facing: float
 ) -> WalkPlan:
-    """Return the plan of a walk whose body keeps a heading, rad, on steps as of people on tracks.
-
-    It turns on the spot first, and then goes straight to its place, from standing to standing.
-    """
+    """Return the plan of a walk whose body turns to a heading, rad, and keeps it to its place."""
     (strider,), goal = step_plan.find_striders([walker]), _destination(request)
     if strider.poses is None:
         message = "given for a model without two feet that step in turn"
@@ -326,9 +317,8 @@ def _route(
     last = 0.0 if request.stop == "standing" else None
     ramps = SpeedRamps(first, last, request.acceleration)
     if request.seconds is not None:
-        seconds = check_number("seconds", request.seconds)
-        check_range("seconds", seconds, *SECONDS_RANGE, "s")
-        gone = walk_request.distances_over_time(curve, request.speed_over, seconds, ramps)
+        scale, seconds = request.speed_over, request.seconds
+        gone = walk_request.distances_over_time(curve, scale, seconds, ramps)
         turns = _turns(request, gone, limits[0])
         return walk_paths.turning(start or FloorMotion(), gone, turns), gone, []
     path, notes = _path(gait, request, start, curve[1])
@@ -446,7 +436,8 @@ def _rates(
     turning = np.minimum(speeds, high) * curvatures
     right, left = _turning_limits(gait, paced)
     beyond = np.maximum(turning - left, right - turning)
-    if beyond.max() > TURN_GRAIN:
+    # Refusals show four decimals.
+    if beyond.max() > 1e-4:
         at = int(np.argmax(beyond))
         point = path.at(gone[at : at + 1])[0][0]
         raise InvalidField(
