@@ -153,9 +153,8 @@ class HeldBody:
 SWAY = np.array([0.005, 0.01j])
 """Standard deviations of the sway of a person who stands, ahead and to the left, m."""
 FREQUENCIES, STREAM = np.array([0.11, 0.23, 0.37, 0.61]), 4
-"""Frequencies of the sway, Hz, whose waves are the lower the faster they are: most of that of quiet
-standing is below 0.5 Hz (Winter, "Human balance and posture control during standing and walking",
-1995); and the stream of a seed, besides those of takes and details."""
+"""Frequencies of the sway, Hz, whose fast waves are low (Winter, "Human balance and posture control
+during standing and walking", 1995), and the stream of a seed."""
 ANGLES = {
     "spine": 0.3,
     "chest": 0.3,

@@ -74,10 +74,8 @@ def find_standing_poses(walkers: Sequence[Walker]) -> StandingPoses | None:
     poses_of_all = [pose for pose in poses if pose is not None]
     if len(poses_of_all) < len(poses):
         return None
-    passings = np.empty((len(poses_of_all), 2))
-    for row, pose in zip(passings, poses_of_all, strict=True):
-        for passing in pose.passings:
-            row[passing.swinging] = passing.phase
+    of_legs = [sorted((one.swinging, one.phase) for one in pose.passings) for pose in poses_of_all]
+    passings = np.array(of_legs)[..., 1]
     return StandingPoses(
         np.stack([pose.rotations for pose in poses_of_all]),
         np.array([pose.height for pose in poses_of_all]),
@@ -103,10 +101,7 @@ def turn_on_the_spot(start: float, facing: float, rate: float) -> Frames:
 
 @dataclass(frozen=True)
 class StepPlan:
-    """Plan of one person in F frames, as of `LocomotionPlan` and `Stepping`.
-
-    speeds: (F,), m/s, and turning: (F,), rad/s, of the controls. phases: (F,), without wrapping.
-    """
+    """Plan of a person, as of `LocomotionPlan` and `Stepping`; rates are those of controls."""
 
     speeds: Frames
     turning: Frames
@@ -150,7 +145,6 @@ def plan_steps(
     supports = np.zeros(2) if poses is None else poses.supports[row]
     first = int(np.argmax(cadences > QUIET))
     if poses is not None and abs(stepped.imag[first]) > abs(stepped.real[first]):
-        # Who sets off to a side steps with the foot there.
         lead = poses.passings[row, np.argmax(poses.sides * stepped.imag[first])]
         number = 0.5 * float(np.argmin((lead - supports) % 1.0))
     phases, moving = _phases(cadences, supports, number, rate, points)
@@ -208,9 +202,8 @@ def _phases(
 ) -> tuple[Frames, np.ndarray]:
     """Return phases (F,), without wrapping, and whether a person steps (F,).
 
-    supports: phases in which both feet stand. number: from 0 to 1. points: of the body (F,), m.
-    After a stop each foot takes one more step, to its place under the body, if there is time, and
-    again each time that the body has left it behind.
+    supports: phases in which both feet stand. number: from 0 to 1. After a stop each foot takes one
+    more step, to its place under the body, and again where points (F,), m, of the body leave it.
     """
     moving = cadences > QUIET
     steps = np.where(moving, cadences, 0.0) / rate

@@ -155,8 +155,7 @@ UNSEEN_PIVOT = 0.2
 """Rate of turning beyond the captured ones that viewers do not see, rad/s: it turns the body by 7°
 over a foot that stands for 0.65 s, and captured pelvises turn by 9° in each stride (median)."""
 FACING_SPEEDS, STANDS, AT_PLACE = (0.1, 0.6), 0.999, 0.01
-"""Speeds of walks whose body faces one way, m/s, the share of the standing pose at rest, and the
-distance up to which who turns is at the place, m."""
+"""Of walks with a facing: speeds, m/s, share of the standing pose at rest, least way of a turn."""
 FACING_NOTE = "steps to the side, backwards and on the spot are synthesised: none was captured"
 # Frames between the points at which controls are solved, and the most points of mean offsets.
 STEP, OFFSET_POINTS = 6, 12

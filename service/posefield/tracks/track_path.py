@@ -2,9 +2,8 @@
 
 Between samples a path is a cubic without overshoot, so a person who stops does not swing beyond the
 place. It is averaged with a kernel that keeps parabolas: noise goes, and starts, stops and curves
-of walkers stay. At the corner of a route that a simulator walks at constant speed a person slows
-down, cuts it by some centimetres, and catches up. Where the path still changes its velocity as no
-walker does, it is averaged over longer. The distance from the track is told.
+of walkers stay. At a corner at constant speed a person slows down, cuts it, and catches up. Where
+velocities still change as no walker's do, it is averaged over longer. The distance is told.
 """
 
 from dataclasses import dataclass

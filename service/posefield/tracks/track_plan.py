@@ -23,12 +23,8 @@ KNOT_SECONDS = 0.2
 
 def find_striders(gait: Gait) -> tuple[Strider, ...]:
     """Return the strides of each combination of labels; the last one has none."""
-    return step_plan.find_striders(
-        [
-            Walker(gait, weights[None], offset, {})
-            for weights, offset in zip(gait.labels.weights, gait.performer_offsets, strict=True)
-        ]
-    )
+    pairs = zip(gait.labels.weights, gait.performer_offsets, strict=True)
+    return step_plan.find_striders([Walker(gait, row[None], offset, {}) for row, offset in pairs])
 
 
 def plan_people(
