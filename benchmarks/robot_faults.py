@@ -1,6 +1,7 @@
 """Broken gaits of a robot planted among good ones: how many the doctor finds, and false alarms.
 
-    python benchmarks/robot_faults.py build/data/robot_go_bdx --record
+    python examples/biped_gaits.py build/biped
+    python benchmarks/robot_faults.py build/data/robot_go_bdx build/biped --record
 
 Four gaits of the folder are broken at a time, each in another way: one joint of each, at random,
 where that changes its angle by a degree or more (root mean square). Gaits that are told without a
@@ -76,8 +77,9 @@ def broken(motion: RobotMotion, kind: str, rng: np.random.Generator) -> RobotMot
     return replace(motion, angles=angles) if change >= LEAST else None
 
 
-def measure(robot: Robot, motions: list[RobotMotion], with_robot: bool) -> list[Row]:
+def measure(folder: Path, with_robot: bool) -> list[Row]:
     """Return the share of broken gaits that are missed, by kind, and of good ones that are told."""
+    robot, motions = read(folder)
     rng = np.random.default_rng(0)
     kinds = [kind for kind in (*FAULTS, EXCHANGED) for _ in range(TRIALS)]
     rng.shuffle(kinds)
@@ -99,7 +101,7 @@ def measure(robot: Robot, motions: list[RobotMotion], with_robot: bool) -> list[
         false.append(float(np.mean([index in outliers for index in sound])))
         sys.stderr.write(f"{start + AT_ONCE} of {len(kinds)}\n")
     everything = [each for kind in missed.values() for each in kind]
-    name = "robot known" if with_robot else "joints alone"
+    name = f"{robot.name.removesuffix('.xml')}, {'with robot' if with_robot else 'joints alone'}"
     goals = (5.0, 2.0) if with_robot else (None, None)
     about = f"{sum(everything)} of {len(everything)}"
     told = f"{100 * np.mean(false) * len(motions) / 100:.1f} of {len(motions)}"
@@ -123,16 +125,19 @@ def measure(robot: Robot, motions: list[RobotMotion], with_robot: bool) -> list[
 def main() -> None:
     """Measure, and print or record the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="folder with a robot and gaits")
+    parser.add_argument("folders", type=Path, nargs="+", help="folders with a robot and gaits")
     parser.add_argument(
         "--record", action="store_true", help="write docs/results/robot_faults.json"
     )
     options = parser.parse_args()
-    robot, motions = read(options.folder)
-    rows = [row for known in (True, False) for row in measure(robot, motions, known)]
+    rows = [
+        row for path in options.folders for known in (True, False) for row in measure(path, known)
+    ]
     sys.stdout.write(f"{table(rows)}\n")
     if options.record:
-        record({"robot_faults": rows}, "python benchmarks/robot_faults.py FOLDER --record", RESULTS)
+        record(
+            {"robot_faults": rows}, "python benchmarks/robot_faults.py FOLDERS --record", RESULTS
+        )
 
 
 if __name__ == "__main__":

@@ -44,8 +44,9 @@ def write(folder: Path) -> Path:
         rows.append(f"gaits/{path.name},{command},{FIRST},{FIRST + PERIOD}")
     (folder / "clips.csv").write_text("\n".join(rows) + "\n")
     controls = [
-        f'[[controls]]\nname = "{name}"\ncolumn = "{column}"\nunit = "m/s"\ndescription = "Command"'
-        for name, column in COMMANDS.items()
+        f'[[controls]]\nname = "{name}"\ncolumn = "{column}"\nunit = "{unit}"\n'
+        'description = "Command"'
+        for (name, column), unit in zip(COMMANDS.items(), ("m/s", "m/s", "rad/s"), strict=True)
     ]
     path = folder / "recipe.toml"
     path.write_text("\n".join([RECIPE, *controls]))

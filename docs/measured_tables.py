@@ -65,6 +65,10 @@ WISHES = {
         "processor time of reading and features": 10.0,
     },
     "found_families": {"clips of families: wrong": 5.0, "all actions: cuts missed": 5.0},
+    "robot_faults": {
+        "go_bdx, with robot: broken, missed": 1.0,
+        "biped, with robot: broken, missed": 1.0,
+    },
     "robot_gaits": {
         "tenths: joints": 0.6,
         "measured tenths: joints": 0.6,

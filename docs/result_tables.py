@@ -28,6 +28,7 @@ JUDGED = (
     "found_families",
     "found_models",
     "proposed_controls",
+    "robot_faults",
     "robot_gaits",
     "roles",
     "scaled",

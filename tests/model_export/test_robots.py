@@ -848,14 +848,16 @@ def test_a_clip_that_is_no_cycle_is_refused_by_a_recipe_of_cycles(family, robot,
     assert "open.json: joint 'left_shin' turns by 34.4 degrees from the last frame" in sentence
 
 
-def test_two_robots_in_one_call_are_told_apart(robot, tmp_path, command):
+def test_two_robots_in_one_call_are_told_apart(robot, file, tmp_path, command):
     sound = save(tmp_path, motion_of(robot), robot, "gmr.pkl").rename(tmp_path / "one.pkl")
     other = save(tmp_path, motion_of(robot), robot, "gmr.pkl")
     edited(other, lambda fields: fields | {"dof_pos": fields["dof_pos"][:, :-2]})
     code, out, errors = command("doctor", sound, other)
     assert code == 1
     assert "found 7 joints, expected the 9 of" in " ".join(errors.split())
-    assert "1 motions" in out
+    assert "1 motions, 0 with faults" in out
+    bent_knee = save(tmp_path, changed(standing(robot), "left_knee", bent), robot, "awd.json")
+    assert "limit 1" in command("doctor", bent_knee, "--robot", file)[1].splitlines()[-1]
 
 
 def test_a_clip_of_no_robot_is_no_reference_motion(walk_path, tmp_path, command):

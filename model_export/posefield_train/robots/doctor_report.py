@@ -1,6 +1,7 @@
 """The doctor's answer as text and as a picture."""
 
 import io
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,9 @@ MOST_DRAWN = 8
 def text(diagnoses: Sequence[Diagnosis]) -> str:
     """Return a paragraph for each motion and a line on all of them."""
     faulty = sum(bool(diagnosis.findings) for diagnosis in diagnoses)
-    total = f"{len(diagnoses)} motions, {faulty} with faults"
+    kinds = Counter(kind for each in diagnoses for kind in {f.kind for f in each.findings})
+    counts = ", ".join(f"{kind} {count}" for kind, count in sorted(kinds.items()))
+    total = f"{len(diagnoses)} motions, {faulty} with faults{counts and ': '}{counts}"
     return "\n".join([*("\n".join(_lines(diagnosis)) for diagnosis in diagnoses), total])
 
 
