@@ -136,7 +136,7 @@ export class Session {
         logSeverityLevel: 3,
       });
     } catch (fault) {
-      throw new ModelError(`onnxruntime cannot open ${values.join(", ")}`, { cause: fault });
+      throw new ModelError(`onnxruntime cannot open the model: ${fault}`, { cause: fault });
     }
   }
 }

@@ -4,7 +4,7 @@ import * as limits from "./constants.ts";
 import { InvalidField } from "./errors.ts";
 import { need, placeLeg } from "./feet.ts";
 import { findLegs, type Limb, LimbPoses, quaternionAt } from "./limbs.ts";
-import type { Model, Options, Poses } from "./model.ts";
+import { finite, type Model, type Options, type Poses, range } from "./model.ts";
 import type { Point } from "./session.ts";
 import { cycleOf, relativeRoot, type Stride } from "./strides.ts";
 import { meanBend } from "./two-bone.ts";
@@ -170,9 +170,8 @@ export class Walkers {
 
   /** Steer a walker from the next step on. */
   steer(index: number, { speed, turn: turned }: Steering): void {
-    if (!Number.isFinite(speed) || !Number.isFinite(turned))
-      throw new InvalidField("steering", `${speed} m/s, ${turned} rad/s, expected finite numbers`);
-    this.#walkers[index]!.steering = { speed: clamp(speed, 0, this.speeds[1]), turn: turned };
+    const within = clamp(finite("speed", speed), 0, this.speeds[1]);
+    this.#walkers[index]!.steering = { speed: within, turn: finite("turn", turned) };
   }
 
   /** Steer a walker to a point, x and z in m, where it stops unless `passes`. */
@@ -188,6 +187,7 @@ export class Walkers {
 
   /** Move all walkers on by some seconds, of a frame. */
   async step(seconds: number): Promise<void> {
+    range("seconds", seconds, 0, 3600, "s");
     const { card, session } = this.#model;
     const controls = this.#walkers.map((walker) => this.#accelerate(walker, seconds));
     const point = { ...this.#gait.point, controls };

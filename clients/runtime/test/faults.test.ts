@@ -30,6 +30,21 @@ test("a question is refused by the field that is wrong", async () => {
   );
 });
 
+test("walkers do not go back in time", async () => {
+  const walkers = await model.walkers(1);
+  for (const seconds of [-1 / 60, Number.NaN, Infinity])
+    await assert.rejects(walkers.step(seconds), names("seconds"));
+  await walkers.step(0);
+  assert.equal(walkers.state(0).z, 0);
+});
+
+test("a build that cannot start tells its reason", async () => {
+  const create = () => Promise.reject(new Error("fetching of the wasm failed"));
+  const ort = { env: { wasm: {} }, InferenceSession: { create }, Tensor: Object };
+  const broken = await load(content, { ort: ort as never });
+  await assert.rejects(broken.pose(model.defaults, 0), /fetching of the wasm failed/);
+});
+
 test("a file that is no model is refused", async () => {
   await assert.rejects(load(new TextEncoder().encode("no model")), ModelError);
   await assert.rejects(load(content.subarray(0, 5000)), ModelError);
