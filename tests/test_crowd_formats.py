@@ -32,23 +32,13 @@ def model():
 @pytest.fixture(scope="module")
 def crowd(model):
     """Two people on arcs, one of whom is there for a part of the time."""
-    tracks = [
-        track.of_arrays(
-            person,
-            10.0 + times,
-            np.column_stack(
-                [5.0 * np.sin(speed * times / 5.0), -5.0 * np.cos(speed * times / 5.0)]
-            ),
-        )
-        for person, (times, speed) in PEOPLE.items()
-    ]
-
-    def build():
-        return track_crowd.build_crowd(
-            model, model.gait, WalkQuestion(count=2, seconds=1.0, fps=FPS), tracks
-        )
-
-    return build
+    tracks = []
+    for person, (times, speed) in PEOPLE.items():
+        turns = speed * times / 5.0
+        points = 5.0 * np.column_stack([np.sin(turns), -np.cos(turns)])
+        tracks.append(track.of_arrays(person, 10.0 + times, points))
+    question = WalkQuestion(count=2, seconds=1.0, fps=FPS)
+    return lambda: track_crowd.build_crowd(model, model.gait, question, tracks)
 
 
 def save(crowd, model, path, **question):

@@ -6,6 +6,7 @@ import sys
 import time
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from clusters import started
 
@@ -37,9 +38,12 @@ def command(tracks, output, *words):
     return [sys.executable, "-m", "posefield", *words]
 
 
-def without_parts(words):
+def in_one_file(tracks, output, *more):
+    """Return the arrays of the people without parts."""
+    words = command(tracks, output, *more)
     at = words.index("--people-per-file")
-    return words[:at] + words[at + 2 :]
+    subprocess.run(words[:at] + words[at + 2 :], check=True, capture_output=True)
+    return dict(np.load(output))
 
 
 def run(*words):
@@ -64,17 +68,13 @@ def whole(tmp_path_factory):
 def test_parts_hold_the_people_of_one_crowd_on_one_clock(whole, tmp_path):
     folder, report = whole
     assert [part["file"] for part in report["parts"]] == NAMES
-    assert [name for part in report["parts"] for name in part["people"]] == [
-        f"p{person}" for person in range(COUNT)
-    ]
-    tracks = table(tmp_path / "tracks.csv")
-    words = without_parts(command(tracks, tmp_path / "all.bones.npz"))
-    subprocess.run(words, check=True, capture_output=True)
-    with np.load(tmp_path / "all.bones.npz") as one:
-        parts = [dict(np.load(folder / name)) for name in NAMES]
-        for name in ("time", "positions", "velocities"):
-            joined = np.concatenate([part[name] for part in parts])
-            np.testing.assert_array_equal(joined, one[name])
+    people = [name for part in report["parts"] for name in part["people"]]
+    assert people == [f"p{person}" for person in range(COUNT)]
+    one = in_one_file(table(tmp_path / "tracks.csv"), tmp_path / "all.bones.npz")
+    parts = [dict(np.load(folder / name)) for name in NAMES]
+    for name in ("time", "positions", "velocities"):
+        joined = np.concatenate([part[name] for part in parts])
+        np.testing.assert_array_equal(joined, one[name])
 
 
 @pytest.mark.system
@@ -117,23 +117,22 @@ def test_unusable_people_are_refused_or_named(tmp_path):
     assert failed.returncode == 3
     assert "person 'p0': jumps" in failed.stderr
     assert list((tmp_path / "a").iterdir()) == []
-    report = run(tracks, tmp_path / "a.bones.npz", "--skip-bad")
+    report = run(tracks, tmp_path / "a.bones.npz", "--skip-bad", "-o", str(tmp_path / "a.arrow"))
     assert list(report["skipped"]) == ["p0", "p3", "p4", "p5"]
     # A part of nobody has no file, and the clock begins with the first who is there.
     assert [part["file"] for part in report["parts"]] == [NAMES[0], None, NAMES[2]]
-    words = [*without_parts(command(tracks, tmp_path / "all.bones.npz")), "--skip-bad"]
-    subprocess.run(words, check=True, capture_output=True)
-    with np.load(tmp_path / "all.bones.npz") as one:
-        times = np.concatenate([np.load(tmp_path / "a" / NAMES[part])["time"] for part in (0, 2)])
-        assert report["begin"] == one["time"].min() == 0.5
-        np.testing.assert_array_equal(times, one["time"])
+    assert report["parts"][2]["files"] == [NAMES[2], "00002.arrow"]
+    rows = pa.ipc.open_stream((tmp_path / "a" / "00002.arrow").read_bytes()).read_all()
+    one = in_one_file(tracks, tmp_path / "all.bones.npz", "--skip-bad")
+    times = [np.load(tmp_path / "a" / NAMES[part])["time"] for part in (0, 2)]
+    np.testing.assert_array_equal(rows["time"], times[1])
+    assert report["begin"] == one["time"].min() == 0.5
+    np.testing.assert_array_equal(np.concatenate(times), one["time"])
 
 
 def test_the_worst_limits_come_first():
-    people = [
-        of_arrays(f"p{speed}", np.arange(4.0), np.outer(np.arange(4.0), [speed, 0.0]))
-        for speed in (3.0, 1.0, 5.0, 4.0)
-    ]
+    step, speeds = np.arange(4.0), (3.0, 1.0, 5.0, 4.0)
+    people = [of_arrays(f"p{speed}", step, np.outer(step, [speed, 0.0])) for speed in speeds]
     walk = posefield.load("cmu_walk").synthesizer
     facts = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=4), people).facts
     said = [line for line in facts["warnings"] if "faster than a walk" in line]

@@ -83,10 +83,8 @@ def usable_cores() -> int:
 def limit_threads() -> None:
     """Limit BLAS to one thread, unless the environment sets its number of threads.
 
-    Idle BLAS threads spin: with two threads a grid of sigma takes 1.5 to 8 times the CPU time,
-    and a crowd of takes twice as much.
-    The last bits of results depend on the number of threads, and worker processes
-    and exports have one.
+    Idle BLAS threads spin: with two, a grid of sigma takes 1.5 to 8 times the CPU time, a crowd of
+    takes twice. Last bits depend on their number, and worker processes and exports have one.
     """
     if not SINGLE_THREAD_ENV.keys() & os.environ.keys():
         threadpool_limits(1, user_api="blas")

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import version
+from os.path import getsize
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -50,15 +51,15 @@ class PartsJob:
     """Crowd of a file of tracks in parts.
 
     model, tracks: files. identity: of the model (name@contenthash). people: of each part. folder,
-    ending: of the parts. question, reading: as of a crowd in one file. skip_bad: whether unusable
-    tracks are left out and told.
+    endings: of the files of a part. question, reading: as of a crowd in one file. skip_bad: whether
+    unusable tracks are left out and told.
     """
 
     model: Path
     identity: str
     tracks: Path
     folder: Path
-    ending: str
+    endings: tuple[str, ...]
     people: int
     question: WalkQuestion
     reading: TrackReading
@@ -171,12 +172,12 @@ def write(
 def write_part(task: tuple[PartsJob, TrackShard]) -> dict[str, Any]:
     """Write one part unless it is there, and return its record; without people it has no file."""
     job, shard = task
-    path = job.folder / f"{shard.index:05}.{job.ending}"
+    paths = [job.folder / f"{shard.index:05}.{ending}" for ending in job.endings]
     record_path = job.folder / f"{shard.index:05}.json"
     digest = _digest(job, shard)
-    if path.is_file() and record_path.is_file():
+    if all(path.is_file() for path in (*paths, record_path)):
         record: dict[str, Any] = orjson.loads(record_path.read_bytes())
-        if record["made_from"] == digest and record["bytes"] == path.stat().st_size:
+        if record["made_from"] == digest and record["bytes"] == sum(map(getsize, paths)):
             return record
     tracks = track.check(_tracks(job, shard), job.tracks, job.skip_bad)
     model = _open(job.model, job.identity)
@@ -195,13 +196,14 @@ def write_part(task: tuple[PartsJob, TrackShard]) -> dict[str, Any]:
     }
     if crowd.people:
         clip = track_crowd.crowd_clip(crowd)
-        crowd_formats.write(clip, path, question, model.session.card.roles)
+        crowd_formats.write_files(clip, paths, question, model.session.card.roles)
         excess = [round(limit.excess, 3) for limit in crowd.limits]
         record |= {name: clip.facts[name] for name in ("people", "path_error_cm", "warnings")}
         # Lines about pairs of people come before those about one.
         record["excess"] = [0.0] * (len(record["warnings"]) - len(excess)) + excess
-        record |= {"file": path.name, "bytes": path.stat().st_size}
-    else:
+        names = [path.name for path in paths]
+        record |= {"file": names[0], "files": names, "bytes": sum(map(getsize, paths))}
+    for path in [] if crowd.people else paths:
         path.unlink(missing_ok=True)
     atomic_files.write(orjson.dumps(record), record_path)
     return record
@@ -235,7 +237,7 @@ def _digest(job: PartsJob, shard: TrackShard) -> str:
     """Return the digest of all that determines the bytes of a part."""
     facts = {
         "model": job.identity,
-        "ending": job.ending,
+        "endings": job.endings,
         "question": structs.asdict(job.question),
         "skip_bad": job.skip_bad,
         "begin": shard.begin,

@@ -95,11 +95,12 @@ DEFAULT_COUNT = 500
 def crowd(
     model: ModelPath,
     output: Annotated[
-        Path,
+        list[Path],
         typer.Option(
             "--output",
             "-o",
-            help="output file: usd, usda, usdc, usdz, npz, bones.npz, arrow, osi, carla.npz or sdf",
+            help="output file: usd, usda, usdc, usdz, npz, bones.npz, arrow, osi, carla.npz or sdf;"
+            " may be given again with other endings, for the same motions computed once",
         ),
     ],
     question: WalkQuestion,

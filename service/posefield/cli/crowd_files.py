@@ -4,6 +4,7 @@ import codecs
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -32,17 +33,16 @@ from posefield.tracks.track_files import TrackReading
 def write_crowd(
     model: Synthesizer,
     question: WalkQuestion,
-    output: Path,
+    outputs: list[Path],
     tracks: TrackSet | None = None,
 ) -> dict[str, Any]:
-    """Write a crowd to a file, and return its report as plain values.
+    """Write a crowd to files, and return its report as plain values.
 
-    tracks: that its people follow; None for random paths.
-
-    Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
-    written.
+    tracks: that its people follow; None for random paths. Raises InvalidField for an invalid query
+    or extension, and FileError if a file cannot be written.
     """
-    crowd_formats.ending_of(output, question)
+    for output in outputs:
+        crowd_formats.ending_of(output, question)
     opened = gait.fit_gait(model.session)
     if tracks is None:
         crowd = walking_feet.build_crowd(model, opened, question)
@@ -50,9 +50,10 @@ def write_crowd(
         crowd = track_crowd.build_crowd(model, opened, question, tracks.tracks)
     feet = _FootSkateMeter(opened, question.fps)
     watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
-    crowd_formats.write(watched, output, question, model.session.card.roles)
+    crowd_formats.write_files(watched, outputs, question, model.session.card.roles)
     return {
-        "file": str(output),
+        "file": str(outputs[0]),
+        "files": [str(output) for output in outputs],
         "model": crowd.facts["model"],
         "characters": len(crowd.motion),
         "motions": question.motions or len(crowd.motion),
@@ -73,17 +74,24 @@ def write_crowd(
 def parts_job(
     model: Path,
     tracks: Path,
-    output: Path,
+    outputs: list[Path],
     people: int,
     question: WalkQuestion,
     reading: TrackReading,
     skip_bad: bool,
 ) -> PartsJob:
-    """Return the job of a crowd in parts, in a folder named as the output without its ending."""
-    ending = crowd_formats.ending_of(output, question)
-    folder = output.with_name(output.name.removesuffix(f".{ending}"))
+    """Return the job of a crowd in parts, in a folder named as the outputs without their endings.
+
+    Raises InvalidField for outputs of several names, and as `crowd_formats.ending_of` does.
+    """
+    endings = tuple(crowd_formats.ending_of(output, question) for output in outputs)
+    pairs = zip(outputs, endings, strict=True)
+    names = (path.with_name(path.name.removesuffix(f".{end}")) for path, end in pairs)
+    folder, *more = dict.fromkeys(names)
+    if more:
+        raise InvalidField("output", f"{folder} and {more[0]}, expected one name for all parts")
     identity = open_model(model).identity
-    return PartsJob(model, identity, tracks, folder, ending, people, question, reading, skip_bad)
+    return PartsJob(model, identity, tracks, folder, endings, people, question, reading, skip_bad)
 
 
 def write_parts(job: PartsJob, workers: int | None, scheduler: str | None) -> dict[str, Any]:
@@ -119,12 +127,8 @@ def parts_text(manifest: dict[str, Any], folder: Path) -> str:
         f"smoothed paths are {worst:.1f} cm away from their tracks at most",
     ]
     skipped = track_crowd.left_out(manifest["skipped"])
-    warnings = [
-        pair
-        for record in records
-        for pair in zip(record["excess"], record["warnings"], strict=True)
-    ]
-    worst_first = [line for _, line in sorted(warnings, key=lambda pair: -pair[0])]
+    pairs = (zip(record["excess"], record["warnings"], strict=True) for record in records)
+    worst_first = [line for _, line in sorted(chain(*pairs), key=lambda pair: -pair[0])]
     return "\n".join(lines + track_crowd.shorten(skipped) + track_crowd.shorten(worst_first))
 
 
@@ -142,16 +146,13 @@ def routes(path: Path) -> Sequence[Route]:
 
     Raises FileError for a file that is not JSON, and InvalidField for invalid routes.
     """
-    return locomotion_plan.parse_routes(_read_json(path))
-
-
-def _read_json(path: Path) -> Any:
     try:
-        return orjson.loads(path.read_bytes().removeprefix(codecs.BOM_UTF8))
+        plain = orjson.loads(path.read_bytes().removeprefix(codecs.BOM_UTF8))
     except OSError as fault:
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
     except orjson.JSONDecodeError as fault:
         raise FileError(path, f"not JSON: {fault}") from fault
+    return locomotion_plan.parse_routes(plain)
 
 
 @dataclass(frozen=True)
@@ -174,27 +175,18 @@ class _FootSkateMeter:
     def facts(self) -> dict[str, float]:
         if not self.samples:
             return {}
-        return {
-            "skate_cm_per_s": round(100.0 * float(np.concatenate(self.samples).mean()), 2),
-            "skate_strides_cm_per_s": round(
-                100.0 * walking_crowd.mean_foot_skate(self.gait, self.rate), 2
-            ),
-            **self._standing_facts(),
+        facts = {
+            "skate_cm_per_s": np.concatenate(self.samples).mean(),
+            "skate_strides_cm_per_s": walking_crowd.mean_foot_skate(self.gait, self.rate),
         }
-
-    def _standing_facts(self) -> dict[str, float]:
-        """Return the facts about feet that were made to stand; none for feet as predicted."""
-        if not self.standing:
-            return {}
-        before, drift, lowered = (
-            100.0 * np.concatenate([getattr(feet, name) for feet in self.standing])
-            for name in ("skate_before", "drift", "lowered")
-        )
-        return {
-            "skate_before_cm_per_s": round(float(before.mean()), 2),
-            "drift_cm": round(float(drift.max()), 2),
-            "lowered_cm": round(float(lowered.max()), 2),
-        }
+        if self.standing:
+            before, drift, lowered = (
+                np.concatenate([getattr(feet, name) for feet in self.standing])
+                for name in ("skate_before", "drift", "lowered")
+            )
+            facts["skate_before_cm_per_s"] = before.mean()
+            facts |= {"drift_cm": drift.max(), "lowered_cm": lowered.max()}
+        return {name: round(100.0 * float(metres), 2) for name, metres in facts.items()}
 
 
 def _with_progress(crowd: CrowdClip, motions: int, feet: _FootSkateMeter) -> CrowdClip:
@@ -214,8 +206,8 @@ def report_text(facts: dict[str, Any]) -> str:
     """Return the report of a crowd as text."""
     shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
     lines = [
-        f"{facts['file']}: {facts['characters']} characters, {facts['frames']} frames at "
-        f"{facts['rate']:g} a second, seed {facts['seed']}",
+        f"{', '.join(facts['files'])}: {facts['characters']} characters, {facts['frames']} "
+        f"frames at {facts['rate']:g} a second, seed {facts['seed']}",
         f"poses at each level of detail, the finest first: {', '.join(shares)}",
     ]
     if "skate_cm_per_s" in facts:

@@ -40,7 +40,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises FileError if it cannot be written.
     """
-    with _temporary_folder(path) as folder:
+    with temporary_folder(path) as folder:
         yield folder / path.name
         _move_into_place(folder / path.name, path)
 
@@ -52,7 +52,7 @@ def replacing_pair(path: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
     The folder is replaced first, so that the file never refers to missing ones. After an error the
     previous file and folder are kept or restored. Raises FileError if they cannot be written.
     """
-    with _temporary_folder(path) as room:
+    with temporary_folder(path) as room:
         new, old = room / "new", room / "old"
         new.mkdir()
         yield room / path.name, new
@@ -65,8 +65,8 @@ def replacing_pair(path: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
 
 
 @contextmanager
-def _temporary_folder(path: Path) -> Iterator[Path]:
-    """Yield a temporary folder beside the path, on the same disk."""
+def temporary_folder(path: Path) -> Iterator[Path]:
+    """Yield a temporary folder beside the path, on the same disk; FileError if it cannot be."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing.") as name:

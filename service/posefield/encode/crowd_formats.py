@@ -1,7 +1,8 @@
 """Table of the files of crowds, by the ending of their names."""
 
+import pickle
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from posefield.common import atomic_files
@@ -75,3 +76,21 @@ def write(crowd: CrowdClip, path: Path, question: WalkQuestion, roles: Roles) ->
     else:
         with atomic_files.replacing(path) as temporary:
             form.write(crowd, temporary, roles)
+
+
+def write_files(crowd: CrowdClip, paths: list[Path], question: WalkQuestion, roles: Roles) -> None:
+    """Write a crowd to several files, each as `write` does, of motions that are computed once.
+
+    A temporary file beside the first has the motions meanwhile, half a kilobyte a pose.
+    """
+    if len(paths) == 1:
+        write(crowd, paths[0], question, roles)
+        return
+    with atomic_files.temporary_folder(paths[0]) as folder, (folder / "spool").open("w+b") as file:
+        for batch in crowd.batches:
+            pickle.dump(batch, file, protocol=pickle.HIGHEST_PROTOCOL)
+        size = file.tell()
+        for path in paths:
+            file.seek(0)
+            batches = (pickle.load(file) for _ in iter(lambda: file.tell() < size, False))
+            write(replace(crowd, batches=batches), path, question, roles)

@@ -105,11 +105,6 @@ def numbers(field: int) -> Layout:
     return message(field, *(Layout(varint(n << 3 | 1) + bytes(8), (1,)) for n in (1, 2, 3)))
 
 
-def text(field: int, value: str) -> Layout:
-    """Return a field with a text."""
-    return message(field, Layout(value.encode()))
-
-
 @cache
 def _base_and_skeleton() -> tuple[Layout, Layout]:
     """Return the parts of a person that are equal for all but for their numbers."""
@@ -124,7 +119,9 @@ def moving_object(index: int, person: str) -> Layout:
     """Return the field of one person in a `GroundTruth`, with gaps for its numbers."""
     base, bones = _base_and_skeleton()
     identity = message(1, whole(1, index))
-    source = message(10, text(2, IDENTIFIER_TYPE), text(3, person))
+    source = message(
+        10, message(2, Layout(IDENTIFIER_TYPE.encode())), message(3, Layout(person.encode()))
+    )
     return message(5, identity, base, whole(3, PEDESTRIAN), source, bones)
 
 
@@ -298,16 +295,12 @@ def write_people(
     for run in runs:
         together = [motions[number] for number in run]
         begins = trace.people_begins(together[0].index)
+        firsts = [motion.first for motion in together]
+        records = [person_parts(motion, trace.layouts[motion.index], paths) for motion in together]
         spans = [
-            (
-                motion.first,
-                motion.first + len(motion),
-                person_parts(motion, trace.layouts[motion.index], paths),
-            )
-            for motion in together
+            (first, first + len(rows), rows) for first, rows in zip(firsts, records, strict=True)
         ]
-        firsts, stops, _ = zip(*spans, strict=True)
-        for frame in range(min(firsts), max(stops)):
+        for frame in range(min(firsts), max(stop for _, stop, _ in spans)):
             os.pwritev(
                 file,
                 [rows[frame - first] for first, end, rows in spans if first <= frame < end],
@@ -323,15 +316,13 @@ def person_parts(
     records = np.empty((frames, size), np.uint8)
     records[:] = np.frombuffer(layout.data, np.uint8)
     values = person_numbers(motion, paths)
+    steps = size, gaps[1] - gaps[0]
     for first in range(0, BASE, 3):
-        vector: Floats = np.ndarray(
-            (frames, 3), "<f8", records, gaps[first], (size, gaps[1] - gaps[0])
-        )
+        vector: Floats = np.ndarray((frames, 3), "<f8", records, gaps[first], steps)
         vector[:] = values[:, first : first + 3]
     # All bones take equally many bytes, and so do their vectors.
-    steps = (gaps[BASE + step] - gaps[BASE] for step in (12, 3, 1))
-    bones: Floats = np.ndarray(
-        (frames, len(paths) + 1, 4, 3), "<f8", records, gaps[BASE], (size, *steps)
-    )
+    strides = size, *(gaps[BASE + step] - gaps[BASE] for step in (12, 3, 1))
+    shape = frames, len(paths) + 1, 4, 3
+    bones: Floats = np.ndarray(shape, "<f8", records, gaps[BASE], strides)
     bones[:] = values[:, BASE:].reshape(bones.shape)
     return records

@@ -258,14 +258,10 @@ def nlerp(
     return mixed
 
 
-def _dot(
-    a: Annotated[Numbers, "*batch 4"], b: Annotated[Numbers, "*batch 4"]
-) -> Annotated[Numbers, "*batch"]:
+def _dot(a: Numbers, b: Numbers) -> Numbers:
     """Return the inner products; sums of four columns take a fifth of the time of a reduction."""
-    products = a * b
-    w, x, y, z = (products[..., axis] for axis in range(4))
-    total: Numbers = w + x + y + z
-    return total
+    w, x, y, z = np.moveaxis(a * b, -1, 0)
+    return np.asarray(w + x + y + z)
 
 
 def smoothstep(shares: Annotated[Numbers, "*batch"]) -> Annotated[Numbers, "*batch"]:
