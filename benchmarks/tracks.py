@@ -111,7 +111,9 @@ def walk(model: Synthesizer, kinds: Kinds, copies: int = COPIES, takes: int = 0)
     people, performers = [], len(model.gait.labels.weights) - 1
     copies = takes * performers or copies
     for name, (times, points, angles) in kinds.items():
-        people += [track.of_arrays(f"{name}#{i}", times, points, angles) for i in range(copies)]
+        faced = None if angles is None else track.floor_headings(angles)
+        walked = track.floor_points(*points.T)
+        people += [track.Track(f"{name}#{i}", times, walked, faced) for i in range(copies)]
     order = WalkQuestion(count=len(people), fps=RATE, take="index" if takes else 0)
     crowd = track_crowd.find_people(model, model.gait, order, people)
     if takes:

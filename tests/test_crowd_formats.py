@@ -35,8 +35,8 @@ def crowd(model):
     tracks = []
     for person, (times, speed) in PEOPLE.items():
         turns = speed * times / 5.0
-        points = 5.0 * np.column_stack([np.sin(turns), -np.cos(turns)])
-        tracks.append(track.of_arrays(person, 10.0 + times, points))
+        points = track.floor_points(5.0 * np.sin(turns), -5.0 * np.cos(turns))
+        tracks.append(track.Track(person, 10.0 + times, points))
     question = WalkQuestion(count=2, seconds=1.0, fps=FPS)
     return lambda: track_crowd.build_crowd(model, model.gait, question, tracks)
 

@@ -13,7 +13,7 @@ from clusters import started
 import posefield
 from posefield.question.walk_question import WalkQuestion
 from posefield.tracks import track_crowd
-from posefield.tracks.track import of_arrays
+from posefield.tracks.track import Track
 
 COUNT, SIZE = 7, 3
 NAMES = ["00000.bones.npz", "00001.bones.npz", "00002.bones.npz"]
@@ -132,7 +132,7 @@ def test_unusable_people_are_refused_or_named(tmp_path):
 
 def test_the_worst_limits_come_first():
     step, speeds = np.arange(4.0), (3.0, 1.0, 5.0, 4.0)
-    people = [of_arrays(f"p{speed}", step, np.outer(step, [speed, 0.0])) for speed in speeds]
+    people = [Track(f"p{speed}", step, 1j * speed * step) for speed in speeds]
     walk = posefield.load("cmu_walk").synthesizer
     facts = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=4), people).facts
     said = [line for line in facts["warnings"] if "faster than a walk" in line]

@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import re
 import runpy
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +31,7 @@ from posefield.robots.robot_motion import RobotMotion
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.report import robot_feasibility
 from posefield_train.robots import doctor, robot_dynamics, robot_file
+from posefield_train.source import ingest
 
 EXAMPLE = Path(__file__).parents[2] / "examples/biped_gaits.py"
 # A biped whose left leg branches before its right, with a hinge beside its body's origin, a body
@@ -475,6 +477,21 @@ def family(robot, file, tmp_path_factory):
     recipe = posefield_train.read_recipe(folder / "recipe.toml")
     posefield_train.export(posefield_train.train(recipe, folder), folder / "biped.onnx")
     return folder
+
+
+def test_the_guides_recipe_reads_gaits_without_doubt_of_their_unit(family, file, tmp_path):
+    guide = Path(__file__).parents[2] / "docs/guide/robots.md"
+    recipe = re.search(r"```toml\n(schema = 1.*?)```", guide.read_text(), re.S)[1]
+    for number in range(8):
+        (tmp_path / f"{number}.json").write_bytes((family / f"{number}.json").read_bytes())
+    (tmp_path / "recipe.toml").write_text(recipe)
+    (tmp_path / "robot.xml").write_text(file.read_text())
+    rows = [f"{number}.json,{number},0,0,40" for number in range(8)]
+    (tmp_path / "clips.csv").write_text("\n".join(["file,vx,yaw,start,end", *rows]) + "\n")
+    recipe = posefield_train.read_recipe(tmp_path / "recipe.toml")
+    examples, notes = ingest.ingest(recipe, tmp_path)
+    assert len(examples) == 8
+    assert not any("metres_per_unit" in note for note in notes)
 
 
 def test_a_model_of_a_robot_answers_with_its_angles_between_the_commands(family, robot):

@@ -142,6 +142,7 @@ def ingest(
     except RigError as fault:
         row = rows[fault.clip]
         raise row.error(f"{row.file}: {fault}") from fault
+    notes += rig_notes if robot else [*rig_notes, *skeleton_checks.size_notes(clips)]
     clips.reverse()
     canonical.return_freed_memory()
     examples, changes, positions = list[Example](), list[float](), list[Positions]()
@@ -152,7 +153,7 @@ def ingest(
         positions.append(captured.positions())
     landmarks = [example.landmarks for example in examples]
     measured_controls.expect_same_order(recipe.landmark_names, rows, landmarks)
-    notes += [*rig_notes, *stretch_notes(rows, changes)]
+    notes += stretch_notes(rows, changes)
     canonical.return_freed_memory()
     recordings, recording_notes = clip_table.stated_recordings(rows), list[str]()
     if recordings is None:

@@ -237,11 +237,11 @@ def leg_length(joints: Skeleton, roles: Mapping[str, str], bones: Floats) -> flo
     return float(np.mean(lengths)) if lengths else None
 
 
-def size_notes(joints: Skeleton, bones: Floats) -> list[str]:
-    """Return a note on a body that is far from a person's size, as in a wrong unit.
-
-    bones (J,): length of the bone that leads to each joint, m.
-    """
+def size_notes(clips: Sequence[Clip]) -> list[str]:
+    """Return a note on a body that is far from a person's size, as in a wrong unit."""
+    joints = clips[0].skeleton
+    offsets = np.median([clip.translations.mean(axis=0) for clip in clips], axis=0)
+    bones = np.linalg.norm(offsets, axis=-1) * (np.arange(len(offsets)) > 0)
     guesses = joint_recognition.recognise(joints.names, joints.parents)
     leg = leg_length(joints, joint_recognition.sure_roles(guesses), bones)
     doubt = "is source.metres_per_unit right?"
@@ -299,7 +299,6 @@ def normalize(
                 "bones with a length",
                 index,
             )
-    notes += size_notes(clips[0].skeleton, np.linalg.norm(np.median(offsets, axis=0), axis=-1))
     stretch = None if stretches else find_stretch(clips)
     if stretch:
         raise RigError(stretch.sentence(clips[0].skeleton), stretch.clip)

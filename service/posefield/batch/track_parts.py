@@ -122,12 +122,13 @@ class _Spools:
             TrackShard(index, self.file(index), np.inf, tuple(names[first : first + size]))
             for index, first in enumerate(range(0, len(names), size))
         ]
-        begins, facing = [np.inf], np.zeros(3, complex)
+        begins, facing, skipped = [np.inf], np.zeros(3, complex), dict[str, str]()
         for shard in shards:
-            usable = track.check(_tracks(self.job, shard), path, self.job.skip_bad).tracks
-            begins += [float(person.times[0]) for person in usable]
-            facing += track.facing(usable)
-        track.check_file(path, len(names), len(begins) - 1, facing)
+            checked = track.check(_tracks(self.job, shard), path, self.job.skip_bad)
+            begins += [float(person.times[0]) for person in checked.tracks]
+            facing += track.facing(checked.tracks)
+            skipped |= checked.skipped
+        track.check_file(path, len(names), skipped, facing)
         return [replace(shard, begin=min(begins)) for shard in shards]
 
 

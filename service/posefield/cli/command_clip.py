@@ -133,6 +133,10 @@ def crowd(
     skip_bad: Annotated[
         bool, typer.Option(help="leave out, and name, people whose trajectory is unusable")
     ] = False,
+    split: Annotated[
+        float | None,
+        typer.Option(min=0.01, help="seconds without a sample after which people return as ID~2"),
+    ] = None,
     people_per_file: Annotated[
         int | None,
         typer.Option(
@@ -161,10 +165,10 @@ def crowd(
     from posefield.cli import crowd_files
 
     process_pool.limit_threads()
+    reading = TrackReading(heading_unit, y_down, split)
     if people_per_file is not None:
         if trajectories is None or paths or count is not None:
             raise InvalidField("people_per_file", "expected with trajectories alone")
-        reading = TrackReading(heading_unit, y_down)
         job = crowd_files.parts_job(
             model, trajectories, output, people_per_file, question, reading, skip_bad
         )
@@ -180,7 +184,6 @@ def crowd(
     if trajectories:
         if paths:
             raise InvalidField("paths", "given with trajectories, expected one of both")
-        reading = TrackReading(heading_unit, y_down)
         tracks = track_files.read_tracks(trajectories, reading, skip_bad)
         count = len(tracks.tracks)
     question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)

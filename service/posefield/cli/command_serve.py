@@ -14,8 +14,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
@@ -172,7 +171,7 @@ def demo(
     """
     # Both end the service too, by `_served`. A shell starts commands in the background with SIGINT
     # ignored, and Python keeps it so unless told otherwise.
-    before = {number: signal.signal(number, _exit_on_signal) for number in STOP_SIGNALS}
+    before = {number: signal.signal(number, lambda *_: sys.exit(0)) for number in STOP_SIGNALS}
     try:
         _show(output, port, browser, once)
     finally:
@@ -239,10 +238,6 @@ def _fetch(url: str, body: bytes | None) -> bytes:
     except urllib.error.HTTPError as refusal:
         with refusal:
             raise MotionError(f"{url}: {refusal.read().decode()}") from refusal
-
-
-def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:
-    raise SystemExit(0)
 
 
 def _has_desktop() -> bool:

@@ -24,7 +24,7 @@ from functools import partial
 from multiprocessing import synchronize
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
 import uvicorn
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
@@ -196,7 +196,7 @@ def serve(sources: Sequence[str | Path], settings: Settings) -> None:
     unavailable address and WorkerDied if worker processes cannot start.
     """
     # Also needed after uvicorn has returned: it raises the signal that ended it again.
-    signal.signal(signal.SIGTERM, _exit_on_signal)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     _raise_open_files()
     source_names = tuple(map(str, sources))
     models = open_models(source_names, settings)
@@ -394,7 +394,3 @@ def _raise_open_files() -> None:
     """Raise the limit on open files, and so on connections, to the hard limit."""
     _, hard_limit = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard_limit, hard_limit))
-
-
-def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:
-    raise SystemExit(0)

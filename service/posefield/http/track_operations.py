@@ -102,9 +102,9 @@ def read_tracks(body: TracksBody, limit: int) -> TrackSet:
             pointer = f"tracks/{index}/{problem.column}/{problem.sample}"
             raise InvalidField(pointer, problem.message)
     if not tracks:
-        raise InvalidField(
-            "tracks", f"all {len(skipped)} people are unusable, expected one or more"
-        )
+        name, why = next(iter(skipped.items()))
+        text = f"all {len(skipped)} people are unusable, the first {name!r}: {why}"
+        raise InvalidField("tracks", text)
     mirrored = track.find_mirror(track.facing(tracks))
     if mirrored is not None:
         raise InvalidField("tracks", mirrored)

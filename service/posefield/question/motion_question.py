@@ -193,10 +193,6 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.exact != "auto" or bool(self.targets) or bool(self.take) or self.detail
 
 
-CONSTRAINING = ("targets", "feet", "floor")
-"""Fields that constrain an answer whatever their value, unless it is empty."""
-
-
 class PoseQuestion(MotionQuestion, frozen=True, kw_only=True):
     """Query for poses of a motion."""
 

@@ -5,14 +5,14 @@ point (x, y) is X = x, Z = -y, and an angle that counts from east against the cl
 a quarter turn more. `floor_points` and `floor_headings` are the only places where this is known.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from posefield.common.errors import FileError, InvalidField
+from posefield.common.errors import FileError
 from posefield.common.units import Floats, Indices
 from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion.floor_plane import FloorVectors
@@ -23,13 +23,18 @@ FASTEST = 12.0
 """Speed beyond which no person runs, m/s: a faster step is a jump if it is longer than `JUMP`."""
 JUMP = 0.5
 """Shortest jump, m."""
-MAX_SECONDS = 1e9
-"""Largest time stamp, s: a float64 still has 1e-7 s there."""
+MAX_SECONDS = 1e10
+"""Largest time stamp, s: clocks that count from 1970 are at 2e9, and a float64 has 2e-6 s here."""
 MAX_ANGLE = {"radians": 2.0 * np.pi + 0.01, "degrees": 360.0}
 """Largest heading of each unit, in that unit."""
 MIRRORED, FOLLOWED, MOVING = 0.9, 0.5, 0.5
 """Agreement of headings with the mirrored direction of travel from which on, and that with the
 direction itself up to which, y points down; speed from which on directions count, m/s."""
+
+
+def leg_name(person: str, leg: int) -> str:
+    """Return the id of a person who comes back: that of the first leg is the id itself."""
+    return person if leg == 1 else f"{person}~{leg}"
 
 
 def floor_points(
@@ -63,11 +68,6 @@ class Track:
         """Return the number of samples."""
         return len(self.times)
 
-    @property
-    def speeds(self) -> Annotated[Floats, "steps"]:
-        """Speed (S - 1,) between samples, m/s."""
-        return np.abs(np.diff(self.points)) / np.diff(self.times)
-
 
 class TrackProblem(NamedTuple):
     """First sample of a track that cannot be used, why, and the column that is at fault."""
@@ -100,24 +100,6 @@ class TrackRows:
     lines: Annotated[Indices, "rows"]
 
 
-def of_arrays(
-    person: str,
-    times: Annotated[Floats, "samples"],
-    points: Annotated[Floats, "samples 2"],
-    headings: Annotated[Floats, "samples"] | None = None,
-) -> Track:
-    """Return the track of points east and north (S, 2), m, and angles from east (S,), rad.
-
-    Raises InvalidField, which names the sample, for a track that cannot be walked.
-    """
-    turned = None if headings is None else floor_headings(headings)
-    track = Track(person, times, floor_points(*points.T), turned)
-    problem = find_problem(track)
-    if problem is not None:
-        raise InvalidField(f"tracks/{person}/{problem.sample}", problem.message)
-    return track
-
-
 def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> TrackSet:
     """Return the tracks of the rows of a file, in the order in which people appear.
 
@@ -136,16 +118,19 @@ def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> Tr
         if len(rows) > MAX_PEOPLE:
             raise FileError(path, f"more than {MAX_PEOPLE} people, expected at most as many")
     tracks = check((_joined(person, pieces) for person, pieces in rows.items()), path, skip_bad)
-    check_file(path, len(rows), len(tracks.tracks), facing(tracks.tracks))
+    check_file(path, len(rows), tracks.skipped, facing(tracks.tracks))
     return tracks
 
 
-def check_file(path: Path, people: int, usable: int, sums: Annotated[FloorVectors, "3"]) -> None:
-    """Raise FileError for a file without usable people, or with y down. sums: as of `facing`."""
+def check_file(
+    path: Path, people: int, skipped: Mapping[str, str], sums: Annotated[FloorVectors, "3"]
+) -> None:
+    """Raise FileError if all people are skipped, or y points down. sums: as of `facing`."""
     if not people:
         raise FileError(path, "no person in it, expected one or more")
-    if not usable:
-        raise FileError(path, f"all {people} people are unusable, expected one or more")
+    if people == len(skipped):
+        name, why = next(iter(skipped.items()))
+        raise FileError(path, f"all {people} people are unusable, the first {name!r}: {why}")
     mirrored = find_mirror(sums)
     if mirrored is not None:
         raise FileError(path, mirrored)
@@ -164,7 +149,8 @@ def check(tracks: Iterable[Track], path: Path, skip_bad: bool = False) -> TrackS
             continue
         line = int(track.lines[problem.sample])
         if not skip_bad:
-            raise FileError(path, f"person {track.person!r}: {problem.message}", line)
+            advice = "--skip-bad leaves such people out, --split parts them at jumps"
+            raise FileError(path, f"person {track.person!r}: {problem.message}; {advice}", line)
         skipped[track.person] = f"line {line}: {problem.message}"
     return TrackSet(tuple(usable), skipped)
 
@@ -209,7 +195,7 @@ def find_problem(track: Track) -> TrackProblem | None:
             text = f"time goes back from {before:g} s to {time:g} s, expected ascending times"
         return TrackProblem(at, text, "times")
     ways = np.abs(np.diff(track.points))
-    jumps = (ways > JUMP) & (ways > FASTEST * steps)
+    jumps = ways > np.maximum(JUMP, FASTEST * steps)
     if jumps.any():
         at = int(np.argmax(jumps))
         return TrackProblem(
@@ -228,8 +214,9 @@ def facing(tracks: Iterable[Track]) -> Annotated[FloorVectors, "3"]:
     sums = np.zeros(3, complex)
     for track in tracks:
         if track.headings is not None:
-            moving = track.speeds > MOVING
-            ways = np.diff(track.points)[moving]
+            ways = np.diff(track.points)
+            moving = np.abs(ways) > MOVING * np.diff(track.times)
+            ways = ways[moving]
             faces = np.exp(1j * track.headings[:-1][moving]) / np.abs(ways)
             sums += (faces @ np.conj(ways), -faces @ ways, len(ways))
     return sums

@@ -1,6 +1,7 @@
 """Crowds of people who walk along tracks."""
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -33,6 +34,8 @@ MOST_SPEED = 2.2
 """Speed up to which people walk, m/s; beyond it their feet slide, which is told."""
 FAR, ASIDE = 0.08, np.radians(45.0)
 """Distance from a track, m, and angle from a given heading, rad, that are told."""
+LONG_STEP, STEPS = 1.5, 5.0
+"""Time without a sample, s, and in usual steps of the track, beyond which it is told."""
 MOST_FRAMES = 1_000_000
 """Frames of a crowd's clock: nine hours at 30 frames a second, 0.4 GB a person."""
 MOST_LINES = 20
@@ -175,6 +178,8 @@ def find_people(
 
 def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
     """Return the number, phase, sway, height and take of a person by the hash of the id."""
+    # All legs of a person have the same looks.
+    person = re.sub(r"~\d+$", "", person)
     digest = hashlib.blake2b(f"{seed}:{person}".encode(), digest_size=40).digest()
     words = np.frombuffer(digest, "<u8")
     number, phase, sway, size = (words[:4] / 2.0**64).tolist()
@@ -302,6 +307,12 @@ def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:
 def _limits(crowd: TrackCrowd, person: Person) -> Iterator[PersonLimit]:
     """Yield what a walker cannot do as the track does, with the time, and what it does instead."""
     path, rate = person.path, crowd.question.fps
+    steps = np.diff(person.track.times)
+    late = int(np.argmax(steps))
+    excess = float(steps[late] / max(LONG_STEP, STEPS * np.median(steps)))
+    if excess > 1.0:
+        line = f"person {person.track.person!r} at {person.track.times[late]:.2f} s: no sample for "
+        yield PersonLimit(excess, f"{line}{steps[late]:.1f} s, and goes straight to the next one")
     speeds = np.abs(path.velocities)
     checks = [
         (speeds / MOST_SPEED, "{:.1f} m/s, faster than a walk: its feet slide", MOST_SPEED),

@@ -36,11 +36,13 @@ class TrackReading:
     """Conventions of a table that the file does not state.
 
     heading_unit: of the headings of a table, from east against the clock; they are refused without
-    it. y_down: whether y of a table points down, as in images; its angles turn over with it.
+    it. y_down: whether y of a table points down, as in images; its angles turn over with it. split:
+    time without a sample, s, after which, as after a jump, a person comes back as another leg.
     """
 
     heading_unit: HeadingUnit | None = None
     y_down: bool = False
+    split: float | None = None
 
 
 DEFAULT_READING = TrackReading()
@@ -69,6 +71,8 @@ def row_blocks(path: Path, reading: TrackReading = DEFAULT_READING) -> Iterator[
         raise InvalidField("trajectories", f"{path.name!r} ends in none of {', '.join(READERS)}")
     try:
         rows = reader(path, reading)
+        if reading.split is not None:
+            rows = _legs(rows, reading.split)
         while batch := list(itertools.islice(rows, BLOCK_ROWS)):
             people, *numbers, lines = zip(*batch, strict=True)
             times, x, y, angles = np.array(numbers, dtype=np.float64)
@@ -80,6 +84,18 @@ def row_blocks(path: Path, reading: TrackReading = DEFAULT_READING) -> Iterator[
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
     except UnicodeDecodeError as fault:
         raise FileError(path, f"no text in UTF-8: byte {fault.start}") from fault
+
+
+def _legs(rows: Iterator[Row], longest: float) -> Iterator[Row]:
+    """Yield rows whose people have another id after a jump or a longer time without a sample."""
+    before: dict[str, tuple[float, float, float, int]] = {}
+    for person, time, x, y, angle, line in rows:
+        then, east, north, leg = before.get(person, (time, x, y, 1))
+        step, distance = time - then, math.hypot(x - east, y - north)
+        if step > longest or (step > 0.0 and distance > max(track.JUMP, track.FASTEST * step)):
+            leg += 1
+        before[person] = time, x, y, leg
+        yield track.leg_name(person, leg), time, x, y, angle, line
 
 
 def _number(path: Path, text: str, name: str, line: int) -> float:
@@ -114,16 +130,13 @@ def _table_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
                 continue
             if len(cells) != len(head):
                 raise FileError(path, f"{len(cells)} cells, expected {len(head)}", lines.line_num)
-            numbers = [
-                _number(path, cells[column], head[column], lines.line_num)
-                for column in (0, 2, 3, *range(4, len(head)))
-            ]
-            angle = (
-                _angle(path, numbers[3], unit, lines.line_num)
-                if unit and numbers[3:]
-                else (math.nan)
+            line = lines.line_num
+            time, x, y, *angles = (
+                _number(path, cells[column], head[column], line)
+                for column in (0, *range(2, len(head)))
             )
-            yield cells[1].strip(), *numbers[:3], angle, lines.line_num  # type: ignore[misc]
+            angle = _angle(path, angles[0], unit, line) if unit and angles else math.nan
+            yield cells[1].strip(), time, x, y, angle, line
 
 
 def _angle(path: Path, value: float, unit: HeadingUnit, line: int) -> float:
@@ -253,12 +266,15 @@ class _XmlEvents:
 
 @dataclass
 class _SumoReader:
-    """Rows of the persons of SUMO's floating car data, as its elements come."""
+    """Rows of the persons on foot in SUMO's floating car data, as its elements come."""
 
     path: Path
     rows: list[Row]
     steps: list[tuple[float, float]] = field(default_factory=list)
+    last: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     time: float | None = None
+    riding: set[str] = field(default_factory=set)
+    legs: dict[str, int] = field(default_factory=dict)
 
     def end(self, name: str, text: str) -> None:
         """Take the end of an element: all is in its attributes."""
@@ -272,10 +288,18 @@ class _SumoReader:
                 raise FileError(self.path, "a person outside of a timestep", line)
             if "id" not in values:
                 raise FileError(self.path, "a person without id", line)
+            person = values["id"]
+            if values.get("vehicle"):
+                self.riding.add(person)
+                return
+            if person in self.riding:
+                self.riding.remove(person)
+                self.legs[person] = self.legs.get(person, 1) + 1
             x, y = (self._value(values, axis, line) for axis in "xy")
             # SUMO counts degrees from north with the clock.
             angle = math.radians(90.0 - self._value(values, "angle", line))
-            self.rows.append((values["id"], self.time, x, y, angle, line))
+            name = track.leg_name(person, self.legs.get(person, 1))
+            self.rows.append((name, self.time, x, y, angle, line))
             if "speed" in values:
                 self._check_unit(values, x, y, line)
 
@@ -303,9 +327,6 @@ class _SumoReader:
                         line,
                     )
         self.last[values["id"]] = (self.time or 0.0, x, y)
-
-    def __post_init__(self) -> None:
-        self.last: dict[str, tuple[float, float, float]] = {}
 
 
 @dataclass

@@ -52,8 +52,8 @@ class TrackPath:
 
 def follow(track: Track, origin: float, rate: float) -> TrackPath | None:
     """Return the path of a track at frames `origin + k / rate`, s; None for fewer than two."""
-    first = int(np.ceil((track.times[0] - origin) * rate - 1e-6))
-    last = int(np.floor((track.times[-1] - origin) * rate + 1e-6))
+    first = int(np.ceil((track.times[0] - origin) * rate - 1e-4))  # Times since 1970 are coarse.
+    last = int(np.floor((track.times[-1] - origin) * rate + 1e-4))
     if last <= first:
         return None
     times = origin + np.arange(first, last + 1) / rate
