@@ -144,7 +144,7 @@ def tell_quaternions(
             return readings[order], f"{order}: standing soles are level within {lengths}"
     raise file.error(
         "the base's quaternions can be read as w x y z and as x y z w: say --quaternions wxyz "
-        "(Kimodo, MuJoCo) or --quaternions xyzw (Unitree, LAFAN1)"
+        "(Kimodo, MuJoCo) or --quaternions xyzw (Unitree, LAFAN1); robot.quaternions in a recipe"
     )
 
 
