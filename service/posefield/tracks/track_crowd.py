@@ -178,8 +178,7 @@ def find_people(
 
 def _draw(person: str, seed: int) -> tuple[float, float, float, float, int]:
     """Return the number, phase, sway, height and take of a person by the hash of the id."""
-    # All legs of a person have the same looks.
-    person = re.sub(r"~\d+$", "", person)
+    person = re.sub(r"~\d+$", "", person)  # All legs of a person have the same looks.
     digest = hashlib.blake2b(f"{seed}:{person}".encode(), digest_size=40).digest()
     words = np.frombuffer(digest, "<u8")
     number, phase, sway, size = (words[:4] / 2.0**64).tolist()
