@@ -14,46 +14,37 @@ def check(*files):
     return subprocess.run(words, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize(
-    ("line", "fault"),
-    [
-        ('"""What the answer is held to."""', "'held to' in: "),
-        ('"""What the answer is."""', "begins with 'What'"),
-        ("# Somebody never seen.", "'Somebody' in: "),
-        ('said = f"nobody knows {name}"', "'nobody' in: "),
-        ('"""Return the answer."""', ""),
-        ("nobody = [somebody]", ""),
-        ('said = f"a {nobody} performer"', ""),
-    ],
-)
-def test_a_sentence_is_judged(line, fault, tmp_path):
-    file = tmp_path / "planted.py"
-    file.write_text(f"{line}\n")
-    done = check(file)
-    assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
+PYTHON = [
+    ('"""What the answer is held to."""', "'held to' in: "),
+    ('"""What the answer is."""', "begins with 'What'"),
+    ("# Somebody never seen.", "'Somebody' in: "),
+    ('said = f"nobody knows {name}"', "'nobody' in: "),
+    ('"""Return the answer."""', ""),
+    ("nobody = [somebody]", ""),
+    ('said = f"a {nobody} performer"', ""),
+]
+TYPESCRIPT = [
+    ("/** What the answer is. */", "begins with 'What'"),
+    ("const a = 1; // Whether it is.", "begins with 'Whether'"),
+    ("/** The answer.\n * It is held to a target. */", ":2: 'held to' in: "),
+    ('const a = "https://held to";', ""),
+    ("/** The answer. */", ""),
+]
+
+
+@pytest.mark.parametrize(("ending", "cases"), [("py", PYTHON), ("ts", TYPESCRIPT)])
+def test_sentences_of_sources_are_judged(ending, cases, tmp_path):
+    file = tmp_path / f"planted.{ending}"
+    for line, fault in cases:
+        file.write_text(f"{line}\n")
+        done = check(file)
+        assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
 
 
 def test_a_sentence_of_a_document_is_judged(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# A page\n\nWhoever asks is held to a target.\n")
     assert len(check(page).stdout.splitlines()) == 2
-
-
-@pytest.mark.parametrize(
-    ("line", "fault"),
-    [
-        ("/** What the answer is. */", "begins with 'What'"),
-        ("const a = 1; // Whether it is.", "begins with 'Whether'"),
-        ("/** The answer.\n * It is held to a target. */", ":2: 'held to' in: "),
-        ('const a = "https://held to";', ""),
-        ("/** The answer. */", ""),
-    ],
-)
-def test_a_comment_of_typescript_is_judged(line, fault, tmp_path):
-    file = tmp_path / "planted.ts"
-    file.write_text(f"{line}\n")
-    done = check(file)
-    assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
 
 
 def test_the_lint_step_runs_it():

@@ -79,7 +79,6 @@ def test_the_pooled_rival_is_one_peer_for_all_families(folder):
 
 
 MEASURED = [name for name in result_tables.SPEED if measured_tables.exists(name)]
-UNMEASURED = {*result_tables.SPEED} - {*MEASURED}
 
 
 def test_tables_of_speed_without_a_file_are_named():

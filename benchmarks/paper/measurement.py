@@ -155,8 +155,8 @@ def _size(
 ) -> Size:
     trained = over.trained_family.trained
     positions = over.positions(over.of(trained.full.truncated(ranks)))
-    compression = truncation_cost.tensor_compression(
-        trained.tensor, ranks, over.trained_family.samples.shape[1]
+    compression = truncation_cost.shape_compression(
+        trained.tensor.values.shape, ranks, over.trained_family.samples.shape[1]
     )
     return Size(
         name,

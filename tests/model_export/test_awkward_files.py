@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from random import Random
 
 import numpy as np
 import pytest
@@ -283,40 +282,3 @@ def test_a_command_reads_the_file_or_says_why_not(posefield, tmp_path, monkeypat
     assert [part for part in case.said if part not in said] == [], said
     if not code and "-o" in case.command:
         assert (tmp_path / case.command.split()[-1]).stat().st_size
-
-
-PIECES = [
-    "0",
-    "-1",
-    "1e9",
-    "nan",
-    "}",
-    "{",
-    "JOINT x",
-    "End Site",
-    "\n",
-    ",",
-    ";",
-    '"',
-    "=",
-    "[",
-    "é",
-]
-
-
-def damaged(content: bytes, chance: Random) -> bytes:
-    """A text with a line taken away, doubled or moved, or with a piece in a wrong place."""
-    lines = content.decode("latin-1").split("\n")
-    at, other = chance.randrange(len(lines)), chance.randrange(len(lines))
-    match chance.randrange(4):
-        case 0:
-            del lines[at]
-        case 1:
-            lines[at], lines[other] = lines[other], lines[at]
-        case 2:
-            lines.insert(at, lines[other])
-        case _:
-            words = lines[at].split(" ")
-            words[chance.randrange(len(words))] = chance.choice(PIECES)
-            lines[at] = " ".join(words)
-    return "\n".join(lines).encode("latin-1", "replace")

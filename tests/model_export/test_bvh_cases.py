@@ -239,16 +239,6 @@ def test_missing_position_channel_takes_the_offset():
     np.testing.assert_array_equal(added.translations[0, :2], [[1, 185, 2], [7, 10, 8]])
 
 
-@pytest.mark.parametrize(("root_offset", "height"), [("replace", 95.0), ("add", 185.0)])
-def test_root_offset_is_replaced_or_added_as_asked(root_offset, height):
-    offsets = ((1, 90, 2), (0, 10, 0), (3, 4, 5))
-    rows = [[4, 95, 6, 10, 20, 30, 40, 50, 60]]
-    joints, text = chain(f"{XYZ_POSITION} {ZXY}", ZXY, "", rows=rows, offsets=offsets)
-    clip = clip_of(text, root_offset=root_offset)
-    assert_positions(clip, worlds(joints, rows, add_root=root_offset == "add"))
-    assert clip.root_path[0, 1] == height
-
-
 def test_several_end_sites_on_one_joint_and_beside_children():
     site = "End Site\n{\nOFFSET 0 15 1\n}\n"
     more = site + "End Site\n{\nOFFSET 7 8 9\n}\n"

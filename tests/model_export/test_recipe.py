@@ -243,7 +243,6 @@ def test_the_size_of_a_recipe_is_bounded(read, tmp_path):
 
 
 CYCLE = ("cyclic = false", "cyclic = true")
-ROLE = ("[size]", '[roles]\nleftUpperLeg = "a"\n[size]')
 # How a control is measured, what else is changed, and what the message must hold.
 UNMEASURABLE = {
     "unknown quantity": (

@@ -336,7 +336,9 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         if v is not None
     }
     ranks, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
-    compression = asdict(truncation_cost.tensor_compression(trained.tensor, ranks, controls))
+    compression = asdict(
+        truncation_cost.shape_compression(trained.tensor.values.shape, ranks, controls)
+    )
     hyper = trained.pose.hyper
     contacts = {}
     if trained.contacts is not None:

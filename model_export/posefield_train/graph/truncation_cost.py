@@ -120,16 +120,11 @@ class Compression:
     stored: float
 
 
-def tensor_compression(tensor: MotionTensor, ranks: Sequence[int], controls: int) -> Compression:
-    """Return the compression at ranks (r1, r2, r3).
+def shape_compression(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
+    """Return the compression of a tensor of shape (D', T, N) at ranks (r1, r2, r3).
 
     `storage_cost` defines what counts as stored.
     """
-    return shape_compression(tensor.values.shape, ranks, controls)
-
-
-def shape_compression(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
-    """Return the compression of a tensor of shape (D', T, N) at ranks (r1, r2, r3)."""
     raw, numbers = float(np.prod(shape)), stored(shape, controls).evaluate(*ranks)
     return Compression(raw / float(np.prod(ranks)), raw / float(numbers))
 

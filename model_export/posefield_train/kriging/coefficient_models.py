@@ -64,7 +64,7 @@ def tune_event(
     problem = TuningProblem(samples, values, nugget, EFFECTOR_GAIN * effector, OTHER_STRENGTH)
     # So large a trend leaves the slopes to the samples, as a linear drift does.
     trend = float(np.exp(PRIORS["trend"].high))
-    return kriging_tuning.tune_with_trend(problem, replace(pose.hyper, trend=trend))
+    return kriging_tuning.tune_at_scales(problem, replace(pose.hyper, trend=trend))
 
 
 def compare_models(

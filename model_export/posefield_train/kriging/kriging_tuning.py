@@ -107,17 +107,16 @@ def tune(
 def tune_beside(problem: TuningProblem, pose: Hyper) -> TunedKriging:
     """Return a model with the scales and correlation of the pose's, and others tuned by density."""
     trend = pose.drifts == (0,) and pose.trend > 0.0
-    return _tune_at_scales(problem, replace(pose, trend=0.0), trend, PredictiveDensityLoss)
+    return tune_at_scales(problem, replace(pose, trend=0.0), trend, PredictiveDensityLoss)
 
 
-def tune_with_trend(problem: TuningProblem, hyper: Hyper) -> TunedKriging:
-    """Return a model with the scales, correlation and trend of `hyper`, and the others tuned."""
-    return _tune_at_scales(problem, hyper, trend=False, loss=LeaveOneOutLoss)
-
-
-def _tune_at_scales(
-    problem: TuningProblem, hyper: Hyper, trend: bool, loss: type[LeaveOneOutLoss]
+def tune_at_scales(
+    problem: TuningProblem,
+    hyper: Hyper,
+    trend: bool = False,
+    loss: type[LeaveOneOutLoss] = LeaveOneOutLoss,
 ) -> TunedKriging:
+    """Return a model with the scales and correlation of `hyper`; trend: whether it is tuned too."""
     names = tuple(
         with_nugget for with_nugget in _free(problem, trend) if with_nugget[0] != "correlation"
     )

@@ -1,12 +1,11 @@
 """Curves of clips in every format that carries them, with usd-core as the oracle of USD."""
 
-import json
-import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from pxr import Usd, UsdSkel
+from user_rigs import read_glb
 
 from posefield.encode import character, layers, usd_clip
 from posefield.encode.character import METRES
@@ -100,15 +99,9 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
         assert layers.crate_text(binary).encode() == expected
 
 
-def gltf(content):
-    """The document of a glTF file, and its buffer."""
-    length = struct.unpack_from("<L", content, 12)[0]
-    return json.loads(content[20 : 20 + length]), content[28 + length :]
-
-
 @pytest.mark.parametrize("body", ["mannequin", "none"])
 def test_gltf_has_a_named_morph_target_for_each_curve(face, body):
-    document, binary = gltf(CLIP_ENCODERS["glb"].encode(face, replace(METRES, body=body)))
+    document, binary = read_glb(CLIP_ENCODERS["glb"].encode(face, replace(METRES, body=body)))
     (mesh,) = document["meshes"]
     assert mesh["extras"]["targetNames"] == list(NAMES)
     assert [len(one["targets"]) for one in mesh["primitives"]] == [len(NAMES)]

@@ -1,11 +1,10 @@
 """Tests of VRM animations as files; `interop/avatars.py` plays them on avatars."""
 
-import json
-import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from user_rigs import read_glb
 
 import posefield
 from posefield.common.errors import InvalidField
@@ -23,11 +22,6 @@ LEGS = [
     for upper, lower in (("UpperLeg", "LowerLeg"), ("LowerLeg", "Foot"))
 ]
 SINGLE = 2e-6
-
-
-def document_of(content):
-    length = struct.unpack_from("<L", content, 12)[0]
-    return json.loads(content[20 : 20 + length]), content[28 + length :]
 
 
 def rest_of(document):
@@ -51,7 +45,7 @@ def walk():
 @pytest.mark.parametrize("name", ["cmu_walk", "hdm05_kick"])
 def test_bones_rest_in_the_t_pose_of_vrm(name):
     clip = posefield.load(name).clip()
-    document, _ = document_of(CLIP_ENCODERS["vrma"].encode(clip))
+    document, _ = read_glb(CLIP_ENCODERS["vrma"].encode(clip))
     rest = rest_of(document)
     bones = document["extensions"]["VRMC_vrm_animation"]["humanoid"]["humanBones"]
     assert {b: document["nodes"][n["node"]]["name"] for b, n in bones.items()} == {
@@ -76,7 +70,7 @@ def test_bones_rest_in_the_t_pose_of_vrm(name):
 
 
 def test_rotations_are_those_of_the_motion_between_bones(walk):
-    document, binary = document_of(CLIP_ENCODERS["vrma"].encode(walk))
+    document, binary = read_glb(CLIP_ENCODERS["vrma"].encode(walk))
     animation = document["animations"][0]
     paths = [(c["target"]["node"], c["target"]["path"]) for c in animation["channels"]]
     assert [path for path in paths if path[1] == "translation"] == [(0, "translation")]
@@ -141,7 +135,7 @@ def test_curves_are_expressions(walk):
     curves = (Curve("aa", 0.0, 1.0, 0.1), Curve("jawOpen", 0.0, 1.0, 0.1))
     weights = np.linspace(0.0, 1.0, 2 * len(walk.clip)).reshape(-1, 2)
     clip = replace(walk.clip, curves=CurveValues(curves, weights))
-    document, binary = document_of(vrma.vrma(replace(walk, clip=clip), METRES))
+    document, binary = read_glb(vrma.vrma(replace(walk, clip=clip), METRES))
     expressions = document["extensions"]["VRMC_vrm_animation"]["expressions"]
     assert {kind: [*names] for kind, names in expressions.items()} == {
         "preset": ["aa"],
