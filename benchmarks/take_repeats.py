@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from evaluation import finest_file
 from rows import Row, record, table
 
 from posefield.common.units import Indices
@@ -23,7 +24,6 @@ from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import training
 from posefield_train.evaluate import motion_errors
-from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 
@@ -69,7 +69,7 @@ def models(trained: TrainedModel) -> Iterator[tuple[set[int], Synthesizer]]:
     for fold in range(FOLDS):
         held_out = set(np.flatnonzero(recordings % FOLDS == fold).tolist())
         kept = [example for clip, example in enumerate(trained.examples) if clip not in held_out]
-        content = onnx_export.export_finest(training.train_examples(trained.recipe, kept))
+        content = finest_file.export_finest(training.train_examples(trained.recipe, kept))
         yield held_out, Synthesizer("takes", session.open_bytes(content, "takes"))
 
 

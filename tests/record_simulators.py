@@ -43,9 +43,7 @@ def record_corner(output: Path) -> None:
         write_corner(folder)
         network = "-n corner.nod.xml -e corner.edg.xml -o corner.net.xml".split()
         subprocess.run(
-            ["netconvert", *network, "--crossings.guess", "--walkingareas"],
-            cwd=folder,
-            check=True,
+            ["netconvert", *network, "--crossings.guess", "--walkingareas"], cwd=folder, check=True
         )
         options = "-n corner.net.xml -r corner.rou.xml --step-length 0.5 --end 60".split()
         options += "--fcd-output corner.xml --fcd-output.attributes x,y,angle,speed".split()

@@ -450,12 +450,7 @@ def test_clip_writes_what_the_encoder_of_the_ending_does(posefield, model_path, 
         model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")
     )
     trust = json.loads(json.dumps(answer.trust.document()))
-    assert json.loads(out) == {
-        "file": str(path),
-        "frames": len(answer.clip),
-        "rate": 30.0,
-        **trust,
-    }
+    assert json.loads(out) == {"file": str(path), "frames": len(answer.clip), "rate": 30.0, **trust}
     assert path.read_bytes() == CLIP_ENCODERS[ending].encode(answer)
     assert stat.S_IMODE(path.stat().st_mode) == 0o644
     assert [p.name for p in path.parent.iterdir()] == [path.name]

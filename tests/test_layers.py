@@ -102,22 +102,14 @@ def test_what_ships_runs_without_the_training_job():
     packages = "posefield.cli, posefield.http.app"
     done = python(f"{HIDDEN}import {packages}\nprint('fine')")
     assert (done.returncode, done.stdout) == (0, "fine\n"), done.stderr
-
-
-def test_what_is_hidden_cannot_be_imported():
-    """Negative control of the test above."""
-    done = python(f"{HIDDEN}import scipy.linalg")
-    assert done.returncode == 1
-    assert "ModuleNotFoundError: hidden" in done.stderr
+    # Negative control: a hidden module cannot be imported.
+    assert "ModuleNotFoundError: hidden" in python(f"{HIDDEN}import scipy.linalg").stderr
 
 
 def test_telemetry_is_off_before_onnxruntime_is_imported():
     done = python(f"{WATCHED}import posefield.inference.session")
     assert done.stdout.splitlines() == ["telemetry disabled: 1"], done.stderr
-
-
-def test_onnxruntime_by_itself_would_not_find_it_off():
-    """Negative control of the test above."""
+    # Negative control: onnxruntime alone does not find it off.
     assert python(f"{WATCHED}import onnxruntime").stdout == "telemetry disabled: None\n"
 
 
@@ -129,9 +121,7 @@ def test_the_start_imports_nothing_that_only_some_requests_need():
     started = "posefield.cli, posefield.http.app, posefield_train.cli"
     said = python(f"import sys, {started}; print([m for m in {LATE} if m in sys.modules])")
     assert said.stdout == "[]\n", said.stderr
-
-
-def test_an_import_at_the_start_would_be_noticed():
+    # Negative control.
     said = python("import sys, posefield.encode.usd_clip; print('pxr' in sys.modules)")
     assert said.stdout == "True\n", said.stderr
 

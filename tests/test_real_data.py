@@ -278,11 +278,7 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
     card, rate = exported.card, 30.0
     walk = gait.fit_gait(model.session)
     plan = walking_crowd.plan_random(walk, 150, 10.0, rate, 0)
-    feet = walking_crowd.measure_foot_skate(
-        card,
-        finest(walk.session, plan),
-        rate,
-    )
+    feet = walking_crowd.measure_foot_skate(card, finest(walk.session, plan), rate)
     count = len(card.performers)
     crowd = mean_walker(feet.mean(axis=1), plan.who, count)
     moved_by = np.array(card.moved_by)
@@ -296,11 +292,7 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
         walk, plan.controls, plan.who, plan.phases[:, 0], starts, rate
     )
     assert np.abs(free.places - plan.places).max() < 0.3
-    left = walking_crowd.measure_foot_skate(
-        card,
-        finest(walk.session, free),
-        rate,
-    )
+    left = walking_crowd.measure_foot_skate(card, finest(walk.session, free), rate)
     assert left.mean() == pytest.approx(feet.mean(), rel=0.01)
 
 

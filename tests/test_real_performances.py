@@ -167,10 +167,7 @@ def test_a_kicking_foot_meets_its_target_and_stands_before_and_after_it(library,
     assert np.ptp(held, axis=0).max() < 1e-5
 
 
-@pytest.mark.parametrize(
-    "pair",
-    [ACTS[:2], ACTS[2:4], ACTS[4:6], ACTS[6:]],
-)
+@pytest.mark.parametrize("pair", [ACTS[:2], ACTS[2:4], ACTS[4:6], ACTS[6:]])
 def test_no_join_of_a_walk_and_an_act_with_its_return_is_hard(library, pair):
     acts = [{"kind": "act", "model": name} for name in pair]
     report = perform(library, {"segments": [WALK, *acts, WALK], "fps": 60}).trust

@@ -29,10 +29,7 @@ def targets(step):
 def test_workflows_run_targets_of_the_makefile():
     found = {path.stem: yaml.safe_load(path.read_text()) for path in WORKFLOWS}
     run = {name: set().union(*map(targets, steps(each))) for name, each in found.items()}
-    assert run == {
-        "test": {"test", "test-system", "docs", "audit"},
-        "publish": {"wheels", "docs"},
-    }
+    assert run == {"test": {"test", "test-system", "docs", "audit"}, "publish": {"wheels", "docs"}}
     assert set().union(*run.values()) <= make_targets()
 
 

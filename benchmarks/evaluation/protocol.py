@@ -7,6 +7,7 @@ from typing import Any
 from evaluation import (
     corrections,
     equal_information,
+    finest_file,
     ground_truth,
     methods,
     new_performers,
@@ -26,7 +27,6 @@ from posefield_train.evaluate.protocol import (
     PartialResult,
     ProgressCallback,
 )
-from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.jobs import Jobs, single_threaded
 from posefield_train.source.ingest import Example
@@ -101,7 +101,7 @@ def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold, name: str)
     rest, held_out = fold.split(examples)
     methods.check_lines(rest, tuple(control.name for control in recipe.controls))
     trained = protocol.train_fold(recipe, examples, fold)
-    file = onnx_export.export_finest(trained.trained)
+    file = finest_file.export_finest(trained.trained)
     # Methods that only one protocol has.
     if name == "clip":
         more: dict[str, Any] = new_performers.predict_unnamed(
@@ -160,7 +160,7 @@ def run_against_truth(
     """Return the result at control points (C, d) of the procedural family."""
     methods.check_lines(list(examples), tuple(control.name for control in recipe.controls))
     trained = train_examples(recipe, examples)
-    file = onnx_export.export_finest(trained)
+    file = finest_file.export_finest(trained)
     batches = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
     run_jobs = jobs.run(_run_truth_batch, batches, (recipe, trained, file))
     fold_results = list(protocol.with_progress(run_jobs, len(batches), report))

@@ -55,10 +55,7 @@ class Jobs(Protocol):
     """Executor of jobs. The results of a job are the same bytes on every executor."""
 
     def run(
-        self,
-        function: Callable[..., Any],
-        arguments: Iterable[Arguments],
-        shared: Arguments = (),
+        self, function: Callable[..., Any], arguments: Iterable[Arguments], shared: Arguments = ()
     ) -> Iterator[Any]:
         """Yield the results of ``function(*shared, *job)``, in the order in which jobs finish.
 
@@ -73,10 +70,7 @@ class SerialJobs:
     """Jobs run one after the other in this process."""
 
     def run(
-        self,
-        function: Callable[..., Any],
-        arguments: Iterable[Arguments],
-        shared: Arguments = (),
+        self, function: Callable[..., Any], arguments: Iterable[Arguments], shared: Arguments = ()
     ) -> Iterator[Any]:
         """Run jobs as `Jobs.run` does, in their order."""
         for job in arguments:
@@ -84,10 +78,7 @@ class SerialJobs:
 
 
 def ordered_results(
-    jobs: Jobs,
-    function: Callable[..., Any],
-    arguments: Iterable[Arguments],
-    shared: Arguments = (),
+    jobs: Jobs, function: Callable[..., Any], arguments: Iterable[Arguments], shared: Arguments = ()
 ) -> list[Any]:
     """Return the results of jobs in the order of their arguments, each made on one BLAS thread."""
     numbered = ((number, job) for number, job in enumerate(arguments))
@@ -109,10 +100,7 @@ class ProcessJobs:
     count: int | None = None
 
     def run(
-        self,
-        function: Callable[..., Any],
-        arguments: Iterable[Arguments],
-        shared: Arguments = (),
+        self, function: Callable[..., Any], arguments: Iterable[Arguments], shared: Arguments = ()
     ) -> Iterator[Any]:
         """Run jobs as `Jobs.run` does; a single job runs in this process."""
         jobs = (joblib.delayed(function)(*shared, *job) for job in arguments)
@@ -129,10 +117,7 @@ class DaskJobs:
     client: "Client"
 
     def run(
-        self,
-        function: Callable[..., Any],
-        arguments: Iterable[Arguments],
-        shared: Arguments = (),
+        self, function: Callable[..., Any], arguments: Iterable[Arguments], shared: Arguments = ()
     ) -> Iterator[Any]:
         """Run jobs as `Jobs.run` does; ClusterError if the cluster cannot do them."""
         from posefield.common import dask_cluster
@@ -170,10 +155,7 @@ class FinishedJobs:
     packages: tuple[str, ...] = PACKAGES
 
     def run(
-        self,
-        function: Callable[..., Any],
-        arguments: Iterable[Arguments],
-        shared: Arguments = (),
+        self, function: Callable[..., Any], arguments: Iterable[Arguments], shared: Arguments = ()
     ) -> Iterator[Any]:
         """Yield the results of jobs as `Jobs.run` does, kept ones first.
 

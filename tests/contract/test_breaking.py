@@ -57,10 +57,7 @@ BREAKING = {
         lambda s: s["components"]["parameters"]["level"].update(required=True),
         f"GET {POSE} now needs parameter level",
     ),
-    "enumeration": (
-        lambda s: schema(s, "Names")["enum"].remove("vrm"),
-        "Names (asked): enum {",
-    ),
+    "enumeration": (lambda s: schema(s, "Names")["enum"].remove("vrm"), "Names (asked): enum {"),
     "field of an answer": (
         lambda s: without(schema(s, "Trust")["properties"], "sigma"),
         "Trust (answered)/sigma: gone",

@@ -7,11 +7,7 @@ from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 
 PAGE = "https://a.example"
-ANSWERS = [
-    ("GET", "/v1/models", 200),
-    ("GET", "/nowhere", 404),
-    ("GET", "/livez?x=1", 400),
-]
+ANSWERS = [("GET", "/v1/models", 200), ("GET", "/nowhere", 404), ("GET", "/livez?x=1", 400)]
 
 
 @pytest.fixture(scope="module")

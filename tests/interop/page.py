@@ -46,11 +46,7 @@ def models() -> dict[str, bytes]:
     real = trained.real(REAL)
     if real is None:
         return {}
-    return {
-        "reaching": trained.family()[1],
-        REAL: real,
-        "quadruped": trained.quadruped()[1],
-    }
+    return {"reaching": trained.family()[1], REAL: real, "quadruped": trained.quadruped()[1]}
 
 
 def _clicked(node: Path, address: str, models: Path) -> list[str]:

@@ -6,13 +6,7 @@ from posefield.question.results import SampledClip, Trust
 
 TRUST = Trust("a@0123456789abcdef", {}, None, 0, 1.0, 0.0, True, ())
 CENTIMETRES_Z = Convention(0.01, "z")
-FORMATS = {
-    "bvh": METRES,
-    "usda": METRES,
-    "usdc": CENTIMETRES_Z,
-    "usdz": METRES,
-    "glb": METRES,
-}
+FORMATS = {"bvh": METRES, "usda": METRES, "usdc": CENTIMETRES_Z, "usdz": METRES, "glb": METRES}
 """Formats and the convention in which each is written here."""
 
 

@@ -146,17 +146,14 @@ CASES = [
     ),
     Case("BVH and GLB", mixed, TRAIN, ("end sites Head_end, LeftHand_end: left out",)),
     Case("siblings in another order", siblings_exchanged, TRAIN),
-    Case(
-        "one frame more than stated",
-        bvh(lambda text: text.replace("Frames: 21", "Frames: 20")),
-        CONVERT,
-        ("note: states 20 frames and has 21: those were read",),
-    ),
-    Case(
-        "one frame less than stated",
-        bvh(lambda text: text.replace("Frames: 21", "Frames: 22")),
-        CONVERT,
-        ("states 22 frames and has 21",),
+    *(
+        Case(
+            f"21 frames where {stated} are stated",
+            bvh(lambda text, stated=stated: text.replace("Frames: 21", f"Frames: {stated}")),
+            CONVERT,
+            (f"note: states {stated} frames and has 21: those were read",),
+        )
+        for stated in (20, 22)
     ),
     Case(
         "frame time in milliseconds",

@@ -57,10 +57,6 @@ def line_changed(number, new):
     return "\n".join(lines)
 
 
-def test_the_unchanged_file_is_read():
-    assert bvh.loads(VALID.encode(), "clips/walk.bvh").values.shape == (3, 9)
-
-
 JOINT_PLACES = "expected OFFSET, CHANNELS, JOINT, End Site or '}' in joint"
 OWN_LINES = "expected 9 a frame, on lines of its own"
 
@@ -108,11 +104,7 @@ MOTION_FAULTS = [
     (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
     (line_changed(18, ""), 19, f"found '{ROW.strip()}', expected 'Frame Time: seconds'"),
     (line_changed(18, "Frame Time: 1e-320"), 18, f"found frame time 1e-320, {FRAME_TIME}"),
-    (
-        changed("Frames: 3", "Frames: 5"),
-        21,
-        "found 3 frames, expected 5",
-    ),
+    (changed("Frames: 3", "Frames: 5"), 21, "found 3 frames, expected 5"),
     (
         "\n".join([*VALID.split("\n")[:18], "1 2 3 4 5 6 7 8", ROW + "1 2 3 4 5 6 7 8 9 10", ""]),
         19,
@@ -305,4 +297,4 @@ def test_what_cannot_be_read_is_named(tmp_path, name):
     assert caught.value.path == str(tmp_path / name)
     # Negative control: what is there is read.
     (tmp_path / "valid.bvh").write_text(VALID)
-    assert len(bvh.read(tmp_path / "valid.bvh").values) == 3
+    assert bvh.read(tmp_path / "valid.bvh").values.shape == (3, 9)

@@ -208,11 +208,7 @@ DEEP = "tables or arrays nested too deep, expected at most five levels"
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "a = " + "[" * 100_000,
-        ".".join("a" * 60_000) + " = 1",
-        "[" + ".".join("a" * 200) + "]",
-    ],
+    ["a = " + "[" * 100_000, ".".join("a" * 60_000) + " = 1", "[" + ".".join("a" * 200) + "]"],
     ids=["open arrays", "many dots", "table names"],
 )
 def test_nesting_is_bounded(read, tmp_path, text):

@@ -111,11 +111,7 @@ def test_a_family_that_was_merged_is_named(posefield, made):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{", "not JSON"),
-        ('{"accept": 3}', "expected a list for each decision"),
-    ],
+    ("text", "said"), [("{", "not JSON"), ('{"accept": 3}', "expected a list for each decision")]
 )
 def test_a_file_that_is_no_decisions_is_refused(posefield, made, tmp_path, text, said):
     (tmp_path / "d.json").write_text(text)

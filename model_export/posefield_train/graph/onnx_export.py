@@ -337,7 +337,7 @@ def check_and_export(model: FloatModel, make_card: Callable[[float], ModelCard])
     make_card: makes the model card from the parity error, m. Raises ExportRefused as
     `check_parity` does.
     """
-    about = _producer()
+    about = producer()
     # The card contains the parity error, so the weights are checked with a draft of the card.
     draft = make_card(0.0)
     parity = check_parity(model, model.onnx(model_card.dump(draft), about), draft)
@@ -345,18 +345,6 @@ def check_and_export(model: FloatModel, make_card: Callable[[float], ModelCard])
     return ExportedModel(model, model.onnx(model_card.dump(card), about), card, parity)
 
 
-@single_threaded()
-def export_finest(trained: TrainedModel) -> bytes:
-    """Return an unchecked file of the finest level alone, for measurements only."""
-    recipe = trained.recipe
-    size = recipe.size.model_copy(update={"levels": []})
-    # Held-out clips narrow the sampled ranges, which presets have to lie in.
-    trained = replace(trained, recipe=recipe.model_copy(update={"size": size, "presets": {}}))
-    model, model_levels = levels.build_levels(trained)
-    card = trained_card.build_card(trained, model_levels, [], parity=0.0)
-    card = estimate(trained).on_card(card)
-    return model.onnx(model_card.dump(card), _producer())
-
-
-def _producer() -> dict[str, str]:
+def producer() -> dict[str, str]:
+    """Return the names that a file gives of the program that made it."""
     return {"producer_name": "posefield", "producer_version": __version__}

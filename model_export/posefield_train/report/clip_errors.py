@@ -13,14 +13,7 @@ from posefield.model_file.model_card import Control
 from posefield.motion import quat, skeleton
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report import page
-from posefield_train.report.page import (
-    Chart,
-    Section,
-    Table,
-    centimetres,
-    draw_chart,
-    short_label,
-)
+from posefield_train.report.page import Chart, Section, Table, centimetres, draw_chart, short_label
 from posefield_train.source.ingest import Example
 
 # Clips named in the table, and clips drawn as stick figures.

@@ -17,13 +17,7 @@ from posefield.motion import clip, quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source.bvh import MAX_POSES, Readable
-from posefield_train.source.bvh_hierarchy import (
-    MAX_NUMBER,
-    NUMBER,
-    Vector,
-    foreign_encoding,
-    quote,
-)
+from posefield_train.source.bvh_hierarchy import MAX_NUMBER, NUMBER, Vector, foreign_encoding, quote
 
 ROOT = "root"
 MAX_BONES = 1000

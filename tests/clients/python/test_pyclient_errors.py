@@ -20,10 +20,7 @@ LIST = b'{"models": []}'
 
 def raised(address, ask=lambda client: client.models(), retry=NEVER, **given):
     """Return the error of the blocking client."""
-    with (
-        Client(address, retry=retry, **given) as client,
-        pytest.raises(PosefieldError) as caught,
-    ):
+    with Client(address, retry=retry, **given) as client, pytest.raises(PosefieldError) as caught:
         ask(client)
     return caught.value
 

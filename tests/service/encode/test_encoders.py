@@ -90,11 +90,7 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
 
 @pytest.mark.parametrize(
     ("extension", "unit", "up", "meant"),
-    [
-        ("bvh", None, None, CENTIMETRES),
-        ("bvh", "m", None, METRES),
-        ("usda", "cm", "z", STAGE),
-    ],
+    [("bvh", None, None, CENTIMETRES), ("bvh", "m", None, METRES), ("usda", "cm", "z", STAGE)],
 )
 def test_what_is_not_asked_for_is_as_usual(extension, unit, up, meant):
     assert CLIP_ENCODERS[extension].convention(unit, up) == meant

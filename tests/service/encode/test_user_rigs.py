@@ -71,10 +71,7 @@ def test_usd_refers_to_the_file_and_copies_neither_bind_nor_skin(character, moti
     path = usd_file(character, motion)
     layer = Sdf.Layer.FindOrOpen(str(path))
     (reference,) = layer.GetPrimAtPath("/Character").referenceList.prependedItems
-    assert (reference.assetPath, str(reference.primPath)) == (
-        f"./{character.file}",
-        "/Character",
-    )
+    assert (reference.assetPath, str(reference.primPath)) == (f"./{character.file}", "/Character")
     text = path.read_text()
     for own in ("bindTransforms", "restTransforms", "points", "skel:jointWeights", "Mesh"):
         assert own not in text

@@ -149,10 +149,7 @@ def test_a_bake_that_was_damaged_is_mended_with_the_same_bytes(bake, tmp_path):
 
 
 REFUSALS = {
-    "last pose does not lead into its first": (
-        "hdm05_kick",
-        ["--grid", "kick_height=1.0:1.2:2"],
-    ),
+    "last pose does not lead into its first": ("hdm05_kick", ["--grid", "kick_height=1.0:1.2:2"]),
     "expected 1 to 2, as blend spaces of engines have": ("cmu_walk", ["--grid", "speed=1.2"]),
     "expected rising values": ("cmu_walk", ["--grid", "speed=1.4,1.0"]),
     "expected a control": ("cmu_walk", ["--grid", "performer=cmu_02,cmu_05"]),

@@ -122,10 +122,7 @@ def test_travels_are_integrals_of_velocities_and_give_them_back():
     np.testing.assert_allclose(mixed[:, 1:], goals[:, 1:], atol=ROUNDING)
 
 
-@pytest.mark.parametrize(
-    "asked",
-    [Measure("height", (4, 5), "landmark", 0.25), Measure("turn")],
-)
+@pytest.mark.parametrize("asked", [Measure("height", (4, 5), "landmark", 0.25), Measure("turn")])
 def test_a_measure_read_is_the_measure_written(asked):
     assert measures.from_dict(measures.to_dict(asked)) == asked
     assert all(value not in (None, []) for value in measures.to_dict(asked).values())

@@ -1,30 +1,8 @@
-"""Models of acts for tests, and where the joints of an act are."""
-
-from dataclasses import replace
+"""Places of the joints of acts, for tests."""
 
 from posefield.motion import skeleton
-from posefield.motion.measures import Measure
 from posefield.performance import holds
 from posefield.performance.passage import FloorMotion
-from posefield.synthesis.synthesizer import Synthesizer
-
-
-def with_card(model, **changed):
-    """The model with other entries of its card."""
-    card = replace(model.session.card, **changed)
-    return Synthesizer(model.name, replace(model.session, card=card))
-
-
-def measured_reach(model):
-    """The reaching model with feet, and with the height of its right hand measured."""
-    names = model.session.card.skeleton.names
-    measure = Measure("height", (names.index("RightHand"),), "end")
-    controls = tuple(
-        replace(control, measure=measure) if control.name == "target_height" else control
-        for control in model.session.card.controls
-    )
-    feet = tuple(names.index(name) for name in ("LeftToeBase", "RightToeBase"))
-    return with_card(model, controls=controls, feet=feet, contacts=())
 
 
 def body(model, bones):

@@ -1,6 +1,7 @@
 """Tests of acts: frames through the event, poses, contacts, and bad input."""
 
 import acting
+import changed_cards
 import numpy as np
 import pytest
 
@@ -21,7 +22,7 @@ HIGH = {"target_height": 1.6}
 
 @pytest.fixture(scope="module")
 def reach(model_path):
-    return acting.measured_reach(Synthesizer("reach", session.load(model_path)))
+    return changed_cards.measured_reach(Synthesizer("reach", session.load(model_path)))
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,7 @@ def test_the_event_is_a_frame_whose_hand_meets_its_target(reach):
 
 
 def test_an_event_within_the_motion_is_a_frame_of_its_canonical_time(reach):
-    early = acting.with_card(reach, event=Event(reach.session.card.event.joint, 0.5))
+    early = changed_cards.with_card(reach, event=Event(reach.session.card.event.joint, 0.5))
     found = act_motion.act_passage(early, MotionQuestion(controls=HIGH))
     question = early.question(MotionQuestion(controls=HIGH))
     time = np.array([found.begins + found.event / RATE])
@@ -85,7 +86,7 @@ def test_contacts_are_detected_where_the_model_has_none(reach):
 
 def test_contacts_are_those_of_the_model_in_the_order_of_its_feet(walker):
     card = walker.session.card
-    still = acting.with_card(walker, cyclic=False, feet=card.feet[::-1])
+    still = changed_cards.with_card(walker, cyclic=False, feet=card.feet[::-1])
     asked = MotionQuestion(controls={own.name: own.default for own in card.controls})
     found = act_motion.act_passage(still, asked)
     times = found.begins + np.arange(len(found.passage)) / RATE

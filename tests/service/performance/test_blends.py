@@ -122,11 +122,7 @@ def test_the_best_pair_is_that_of_brute_force():
     exits, entries = range(30, 60), range(12)
     found = joins.find_cut(character(), before, after, exits, entries)
     pairs = [
-        (
-            joins.find_cut(character(), before, after, range(e, e + 1), range(b, b + 1)).cost,
-            e,
-            b,
-        )
+        (joins.find_cut(character(), before, after, range(e, e + 1), range(b, b + 1)).cost, e, b)
         for e in exits
         for b in entries
     ]

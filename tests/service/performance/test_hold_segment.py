@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import acting
+import changed_cards
 import numpy as np
 import pytest
 
@@ -20,7 +21,7 @@ STILL = 1e-4
 
 @pytest.fixture(scope="module")
 def reach(model_path):
-    return acting.measured_reach(Synthesizer("reach", session.load(model_path)))
+    return changed_cards.measured_reach(Synthesizer("reach", session.load(model_path)))
 
 
 @pytest.fixture(scope="module")

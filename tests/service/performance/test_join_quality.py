@@ -72,10 +72,7 @@ def test_roots_may_differ_by_as_much_as_a_blend_rises_when_they_accelerate_as_us
 @pytest.mark.parametrize(
     ("facts", "said"),
     [
-        (
-            replace(EASY, distance=0.3),
-            "the poses are 30 cm apart, expected at most 25",
-        ),
+        (replace(EASY, distance=0.3), "the poses are 30 cm apart, expected at most 25"),
         (
             replace(EASY, peak=13.0),
             "joints accelerate by 13 m/s2, expected at most 3 times the 4.0 m/s2 of the captured"

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import acting
+import changed_cards
 import msgspec
 import numpy as np
 import pytest
@@ -27,8 +28,8 @@ def find(models):
     library = dict(model_registry.load([models]).models)
     reach = library["reach"]
     own = reach.session.card.event
-    library["free"] = acting.with_card(reach, event=None)
-    library["early"] = acting.with_card(reach, event=Event(own.joint, 0.5))
+    library["free"] = changed_cards.with_card(reach, event=None)
+    library["early"] = changed_cards.with_card(reach, event=Event(own.joint, 0.5))
     library["standing"] = measured_at_start(reach)
     library["cmu_walk"] = model_registry.load([model_registry.SHIPPED_FOLDER]).find("cmu_walk")
     return library.__getitem__
@@ -39,7 +40,7 @@ def measured_at_start(model):
     control = model.session.card.control("hip_height")
     measured = replace(control, measure=Measure("height", (0,), "start"))
     controls = [measured if own is control else own for own in model.session.card.controls]
-    return acting.with_card(model, controls=tuple(controls))
+    return changed_cards.with_card(model, controls=tuple(controls))
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +60,7 @@ def performed(find, *segments, fps=60):
 
 def reach(position, model="free", **when):
     place = [float(axis) for axis in position]
-    return {
-        "kind": "act",
-        "model": model,
-        "targets": [{"joint": HAND, "position": place, **when}],
-    }
+    return {"kind": "act", "model": model, "targets": [{"joint": HAND, "position": place, **when}]}
 
 
 def path(answer, name=HAND):

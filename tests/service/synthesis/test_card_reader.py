@@ -145,10 +145,7 @@ def test_presets_are_read_as_they_were_written():
 @pytest.mark.parametrize(
     ("preset", "said"),
     [
-        (
-            Preset("far", {"height": 1.7}),
-            "presets[1].controls is ['height'], expected a value for",
-        ),
+        (Preset("far", {"height": 1.7}), "presets[1].controls is ['height'], expected a value for"),
         (
             Preset("far", POINT, {"performer": "cay"}),
             "presets[1].labels.performer is cay, expected one of",

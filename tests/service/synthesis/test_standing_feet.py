@@ -4,22 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from changed_cards import measured_reach, with_card
 from msgspec import structs
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.common.units import UP
 from posefield.feet import stance_rows
 from posefield.inference import session
-from posefield.motion.measures import Measure
 from posefield.question import json_decoding, text_decoding
 from posefield.question.motion_question import ClipQuestion, Floor, Target
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-
-
-def with_card(model, **changed):
-    card = replace(model.session.card, **changed)
-    return Synthesizer(model.name, replace(model.session, card=card))
 
 
 @pytest.fixture(scope="module")
@@ -30,16 +25,7 @@ def walker(walk_path):
 @pytest.fixture(scope="module")
 def reach(labelled_path):
     """A reach model with feet, without contacts, whose hand height can be constrained."""
-    model = Synthesizer("reach", session.load(labelled_path))
-    names = model.session.card.skeleton.names
-    controls = tuple(
-        replace(control, measure=Measure("height", (names.index("RightHand"),), "end"))
-        if control.name == "target_height"
-        else control
-        for control in model.session.card.controls
-    )
-    feet = (names.index("LeftFoot"), names.index("RightFoot"))
-    return with_card(model, controls=controls, feet=feet, contacts=())
+    return measured_reach(Synthesizer("reach", session.load(labelled_path)), feet="Foot")
 
 
 def middle(model):

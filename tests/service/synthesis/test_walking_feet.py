@@ -1,16 +1,12 @@
 """Tests of walking crowds whose feet stand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from changed_cards import with_card
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import (
-    gait,
-    walking_crowd,
-)
+from posefield.locomotion import gait, walking_crowd
 from posefield.motion import skeleton
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
@@ -82,11 +78,6 @@ def test_a_standing_foot_stays_in_one_place_on_the_floor(model, own):
     still, slow = (np.linalg.norm(steps, axis=-1) < 2e-6 for steps in level)
     # Half of all frames or so, where the prediction has none.
     assert 0.3 < still.mean() < 0.8 and slow.mean() < 0.02
-
-
-def with_card(model, **changed):
-    card = replace(model.session.card, **changed)
-    return Synthesizer(model.name, replace(model.session, card=card))
 
 
 def test_crowds_with_few_frames_are_as_predicted_and_refuse_to_stand(model, own):
