@@ -133,7 +133,7 @@ def with_one_way(spec):
     """Leave walks one way to end, performances one way to begin, targets one moment, and no plan
     in the format of a file: no schema here says that fields exclude each other."""
     parts = spec["components"]
-    for name in ("to", "turn", "seconds"):
+    for name in ("to", "turn", "seconds", "facing"):
         del parts["schemas"]["Walk"]["properties"][name]
     del parts["schemas"]["PerformanceStart"]["properties"]["poses"]
     spec["components"]["parameters"]["plan"]["schema"] = {"enum": [False]}

@@ -60,6 +60,7 @@ def from_question(
 ) -> PerformanceCrowd:
     """Return a crowd with the stage of a question; InvalidField as for walking crowds."""
     question = WalkQuestion(**structs.asdict(stage))
+    question.check()
     camera, pixels = walking_crowd.camera_of(question), question.pixels
     view = None
     if camera is not None:

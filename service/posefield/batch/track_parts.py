@@ -66,6 +66,7 @@ class PartsJob:
     skip_bad: bool = False
 
     def __post_init__(self) -> None:
+        self.question.check()
         if self.people < 1:
             raise InvalidField("people_per_file", f"{self.people}, expected 1 person or more")
 

@@ -38,7 +38,7 @@ from posefield.question.motion_question import (
     LabelValue,
     RootMode,
 )
-from posefield.question.walk_question import WalkQuestion
+from posefield.question.walk_question import DEFAULT_PIXELS, WalkQuestion
 from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.validation.crowd_validation import (
     Blending,
@@ -49,7 +49,6 @@ from posefield.validation.crowd_validation import (
 
 # The default of Accept is binary USD.
 WALK_FORMATS = {"usdc": CROWD_FORMATS["usdc"], **CROWD_FORMATS}
-DEFAULT_PIXELS = 1.0
 VALUES, FEWEST = 64, 100_000
 """Maximum values of a character, and minimum number of characters that the limit allows for."""
 # float, since JSON has one number type: 1.0 is a valid level.
@@ -230,11 +229,11 @@ def _view(body: CrowdBody) -> LevelCriteria:
 
 
 def check_size(question: WalkQuestion, ending: str, card: ModelCard, settings: Settings) -> None:
-    """Check that a crowd is within the limits of the settings.
+    """Raise InvalidField for a crowd beyond the limits of the settings.
 
-    ending: extension of the format. card: of the model. Raises InvalidField for characters, poses,
-    frames or bytes beyond the limits of the settings.
+    ending: extension of the format. card: of the model.
     """
+    question.check()
     flat = question.instancing == "flatten"
     if question.count > settings.crowd_limit:
         raise InvalidField("count", f"{question.count}, expected at most {settings.crowd_limit}")
@@ -253,9 +252,8 @@ def check_size(question: WalkQuestion, ending: str, card: ModelCard, settings: S
     points = character.body_size(card.skeleton, question.body or DEFAULT_BODY)
     motions = question.motions or question.count
     frames = walking_crowd.frame_count(motions, question.seconds, question.fps, question.seed)
-    counts = CrowdCounts(
-        len(card.skeleton), question.count, motions, frames, points, len(card.curves)
-    )
+    joints, channels = len(card.skeleton), len(card.curves)
+    counts = CrowdCounts(joints, question.count, motions, frames, points, channels)
     size = crowd_size.file_size_bound(counts, ending, flat)
     if size > settings.output_limit:
         raise InvalidField(

@@ -37,8 +37,6 @@ from posefield.question.walk_question import (
 POSES_PER_BATCH = 8_000
 # Poses computed at once in double precision: 25 MB at 31 joints.
 POSES_PER_CALL = 16_000
-
-
 # Largest number of poses of one plan, which takes a few hundred bytes for each.
 MAX_POSES = 20_000_000
 # Longest interval between planned points of a path, s, for crowds with few frames a second.
@@ -284,6 +282,7 @@ def build_crowd(
     make: computes the motions, which are as predicted by default. Raises InvalidField for
     parameters that the model or the limits do not permit.
     """
+    question.check()
     gait = gait.with_labels(question.labels)
     span = question.seconds, question.fps, question.seed
     plan = plan_random(gait, question.motions or question.count, *span)

@@ -13,8 +13,7 @@ Instancing = Literal["references", "scenegraph", "flatten"]
 WalkerTake = Literal["index"] | Whole
 """Seed of all characters, or "index" for a seed of its own for each."""
 DEFAULT_FOV, DEFAULT_HEIGHT, DEFAULT_PIXELS = math.pi / 3.0, 1080.0, 1.0
-MAX_CHARACTERS = 1_000_000
-"""Largest number of characters of one crowd, which may share motions."""
+MAX_CHARACTERS = 1_000_000  # Of one crowd, who may share motions.
 
 FieldOfView = Annotated[
     float | None,
@@ -99,6 +98,9 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             for name in ("fov", "height", "pixels"):
                 if getattr(self, name) is not None:
                     raise InvalidField(name, "given without a camera, expected only with one")
+
+    def check(self) -> None:
+        """Raise InvalidField for a number out of range, and for what a camera excludes."""
         if not 1 <= self.count <= MAX_CHARACTERS:
             raise InvalidField("count", f"{self.count}, expected 1 to {MAX_CHARACTERS} characters")
         if self.level is not None and self.camera is not None:
@@ -106,8 +108,6 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         if self.motions is not None and not 1 <= self.motions <= self.count:
             raise InvalidField("motions", f"{self.motions}, expected 1 to {self.count} characters")
         if self.motions is not None and self.camera is not None:
-            raise InvalidField(
-                "motions", "shared by characters near and far, expected a level and no camera"
-            )
+            raise InvalidField("motions", "shared near and far, expected a level and no camera")
         if self.pixels is not None and not self.pixels >= 0.0:
             raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")

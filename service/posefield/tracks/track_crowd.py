@@ -154,6 +154,7 @@ def find_people(
 
     It is empty if all tracks are too short. Raises InvalidField for tracks that are too long.
     """
+    question.check()
     walking_crowd.frame_count(1, 1.0, question.fps, question.seed)
     gait = gait.with_labels(question.labels)
     if begin is None:
