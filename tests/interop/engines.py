@@ -22,9 +22,11 @@ VENV = environment.ROOT / ".venv-engines"
 PACKAGES = ("openvino==2026.4.1", "tract==0.23.9")
 WEB = environment.ROOT / "build/web"
 WEB_PACKAGES = ("onnxruntime-web@1.23.0",)
-# Engines sum in another order, and sigma is the root of a difference: metres, seconds and parts of
-# a quaternion. The next level of detail is off by much more, which is looked at too.
-CLOSE = 5e-5
+# Engines sum in another order: metres, seconds and parts of a quaternion. The next level of detail
+# is off by much more, which is looked at too.
+CLOSE = 2e-5
+# OpenVINO takes the double precision of the file, in which large terms of sigma cancel, as single.
+LIMITS = {("openvino", "sigma"): 1e-4}
 
 Tensors = Mapping[str, np.ndarray]
 
@@ -50,17 +52,20 @@ def faults(node: Path, npm: Path) -> list[str]:
 def _compared(found: Mapping[str, Tensors], right: Tensors, wrong: Tensors) -> Iterator[str]:
     print(f"{'engine':<20}{'off':>10}{'another level':>16}")
     for engine, answers in found.items():
-        off, control = _distance(answers, right), _distance(answers, wrong)
-        print(f"{engine:<20}{off:>10.1e}{control:>16.1e}")
-        if not off < CLOSE < control:
-            yield f"{engine}: off by {off:g}, and by {control:g} from another level"
+        distances = _distances(answers, right)
+        control = max(_distances(answers, wrong).values())
+        print(f"{engine:<20}{max(distances.values()):>10.1e}{control:>16.1e}")
+        limits = {name: LIMITS.get((engine, name), CLOSE) for name in distances}
+        close = all(distances[name] < limit for name, limit in limits.items())
+        if not close or control < max(limits.values()):
+            yield f"{engine}: off by {distances}, and by {control:g} from another level"
 
 
-def _distance(answers: Tensors, expected: Tensors) -> float:
-    """The largest difference of any number; infinite where tensors or shapes differ."""
+def _distances(answers: Tensors, expected: Tensors) -> dict[str, float]:
+    """The largest difference of each tensor; infinite where tensors or shapes differ."""
     if {n: a.shape for n, a in answers.items()} != {n: e.shape for n, e in expected.items()}:
-        return float("inf")
-    return max(_apart(answers[name], expected[name], name) for name in expected)
+        return {"shapes": float("inf")}
+    return {name: _apart(answers[name], expected[name], name) for name in expected}
 
 
 def _apart(one: np.ndarray, other: np.ndarray, name: str) -> float:
