@@ -36,7 +36,7 @@ from posefield.performance.script import Script, resolve_script
 from posefield.question.motion_question import DEFAULT_BODY, BodyKind
 from posefield.question.performance_question import CrowdStageQuestion, PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
-from posefield.question.walk_question import DEFAULT_PIXELS, WalkQuestion
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
 
@@ -61,11 +61,7 @@ def from_question(
     """Return a crowd with the stage of a question; InvalidField as for walking crowds."""
     question = WalkQuestion(**structs.asdict(stage))
     question.check()
-    camera, pixels = walking_crowd.camera_of(question), question.pixels
-    view = None
-    if camera is not None:
-        pixels = DEFAULT_PIXELS if pixels is None else pixels
-        view = LevelCriteria(camera, pixels, budget=None, previous=None)
+    view = walking_crowd.criteria_of(question)
     return PerformanceCrowd(models, path, view, stage.instancing, stage.body or DEFAULT_BODY)
 
 

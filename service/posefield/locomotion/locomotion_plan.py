@@ -89,10 +89,6 @@ class Paths:
         return before, gone / POINT_SPACING - before
 
 
-# Largest length, m, which takes hours to walk, and most waypoints, whose spline takes seconds.
-MAX_LENGTH, MAX_WAYPOINTS = 10_000.0, 1_000
-
-
 @dataclass(frozen=True)
 class Route:
     """Waypoints (P, 2) in order, x to the left and z forward, m, and one speed, m/s."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
-from posefield.inference.level_selection import Camera, NamedModel
+from posefield.inference.level_selection import Camera, LevelCriteria, NamedModel
 from posefield.inference.session import Session
 from posefield.locomotion import (
     collision_avoidance,
@@ -265,13 +265,15 @@ MOST_OVERLAPS = 20
 """Pairs of characters that overlap, the first ones, of which a crowd tells the times."""
 
 
-def camera_of(question: WalkQuestion) -> Camera | None:
-    """Return the camera of a question, which chooses the levels of detail; None without one."""
+def criteria_of(question: WalkQuestion) -> LevelCriteria | None:
+    """Return the camera and the limit that choose the levels of detail; None without a camera."""
     if question.camera is None:
         return None
     fov = DEFAULT_FOV if question.fov is None else question.fov
     height = DEFAULT_HEIGHT if question.height is None else question.height
-    return Camera(np.array(question.camera), fov, height)
+    pixels = DEFAULT_PIXELS if question.pixels is None else question.pixels
+    camera = Camera(np.array(question.camera), fov, height)
+    return LevelCriteria(camera, pixels, budget=None, previous=None)
 
 
 def build_crowd(
@@ -335,9 +337,9 @@ def build_schedule(
     level, coarsest = question.level or 0, len(model.session.card.levels) - 1
     if not 0 <= level <= coarsest:
         raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-    camera = camera_of(question)
-    if camera is None:
+    criteria = criteria_of(question)
+    if criteria is None:
         return locomotion_plan.constant_schedule(level, plan.phases.shape)
-    scale = locomotion_plan.scale(camera, plan.roots + model.rest_position, model.radius)
-    pixels = DEFAULT_PIXELS if question.pixels is None else question.pixels
+    roots, pixels = plan.roots + model.rest_position, criteria.pixels
+    scale = locomotion_plan.scale(criteria.camera, roots, model.radius)
     return locomotion_plan.schedule_levels(model.level_table, scale, pixels, question.fps)

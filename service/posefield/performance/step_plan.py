@@ -25,14 +25,14 @@ cadence up to which a person stands, cycles a second."""
 SLOW, SLOW_WINDOW = 0.2, 0.5
 """Speed below which steps follow the average velocity, m/s, and its standard deviation, s."""
 SETTLING, LEAST_SETTLED, LAST_STEPS = 0.6, 0.5, 2.7
-"""Mean cadence of the last steps after a stop, cycles a second, their fewest cycles, and the time
-in which a person comes to stand, s, at most."""
+"""Mean cadence of the last steps after a stop, cycles a second, their fewest cycles, and the
+longest time in which a person comes to stand, s."""
 EASE, LEAST_WALKED = 0.1, 0.4
 """Standard deviation of the average with which standing and stepping are blended, s, and smallest
 share of the walk in the pose of a person who steps."""
 TOES, DRIFT = 0.1, 0.1
-"""Distance of the balls of feet ahead of the axis about which they turn, and the way after which
-who hardly moves steps, m."""
+"""Distance of the balls of feet ahead of the axis about which they turn, m, and the distance to
+which a slow body leaves its feet before they step, m."""
 TURN_SPEED, TURN_EASE, FACED = 1.9, 0.5, 0.035
 """Mean rate of a turn on the spot, rad/s, the time that it takes besides, s, and least turn."""
 

@@ -18,11 +18,12 @@ from posefield.common.units import Floats, PerPoint
 from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import Ends, FloorVectors
-from posefield.locomotion.locomotion_plan import MAX_LENGTH, MAX_WAYPOINTS
 from posefield.performance.passage import FloorMotion
 
 SPACING = 0.02
 """Largest distance between the points of a path, m. A path is an arc between two points."""
+# Largest length, m, which takes hours to walk, and most waypoints, whose spline takes seconds.
+MAX_LENGTH, MAX_WAYPOINTS = 10_000.0, 1_000
 
 
 @dataclass(frozen=True)
