@@ -431,7 +431,7 @@ def rows_of(trials: dict[str, Any], models: dict[str, Any]) -> list[Row]:
     for kind, facts in models.items():
         for where in ("captured", "between"):
             if (kind, where) == ("given", "between"):
-                # Nobody knows how fast a gait between commands of a planner should be.
+                # There is no true speed of a gait between commands of a planner.
                 continue
             median = facts[f"{where}_tracked_median"]
             high = f"95 % within {facts[f'{where}_tracked_95']:.2g} %"

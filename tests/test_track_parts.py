@@ -119,7 +119,7 @@ def test_unusable_people_are_refused_or_named(tmp_path):
     assert list((tmp_path / "a").iterdir()) == []
     report = run(tracks, tmp_path / "a.bones.npz", "--skip-bad", "-o", str(tmp_path / "a.arrow"))
     assert list(report["skipped"]) == ["p0", "p3", "p4", "p5"]
-    # A part of nobody has no file, and the clock begins with the first who is there.
+    # A part without people has no file, and the clock begins with the first usable track.
     assert [part["file"] for part in report["parts"]] == [NAMES[0], None, NAMES[2]]
     assert report["parts"][2]["files"] == [NAMES[2], "00002.arrow"]
     rows = pa.ipc.open_stream((tmp_path / "a" / "00002.arrow").read_bytes()).read_all()

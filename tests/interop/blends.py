@@ -59,7 +59,7 @@ def _compared(error: Mapping[str, float], found: Mapping[str, Mapping]) -> Itera
                 yield f"blend of {name}: only {off:g} cm from another walk"
             continue
         asked = POINTS[name][0]
-        # Hips also sway, and are faster where a foot comes down; a cycle's end is no jump.
+        # Hips sway, and go faster as a foot comes down. At a jump they would be far beyond it.
         if off > error["worst_cm"] + 0.1 or abs(speed - asked) > 0.06 or fastest > 1.5 * asked:
             yield f"blend of {name}: {off:g} cm off, {speed:g} m/s, at most {fastest:g}"
 
