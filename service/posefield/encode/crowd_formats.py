@@ -1,15 +1,16 @@
 """Table of the files of crowds, by the ending of their names."""
 
-import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField, UnknownFormat
 from posefield.encode import actor_scene, bone_tables, crowd_size, motion_tables, osi_trace
 from posefield.encode.archives import ARROW, NPZ, Format, by_extension
-from posefield.motion.clip import CrowdClip
+from posefield.motion.clip import CrowdClip, Motions
 from posefield.question.motion_question import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion
 
@@ -81,16 +82,19 @@ def write(crowd: CrowdClip, path: Path, question: WalkQuestion, roles: Roles) ->
 def write_files(crowd: CrowdClip, paths: list[Path], question: WalkQuestion, roles: Roles) -> None:
     """Write a crowd to several files, each as `write` does, of motions that are computed once.
 
-    A temporary file beside the first has the motions meanwhile, half a kilobyte a pose.
+    A temporary file has the motions, half a kilobyte a pose, but no facts of feet, as all files.
     """
     if len(paths) == 1:
         write(crowd, paths[0], question, roles)
         return
+    names = "rotations root_position bone_offsets levels".split() + ["curves"] * bool(crowd.curves)
     with atomic_files.temporary_folder(paths[0]) as folder, (folder / "spool").open("w+b") as file:
         for batch in crowd.batches:
-            pickle.dump(batch, file, protocol=pickle.HIGHEST_PROTOCOL)
+            for name in names:
+                np.save(file, getattr(batch, name), allow_pickle=False)
         size = file.tell()
         for path in paths:
             file.seek(0)
-            batches = (pickle.load(file) for _ in iter(lambda: file.tell() < size, False))
+            left = iter(lambda: file.tell() < size, False)
+            batches = (Motions(**{name: np.load(file) for name in names}) for _ in left)
             write(replace(crowd, batches=batches), path, question, roles)
