@@ -194,8 +194,10 @@ def run(spec, app, accepted, modes, phases):
 
 def failures(event):
     return [
-        f"{event.phase.value} {event.label} {case}: {check.failure_info.failure}"
+        f"{event.phase.value} {event.label}: {check.failure_info.failure}\n{call.request.uri} "
+        f"{call.request.body} {call.response and call.response.content[-500:]}"
         for case, checks in event.recorder.checks.items()
+        for call in [event.recorder.interactions[case]]
         for check in checks
         if check.status == Status.FAILURE
     ]

@@ -149,10 +149,11 @@ def parse_integer(text: str) -> int:
 
     Raises ValueError for any other text.
     """
-    # Whole numbers of queries are below ten digits; int would read any length.
-    if not re.fullmatch("[0-9]{1,9}", text, re.ASCII):
+    # As in a body, 2.0 is 2. Whole numbers of queries are below ten digits.
+    number = float(text) if NUMBER.fullmatch(text) else math.nan
+    if not (number.is_integer() and 0 <= number < 1e9):
         raise ValueError(f"{text!r}, expected a whole number")
-    return int(text)
+    return int(number)
 
 
 def choice_parser(choices: tuple[str, ...]) -> Callable[[str], str]:

@@ -60,6 +60,11 @@ def test_exact_controls_in_words():
             text_decoding.parse_exact(text)
 
 
+@pytest.mark.parametrize("text", ["2", "2.0", "2e0"])
+def test_a_whole_number_may_be_written_as_any_number_of_a_body(text):
+    assert text_decoding.parse_integer(text) == 2
+
+
 def test_a_name_that_is_no_parameter_is_a_control():
     pairs = [("turn", "3"), ("fps", "24"), ("loop", "true"), ("unit", "cm")]
     pairs += [("target", "a@end:1,2,3"), ("target", "b@0.5:1,2,3")]
@@ -81,7 +86,7 @@ def test_a_name_that_is_no_parameter_is_a_control():
         (PoseQuestion, [("time", "0"), ("turn", "1"), ("turn", "2")], "turn: given twice"),
         (PoseQuestion, [("time", "nan")], "time: 'nan', expected a finite number"),
         (PoseQuestion, [("time", "0"), ("turn", "1_0")], "turn: '1_0', expected a finite number"),
-        (PoseQuestion, [("time", "0"), ("level", "1.0")], "level: '1.0', expected a whole number"),
+        (PoseQuestion, [("time", "0"), ("level", "1.5")], "level: '1.5', expected a whole number"),
         (FileQuestion, [("up", "x")], "up: 'x', expected one of y, z"),
         (FileQuestion, [("loop", "1")], "loop: '1', expected one of true, false"),
         (WalkQuestion, [("camera", "1,2")], "camera: '1,2', expected x,y,z in metres"),
