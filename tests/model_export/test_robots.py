@@ -343,6 +343,11 @@ def test_a_file_of_another_robot_is_refused_with_both_counts(robot, tmp_path):
 BAD_ROBOTS = {
     "'left_knee' is a slide joint": ('name="left_knee"', 'name="left_knee" type="slide"'),
     "'neck_yaw' is a ball joint": ('neck_yaw" axis="0 0 1"', 'neck_yaw" type="ball"'),
+    "bodies that float: 'pelvis', 'box', expected the robot's": (
+        "</worldbody>",
+        '<body name="box"><freejoint/><geom size="0.1"/></body></worldbody>',
+    ),
+    "bodies that float: none": (BIPED, "<mujoco/>"),
     "Error opening file 'gone.xml'": ("<worldbody>", '<include file="gone.xml"/><worldbody>'),
     "Error opening file .*gone.stl": (
         "<worldbody>",
@@ -357,6 +362,18 @@ def test_a_robot_that_cannot_be_read_is_refused_with_the_reason(message, tmp_pat
     path.write_text(BIPED.replace(*BAD_ROBOTS[message]))
     with pytest.raises(MotionFileError, match=message):
         robot_file.read(path)
+
+
+def test_bodies_that_are_fixed_to_a_foot_are_one_foot_with_it(robot, tmp_path):
+    box = '<geom type="box" size="0.08 0.04 0.02"/></body>'
+    heel = '<body pos="{} 0 -0.02"><geom type="box" size="0.02 0.04 0.01"/></body>'
+    path = tmp_path / "robot.xml"
+    path.write_text(BIPED.replace(box, f"{heel.format(0.05)}{heel.format(-0.05)}</body>"))
+    parts = robot_file.read(path)
+    assert [parts.bodies[foot.body] for foot in parts.feet] == ["left_foot", "right_foot"]
+    for foot in parts.feet:
+        np.testing.assert_allclose(np.ptp(foot.points, axis=0), [0.14, 0.08, 0.02])
+    assert len(repr(parts)) < 500 and len(repr(motion_of(robot))) < 500
 
 
 def test_a_urdf_file_floats(tmp_path):

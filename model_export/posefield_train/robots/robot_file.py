@@ -29,15 +29,11 @@ def read(path: Path) -> Robot:
     """
     model = model_of(path)
     joints = [_Joint(model, index) for index in range(model.njnt)]
-    free = [joint for joint in joints if joint.kind == "free"]
-    others = [joint for joint in joints if joint.kind in ("ball", "slide")]
-    if others:
-        raise MotionFileError(
-            str(path), f"joint {others[0].name!r} is a {others[0].kind} joint, expected hinges"
-        )
+    free = [joint.body for joint in joints if joint.kind == "free"]
     if len(free) != 1:
-        raise MotionFileError(str(path), f"found {len(free)} free joints, expected one robot's")
-    base = free[0].body
+        listed = ", ".join(repr(model.body(body).name) for body in free) or "none"
+        raise MotionFileError(str(path), f"bodies that float: {listed}, expected the robot's base")
+    base = free[0]
     # Bodies of other trees, such as a floor or a box, are no part of the robot.
     bodies = [index for index in range(1, model.nbody) if model.body_rootid[index] == base]
     places = {body: place for place, body in enumerate(bodies)}
@@ -71,8 +67,12 @@ def model_of(path: Path) -> "mujoco.MjModel":
         spec = mujoco.MjSpec.from_file(str(path))
         # The links of a URDF file stay, and its base floats.
         spec.compiler.fusestatic = False
+        for index, joint in enumerate(spec.joints):
+            if KINDS[joint.type] in ("ball", "slide"):
+                name, kind = joint.name or f"joint {index}", KINDS[joint.type]
+                raise MotionFileError(str(path), f"{name!r} is a {kind} joint, expected hinges")
         bodies = spec.worldbody.bodies
-        if bodies and not any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in spec.joints):
+        if bodies and not any(KINDS[joint.type] == "free" for joint in spec.joints):
             bodies[0].add_freejoint()
         return spec.compile()
     except ValueError as fault:
@@ -80,9 +80,13 @@ def model_of(path: Path) -> "mujoco.MjModel":
         raise MotionFileError(str(path), f"MuJoCo refuses it: {reason}") from None
 
 
+KINDS = ("free", "ball", "slide", "hinge")
+"""Kinds of joints by MuJoCo's numbers."""
+
+
 class _Joint:
     def __init__(self, model: "mujoco.MjModel", index: int) -> None:
-        self.kind = ("free", "ball", "slide", "hinge")[int(model.jnt_type[index])]
+        self.kind = KINDS[int(model.jnt_type[index])]
         self.name = model.joint(index).name or f"joint {index}"
         self.body = int(model.jnt_bodyid[index])
         self.axis = model.jnt_axis[index].copy()
@@ -142,7 +146,10 @@ def _outermost(points: Floats) -> Floats:
 
 
 def _with_feet(robot: Robot, surfaces: list[Floats]) -> Robot:
-    """Return the robot with its feet: the bodies whose surfaces are the lowest at rest."""
+    """Return the robot with its feet: the bodies whose surfaces are the lowest at rest.
+
+    A body without a hinge is one with the body that carries it, such as spheres below an ankle.
+    """
     identity, angles = quat.IDENTITY[None], np.zeros((1, len(robot.hinges)))
     positions, rotations = robot.body_poses(np.zeros((1, 3)), identity, angles)
     lowest: dict[int, float] = {}
@@ -151,8 +158,18 @@ def _with_feet(robot: Robot, surfaces: list[Floats]) -> Robot:
             heights = positions[0, body, 2] + quat.rotate(rotations[0, body], points)[:, 2]
             lowest[body] = float(heights.min())
     ground = min(lowest.values(), default=0.0)
-    low = [body for body, height in lowest.items() if height < ground + GROUND_BAND]
+    soles: dict[int, list[Floats]] = {}
+    for body in (body for body, height in lowest.items() if height < ground + GROUND_BAND):
+        points, hinged = surfaces[body], body
+        while hinged and hinged not in robot.hinge_bodies:
+            points = robot.offsets[hinged] + quat.rotate(robot.turns[hinged], points)
+            hinged = robot.parents[hinged]
+        soles.setdefault(hinged, []).append(points)
     # Of an ankle and the foot that it carries, the foot.
-    carriers = {robot.parents[body] for body in low}
-    feet = tuple(Foot(body, surfaces[body]) for body in low if body not in carriers)
+    carriers = {robot.parents[body] for body in soles}
+    feet = tuple(
+        Foot(body, _outermost(np.concatenate(points)))
+        for body, points in soles.items()
+        if body not in carriers
+    )
     return replace(robot, feet=feet)

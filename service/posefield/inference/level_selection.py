@@ -12,7 +12,7 @@ import math
 import time
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from hashlib import blake2b
 from typing import Annotated
@@ -286,7 +286,7 @@ class NamedModel:
     """An opened model file and the name under which it is asked."""
 
     name: str
-    session: Session
+    session: Session = field(repr=False)
 
     @cached_property
     def identity(self) -> str:

@@ -34,13 +34,13 @@ class Clip:
     by index, of the roles that the model's recipe gives.
     """
 
-    skeleton: Skeleton
-    rotations: Rotations
-    translations: Positions
+    skeleton: Skeleton = field(repr=False)
+    rotations: Rotations = field(repr=False)
+    translations: Positions = field(repr=False)
     rate: float
-    curves: CurveValues | None = None
+    curves: CurveValues | None = field(default=None, repr=False)
     root_bone: bool = False
-    roles: Mapping[str, int] = field(default_factory=dict)
+    roles: Mapping[str, int] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         frames, joints = len(self.rotations), len(self.skeleton)

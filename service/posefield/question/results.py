@@ -248,7 +248,7 @@ class ClipAnswer(SampledClip):
     """
 
     trust: Trust
-    robot: Robot | None = None
+    robot: Robot | None = field(default=None, repr=False)
     loops: bool = False
 
 

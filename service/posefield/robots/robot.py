@@ -42,14 +42,14 @@ class Robot:
     name: str
     bodies: tuple[str, ...]
     parents: tuple[int, ...]
-    offsets: Annotated[Floats, "bodies 3"]
-    turns: Annotated[Floats, "bodies 4"]
+    offsets: Annotated[Floats, "bodies 3"] = field(repr=False)
+    turns: Annotated[Floats, "bodies 4"] = field(repr=False)
     hinges: tuple[str, ...]
     hinge_bodies: tuple[int, ...]
-    axes: Annotated[Floats, "hinges 3"]
-    anchors: Annotated[Floats, "hinges 3"]
-    ranges: Annotated[Floats, "hinges 2"]
-    feet: tuple[Foot, ...] = field(default=())
+    axes: Annotated[Floats, "hinges 3"] = field(repr=False)
+    anchors: Annotated[Floats, "hinges 3"] = field(repr=False)
+    ranges: Annotated[Floats, "hinges 2"] = field(repr=False)
+    feet: tuple[Foot, ...] = field(default=(), repr=False)
 
     def body_order(self, order: Order) -> list[int]:
         """Return the indices of the bodies in an order."""

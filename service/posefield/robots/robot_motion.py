@@ -17,7 +17,7 @@ LIMIT_TOLERANCE = np.radians(0.1)
 """Angle beyond a limit that rounding explains."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RobotMotion:
     """Frames of a robot's base and hinges, Z up.
 
@@ -30,9 +30,9 @@ class RobotMotion:
 
     source: str
     format: str
-    base_path: RootPath
-    base_rotations: Annotated[Floats, "frames 4"]
-    angles: HingeAngles
+    base_path: RootPath = field(repr=False)
+    base_rotations: Annotated[Floats, "frames 4"] = field(repr=False)
+    angles: HingeAngles = field(repr=False)
     rate: float
     hinges: tuple[str, ...] = ()
     loops: bool | None = None
