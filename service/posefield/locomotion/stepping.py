@@ -136,24 +136,35 @@ def cadences(
     return np.asarray((walked**POWER + stepped**POWER) ** (1.0 / POWER))
 
 
+def stances(
+    phases: Frames, passings: Annotated[Floats, "2"]
+) -> tuple[Annotated[Floats, "frames 2"], Annotated[Floats, "frames 2"]]:
+    """Return the phases of the middle of each foot's last stance (F, 2), and shares of the next.
+
+    phases: of the cycle (F,), without wrapping. passings: phase at which each foot swings past the
+    other one. The next stance is a cycle later; the share (F, 2) grows while the foot swings.
+    """
+    cycles = phases[:, None] - passings
+    swing = np.round(cycles)
+    share = quat.smoothstep(np.clip((cycles - swing) / SWING + 0.5, 0.0, 1.0))
+    return passings + swing - 0.5, share
+
+
 def stepped(
     phases: Frames, beyond: Annotated[Numbers, "*frames"], passings: Annotated[Floats, "2"]
 ) -> Annotated[Numbers, "frames 2"]:
     """Return the changes of both legs (F, 2) with which feet keep their places in stances.
 
-    phases: of the cycle (F,), without wrapping. beyond: turns, rad, or ways, m, of the body beyond
-    those of the model (F,), or of each foot (F, 2). passings: phase at which each foot swings past
-    the other one. A foot has the place of the body in the middle of its stance, and goes to the
-    next one while it swings.
+    phases, passings: as of `stances`. beyond: turns, rad, or ways, m, of the body beyond those of
+    the model (F,), or of each foot (F, 2). A foot has the place of the body in the middle of its
+    stance, and goes to the next one while it swings.
     """
+    middles, shares = stances(phases, passings)
     changes = np.empty((len(phases), 2), beyond.dtype)
     # Phases may rest, where the body does, too.
     rising = phases + 1e-9 * np.arange(len(phases))
     of_feet = np.broadcast_to(beyond.T, changes.T.shape)
-    for foot, (passing, way) in enumerate(zip(passings.tolist(), of_feet, strict=True)):
-        cycles = phases - passing
-        swing = np.round(cycles)
-        before, after = (np.interp(passing + swing + half, rising, way) for half in (-0.5, 0.5))
-        share = quat.smoothstep(np.clip((cycles - swing) / SWING + 0.5, 0.0, 1.0))
+    for foot, (middle, share, way) in enumerate(zip(middles.T, shares.T, of_feet, strict=True)):
+        before, after = (np.interp(middle + cycle, rising, way) for cycle in (0.0, 1.0))
         changes[:, foot] = before + share * (after - before) - way
     return changes

@@ -38,8 +38,6 @@ from posefield.locomotion.gait import ITERATIONS, Gait, requested_labels
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import quat, skeleton
-from posefield.motion.contact_detection import FootContact
-from posefield.performance.passage import FloorMotion
 from posefield.question.motion_question import LabelValue, check_number, check_range
 from posefield.synthesis import walking_feet
 from posefield.validation.question_validation import label_weights
@@ -227,14 +225,11 @@ LEFT = np.array([1.0, 0.0, 0.0])
 class FootPassing:
     """Moment of the cycle at which the swinging foot is beside the standing one.
 
-    phase: of the cycle. swinging: leg, by place. before, after: phases since the double support
-    before it, and to the one after it.
+    phase: of the cycle. swinging: leg, by place.
     """
 
     phase: float
     swinging: int
-    before: float
-    after: float
 
 
 @dataclass(frozen=True)
@@ -242,34 +237,20 @@ class StandingPose:
     """Pose with both feet on the floor, in the frame that travels with the walker.
 
     parents: of the joints. bones: offsets (J, 3), m. legs: of the two feet, in the order of the
-    passages' contacts. contacts: statistics of the feet. passings: of a cycle. rotations: (J, 4).
-    height: of the root, m. place: of the root over the floor. balls: of the feet over the floor
-    (2,). levels: heights of the balls (2,), m. gaps: from the balls to where they are in the walk
-    while the other foot passes (2,).
+    passages' contacts. passings: of a cycle. rotations: (J, 4). height: of the root, m. place: of
+    the root over the floor. balls: of the feet over the floor (2,). levels: heights of the balls
+    (2,), m.
     """
 
     parents: tuple[int, ...]
     bones: Bones
     legs: tuple[Limb, Limb]
-    contacts: tuple[FootContact, FootContact]
     passings: tuple[FootPassing, FootPassing]
     rotations: JointRotations
     height: float
     place: complex
     balls: Annotated[FloorVectors, "2"]
     levels: Annotated[Floats, "2"]
-    gaps: Annotated[FloorVectors, "2"]
-
-    @property
-    def phases(self) -> Annotated[Floats, "2"]:
-        """Return the phases at which a foot passes the other one."""
-        return np.array([passing.phase for passing in self.passings])
-
-    def passing_at(self, phase: float) -> FootPassing:
-        """Return the passing that is nearest to a phase."""
-        return min(
-            self.passings, key=lambda passing: abs((passing.phase - phase + 0.5) % 1.0 - 0.5)
-        )
 
 
 def find_standing_pose(walker: Walker) -> StandingPose | None:
@@ -296,22 +277,10 @@ def _made(walker: Walker) -> StandingPose | None:
     if legs[0] is None or legs[1] is None:
         return None
     cycle = _Cycle(parents, bones, (legs[0], legs[1]), posed)
-    passings = _passings(cycle, walker.double_supports)
+    passings = _passings(cycle) if len(walker.double_supports) == 2 else None
     if passings is None:
         return None
-    return _stand(cycle, (contacts[0], contacts[1]), passings)
-
-
-def path_start(walker: Walker, pose: StandingPose) -> tuple[FloorMotion, float]:
-    """Return where the path of a walk begins that opens from its standing pose, and its phase.
-
-    The path is in the frame of the pose: it begins below the mean root, and runs the way the walker
-    travels.
-    """
-    first = pose.passings[0]
-    root = complex(walker.mean_offsets(walker.slowest)[0]) - pose.gaps[1 - first.swinging]
-    drift = float(walker.strides(walker.slowest).drifts[0])
-    return FloorMotion(drift, complex(root)), first.phase
+    return _stand(cycle, passings)
 
 
 @dataclass(frozen=True)
@@ -339,30 +308,24 @@ class _Cycle:
         return self.evaluate(self.posed.rotations, self.roots)
 
 
-def _passings(
-    cycle: _Cycle, supports: Annotated[Floats, "some"]
-) -> tuple[FootPassing, FootPassing] | None:
+def _passings(cycle: _Cycle) -> tuple[FootPassing, FootPassing] | None:
     """Return the moments at which the feet pass each other; None if they do not do so twice."""
     forward = [floor_plane.project(cycle.poses.position(leg.tip)).real for leg in cycle.legs]
     gap = forward[0] - forward[1]
     later = np.roll(gap, -1)
     rows = np.flatnonzero((gap < 0.0) != (later < 0.0))
-    if len(rows) != 2 or len(supports) != 2:
+    if len(rows) != 2:
         return None
-    first, second = (_passing(gap, later, int(row), supports) for row in rows)
+    first, second = (_passing(gap, later, int(row)) for row in rows)
     return (first, second) if first.swinging != second.swinging else None
 
 
 def _passing(
-    gap: Annotated[Floats, "phases"],
-    later: Annotated[Floats, "phases"],
-    row: int,
-    supports: Annotated[Floats, "some"],
+    gap: Annotated[Floats, "phases"], later: Annotated[Floats, "phases"], row: int
 ) -> FootPassing:
     """Return the passing between a phase and the next one; the foot that gets ahead swings."""
     phase = (row + float(gap[row] / (gap[row] - later[row]))) / len(gap)
-    before, after = np.min((phase - supports) % 1.0), np.min((supports - phase) % 1.0)
-    return FootPassing(phase, 0 if gap[row] < 0.0 else 1, float(before), float(after))
+    return FootPassing(phase, 0 if gap[row] < 0.0 else 1)
 
 
 @dataclass(frozen=True)
@@ -420,7 +383,6 @@ def _below(parents: tuple[int, ...], leg: Limb) -> Indices:
 
 def _stand(
     cycle: _Cycle,
-    contacts: tuple[FootContact, FootContact],
     passings: tuple[FootPassing, FootPassing],
 ) -> StandingPose:
     """Return the pose in which both feet stand, beside each other."""
@@ -449,8 +411,8 @@ def _stand(
         rotations[leg.lower] = quat.mul(lower, turned)[0]
     levels = np.array([standing.level for standing in stood])
     pose = rotations, min(heights), root_place
-    feet = balls, levels, stances - balls
-    return StandingPose(cycle.parents, cycle.bones, cycle.legs, contacts, passings, *pose, *feet)
+    feet = balls, levels
+    return StandingPose(cycle.parents, cycle.bones, cycle.legs, passings, *pose, *feet)
 
 
 def _sides(

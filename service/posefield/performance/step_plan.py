@@ -7,7 +7,7 @@ after a stop advance it too. All is planned in the size of the model's body.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Strider:
 
     poses: standing ones, of which `row` is the walker's; None for a model without two feet. speeds:
     (S,), m/s. lengths: (S,), m. durations: (S,), s. drifts: (S,), rad. offsets: mean points of the
-    root (S,).
+    root (S,). leans: how much these move by a rate of turning (S,), m s/rad.
     """
 
     walker: Walker
@@ -54,16 +54,20 @@ class Strider:
     durations: Floats
     drifts: Floats
     offsets: Annotated[FloorVectors, "speeds"]
+    leans: Annotated[FloorVectors, "speeds"]
 
 
 def find_striders(walkers: Sequence[Walker]) -> tuple[Strider, ...]:
     """Return the strides of walkers of one model."""
     poses, striders = find_standing_poses(walkers), []
     speeds = np.linspace(*walkers[0].gait.region.speeds, TABLE_SPEEDS)
+    right, left = walkers[0].gait.region.turning(speeds)
     for row, walker in enumerate(walkers):
         controls = walker.controls(speeds, np.zeros(TABLE_SPEEDS))
         done, offsets = walker.strides(controls), walker.mean_offsets(controls)
-        tables = done.speeds, np.abs(done.travels), done.durations, done.drifts, offsets
+        to_left, to_right = (walker.mean_offsets(walker.controls(speeds, s)) for s in (left, right))
+        leans = (to_left - to_right) / np.maximum(left - right, 1e-6)
+        tables = done.speeds, np.abs(done.travels), done.durations, done.drifts, offsets, leans
         striders.append(Strider(walker, poses, row, *tables))
     return tuple(striders)
 
@@ -126,7 +130,7 @@ def plan_steps(
     phase. rate: frames a second.
     """
     (points, headings), velocities = path, np.gradient(path[0]) * rate
-    region, frames = table.walker.gait.region, len(points)
+    region = table.walker.gait.region
     low, high = region.speeds
     slow = smooth(velocities, SLOW_WINDOW * rate, fixed=False)
     stepped = np.where(np.abs(velocities) < SLOW, slow, velocities) * np.exp(-1j * headings)
@@ -148,49 +152,99 @@ def plan_steps(
         lead = poses.passings[row, np.argmax(poses.sides * stepped.imag[first])]
         number = 0.5 * float(np.argmin((lead - supports) % 1.0))
     phases, moving = _phases(cadences, supports, number, rate, points)
-    steps = smooth(moving.astype(complex), EASE * rate, fixed=False).real
-    speed = np.clip(np.abs(stepped.real) / low, 0.0, 1.0)
-    shares = 1.0 - steps * np.maximum(LEAST_WALKED, np.sqrt(speed))
-    shares = smooth(shares.astype(complex), EASE * rate, fixed=False).real
-    offsets = np.interp(forward, table.speeds, table.offsets)
-    turns, shifts = np.zeros((frames, 2)), np.zeros((frames, 2), complex)
+    offsets, leans = (np.interp(forward, table.speeds, v) for v in (table.offsets, table.leans))
+    offsets = offsets + walked * leans
+    beyond = turning - walked
+    course = Course(phases, moving, cadences, stepped, beyond, lengths, walked * durations)
+    placed = place_feet(poses, row, (points, headings, points), course, low, rate)
     if poses is not None:
-        # Of the turn and the way since the middle of a stance the stride has a part in its pose.
-        passings = poses.passings[row]
-        strides = (1.0 - shares)[:, None] * stepping.stepped(phases, phases, passings)
-        turns = stepping.stepped(phases, headings, passings)
-        turns -= (walked * durations)[:, None] * strides
-        # Feet are wider apart by half a step to the side, or where toes turn in: none crosses.
-        aside = np.abs(stepped.imag) + TOES * np.abs(turning - walked)
-        apart = 0.25 * steps * aside / np.maximum(cadences, QUIET)
-        placed = points[:, None] + np.outer(apart * np.exp(1j * headings), 1j * poses.sides)
-        shifts = stepping.stepped(phases, placed, passings) + placed - points[:, None]
-        shifts *= np.exp(-1j * headings)[:, None]
-        shifts -= lengths[:, None] * strides
-        offsets = offsets + shares * (poses.points[row] - offsets)
-    else:
-        shares = np.zeros(frames)
-    faced = headings - (1.0 - shares) * drifts
+        offsets = offsets + placed.shares * (poses.points[row] - offsets)
+    faced = headings - (1.0 - placed.shares) * drifts
     return StepPlan(
         forward,
         walked,
         phases,
         points - np.exp(1j * faced) * offsets,
         faced,
-        shares,
-        quat.smoothstep(np.clip(1.0 - steps, 0.0, 1.0)),
-        turns,
-        shifts,
+        *placed,
     )
 
 
-def stepping_of(strider: Strider, plans: Sequence[StepPlan]) -> Stepping | None:
+class Course(NamedTuple):
+    """Motion of a person in F frames besides the path.
+
+    phases: without wrapping (F,). moving: whether the feet step (F,). cadences: (F,), cycles a
+    second. velocities: in the frame of the body (F,), m/s. beyond: rates of turning beyond those of
+    the model (F,), rad/s. lengths: of the model's stride (F,), m. turned: turns of its cycle (F,),
+    rad.
+    """
+
+    phases: Frames
+    moving: np.ndarray
+    cadences: Frames
+    velocities: Annotated[FloorVectors, "frames"]
+    beyond: Frames
+    lengths: Frames
+    turned: Frames
+
+
+class PlacedFeet(NamedTuple):
+    """Share of the standing pose, and what keeps feet in their places, as of `Stepping`."""
+
+    shares: Frames
+    firm: Frames
+    turns: Annotated[Floats, "frames 2"]
+    shifts: Annotated[FloorVectors, "frames 2"]
+
+
+def place_feet(
+    poses: StandingPoses | None,
+    row: int,
+    path: tuple[Annotated[FloorVectors, "frames"], Frames, Annotated[FloorVectors, "frames"]],
+    course: Course,
+    slowest: float,
+    rate: float,
+) -> PlacedFeet:
+    """Return how the legs of a person step along a path; without change for less than two feet.
+
+    path: as of `plan_steps`, and points (F,) under which feet are set. slowest: of the model's
+    speeds, m/s.
+    """
+    (points, headings, anchors), frames = path, len(path[0])
+    steps = smooth(course.moving.astype(complex), EASE * rate, fixed=False).real
+    firm = quat.smoothstep(np.clip(1.0 - steps, 0.0, 1.0))
+    if poses is None:
+        none = np.zeros((frames, 2))
+        return PlacedFeet(np.zeros(frames), firm, none, none.astype(complex))
+    speed = np.clip(np.abs(course.velocities.real) / slowest, 0.0, 1.0)
+    shares = 1.0 - steps * np.maximum(LEAST_WALKED, np.sqrt(speed))
+    shares = smooth(shares.astype(complex), EASE * rate, fixed=False).real
+    # Of the turn and the way since the middle of a stance the stride has a part in its pose.
+    passings, phases = poses.passings[row], course.phases
+    middles, share = stepping.stances(phases, passings)
+    first, last = np.where(course.moving[[0, -1]], phases[[0, -1]], [-np.inf, np.inf])
+    before, after = (np.clip(middles + cycle, first, last) for cycle in (0.0, 1.0))
+    strides = (1.0 - shares)[:, None] * (before + share * (after - before) - phases[:, None])
+    turns = stepping.stepped(phases, headings, passings) - course.turned[:, None] * strides
+    # Feet are wider apart by half a step to the side, or where toes turn in: none crosses.
+    aside = np.abs(course.velocities.imag) + TOES * np.abs(course.beyond)
+    widths = 0.25 * steps * aside / np.maximum(course.cadences, QUIET)
+    placed = anchors[:, None] + np.outer(widths * np.exp(1j * headings), 1j * poses.sides)
+    shifts = stepping.stepped(phases, placed, passings) + placed - points[:, None]
+    shifts *= np.exp(-1j * headings)[:, None]
+    shifts -= course.lengths[:, None] * strides
+    return PlacedFeet(shares, firm, turns, shifts)
+
+
+def stepping_of(
+    walker: Walker, poses: StandingPoses | None, plans: Sequence[StepPlan | PlacedFeet]
+) -> Stepping | None:
     """Return the steps of people whose plans have equally many frames; None without two feet."""
-    if strider.poses is None:
+    if poses is None:
         return None
     names = "shares", "firm", "turns", "shifts"
     fields = (np.stack([getattr(plan, name) for plan in plans]) for name in names)
-    return Stepping(strider.poses, strider.walker.card.skeleton.parents, *fields)
+    return Stepping(poses, walker.card.skeleton.parents, *fields)
 
 
 def _phases(

@@ -11,7 +11,7 @@ from posefield.constraints.take_variation import TakeSettings
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.model_file.model_card import PERFORMER
-from posefield.performance import standing_pose, standing_steps
+from posefield.performance import standing_pose
 from posefield.performance.joins import Cut
 from posefield.performance.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script, Source
@@ -49,17 +49,12 @@ def walk_passage(
         posed = plan.steps.apply((0 * frames, frames), 0 * frames, posed)
         contacts += plan.steps.firm[0, :, None] * (1.0 - contacts)
     roots = plan.places + posed.places * np.exp(1j * plan.headings)
-    walked = Passage(
+    return Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
         floor_plane.at_height(roots, posed.heights),
         contacts,
         _sigmas(model, plan.walker, plan.controls),
         phases,
-    )
-    if plan.standing is None:
-        return walked
-    return standing_steps.add_standing_ends(
-        walked, plan.places, plan.headings, plan.phases, plan.standing
     )
 
 
@@ -269,11 +264,8 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
     pose = standing_pose.find_standing_pose(walking) if request.start == "standing" else None
     if pose is not None:
         cut = timeline.find_cut(script.adapted(index, still(pose)), range(1))
-        begin, first = standing_pose.path_start(walking, pose)
-        if request.facing is not None:
-            begin = FloorMotion(0.0, pose.place)
-        at_rest = replace(cut, motion=FloorMotion())
-        return WalkEntry(request, cut.motion.after(begin), first, at_rest)
+        begin, at_rest = FloorMotion(0.0, pose.place), replace(cut, motion=FloorMotion())
+        return WalkEntry(request, cut.motion.after(begin), 0.0, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
     level, take = script.question.level, take_settings(script.question)
     stride, poses, offset = _cycles.find(

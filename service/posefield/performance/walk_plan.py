@@ -17,16 +17,15 @@ from posefield.locomotion import stepping
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.stepping import Stepping
+from posefield.motion import quat
 from posefield.performance import (
-    standing_pose,
-    standing_steps,
     step_plan,
     walk_paths,
     walk_request,
 )
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.standing_pose import Walker, find_walker
-from posefield.performance.standing_steps import MOST_BESIDE, StandingEnds
+from posefield.performance.step_plan import Course
 from posefield.performance.walk_paths import Destination, FloorPath, Radii
 from posefield.performance.walk_request import SpeedRamps, WalkNote, WalkRequest
 from posefield.question.motion_question import check_number
@@ -36,6 +35,12 @@ MAX_SCALING, SHORT_SCALING = 0.06, 0.15
 that is long enough, and of a shorter one."""
 SCALED_CYCLES = 2.0
 """Smallest number of cycles before a stop over which strides are scaled, of those there are."""
+STEP_REST, STEP_END, LEAST_SWING = 0.35, 0.9, 0.12
+"""Time in which a walker stands at a standing end, time until the first or since the last step
+there, s, and least part of the cycle in which its foot swings beside the other one."""
+BESIDE, NEARING = 0.08, 0.3
+"""Distances from a standing end up to which feet are set for it, and from which on they are not,
+m."""
 SYNTHESISED = "synthesised"
 """First word of the codes of notes about motion that no capture shows."""
 
@@ -47,43 +52,43 @@ def plan_phases(
     phase: float,
     end_kinds: tuple[str, str],
     extra: Frames | float = 0.0,
-) -> tuple[Frames, StandingEnds | None, list[WalkNote]]:
-    """Return the phases (F,) of a walk, without wrapping, steps at its standing ends, and notes.
+    stretch: float = 1.0,
+) -> tuple[Frames, tuple[bool, bool], list[WalkNote]]:
+    """Return the phases (F,) of a walk, without wrapping, which ends are steps, and notes.
 
-    The steps are None for a walk without any. distances: (F,), m. ways: lengths of the stride (F,),
-    m. phase: at the first frame. end_kinds: whether the walk begins and ends "standing". A walk
-    that is too short for an opening or a closing step begins or ends in double support. extra:
-    phases of each frame (F,) beyond those of the way, of turns on planned steps.
+    distances: (F,), m. ways: lengths of the stride (F,), m. phase: at the first frame. end_kinds:
+    whether the walk begins and ends "standing". A walk that is too short for an opening or a
+    closing step begins or ends in double support. extra: phases of each frame (F,) beyond those of
+    the way, of turns on planned steps. stretch: cycles over those of the way.
     """
     steps = np.diff(distances) * 0.5 * (1.0 / ways[1:] + 1.0 / ways[:-1])
-    gone = np.pad(np.cumsum(steps + np.broadcast_to(extra, len(ways))[1:]), (1, 0))
+    gone = stretch * np.pad(np.cumsum(steps + np.broadcast_to(extra, len(ways))[1:]), (1, 0))
     begin, stop = (end == "standing" for end in end_kinds)
     if not (begin or stop):
-        return phase + gone, None, []
-    pose = standing_pose.find_standing_pose(walker)
-    steps_wanted = begin and pose is not None, stop and pose is not None
-    # Without room for a step, the phases are planned once more for a walk without it.
-    for _ in range(2 if any(steps_wanted) else 1):
-        quiet = [
-            pose.phases if pose and with_step else walker.double_supports
-            for with_step in steps_wanted
-        ]
-        first = phase + _to_nearest(phase, quiet[0]) if begin else phase
-        phases, left = first + gone, 0.0
-        if stop:
-            phases, left = _scaled(phases, _to_nearest(float(phases[-1]), quiet[1]))
-        closing = standing_steps.closing_frames(pose, phases) if pose and steps_wanted[1] else 0
-        opening = standing_steps.opening_frames(pose, phases) if pose and steps_wanted[0] else 0
-        opening = opening if opening + closing <= len(phases) else 0
-        if (opening > 0, closing > 0) == steps_wanted:
-            break
-        steps_wanted = opening > 0, closing > 0
-    standing = StandingEnds(pose, opening, closing) if pose and any(steps_wanted) else None
-    notes = [
-        *_standing_notes(end_kinds, steps_wanted),
-        *_left_notes(left, float(ways[-1]), steps_wanted[1]),
-    ]
-    return phases, standing, notes
+        return phase + gone, (False, False), []
+    poses, frames = step_plan.find_standing_poses([walker]), len(ways)
+    stepped = poses is not None and frames > (begin + stop) * STEP_END * RATE
+    quiet = poses.passings[0] if poses is not None and stepped else walker.double_supports
+    first = phase + _to_nearest(phase, quiet) if begin else phase
+    phases, left = first + gone, 0.0
+    if stop:
+        phases, left = _scaled(phases, _to_nearest(float(phases[-1]), quiet))
+    notes = [*_standing_notes(end_kinds, stepped)]
+    if poses is None or not stepped:
+        return phases, (False, False), [*notes, *_left_notes(left)]
+    # The body moves while a foot swings past the other one; before and after, both feet stand.
+    supports, times = poses.supports[0], np.arange(frames) / RATE
+    ramps = (
+        quat.smoothstep(np.clip((t - STEP_REST) / (STEP_END - STEP_REST), 0.0, 1.0))
+        for t in (times, times[::-1])
+    )
+    before, after = (1.0 - ramp for ramp in ramps)
+    if begin:
+        phases = phases - before * (LEAST_SWING + (first - supports - LEAST_SWING) % 1.0).min()
+    if stop:
+        end = float(phases[-1])
+        phases = phases + after * (LEAST_SWING + (supports - end - LEAST_SWING) % 1.0).min()
+    return phases, (begin, stop), notes
 
 
 def _to_nearest(phase: float, quiet: Annotated[Floats, "phases"]) -> float:
@@ -110,33 +115,28 @@ def _scaled(phases: Frames, missing: float) -> tuple[Frames, float]:
     return phases + done * 0.5 * (1.0 - np.cos(np.pi * progress)), missing - done
 
 
-def _standing_notes(end_kinds: tuple[str, str], steps: tuple[bool, bool]) -> Iterator[WalkNote]:
+def _standing_notes(end_kinds: tuple[str, str], stepped: bool) -> Iterator[WalkNote]:
     names = ("start", "begins", "an opening step"), ("stop", "ends", "a closing step")
-    for (field, word, step), end, has_step in zip(names, end_kinds, steps, strict=True):
+    for (field, word, step), end in zip(names, end_kinds, strict=True):
         if end != "standing":
             continue
-        manner = f"with {step}" if has_step else "by slowing down its slowest stride"
+        manner = f"with {step}" if stepped else "by slowing down its slowest stride"
         message = f"the walk {word} standing {manner}, which is synthesised: none was captured"
         yield WalkNote(f"{SYNTHESISED}-{field}", field, message)
-        if not has_step:
+        if not stepped:
             message = f"there is no room for {step}: the walk {word} with one foot ahead"
             yield WalkNote("feet-apart", field, message)
 
 
-def _left_notes(left: float, stride_length: float, closed: bool) -> Iterator[WalkNote]:
-    """Yield a note on a stop that strides could not be scaled for.
-
-    stride_length: of a stride, m.
-    """
-    if closed and 2.0 * (abs(left) * stride_length - MOST_BESIDE) > MOST_BESIDE:
-        distance = 200.0 * (abs(left) * stride_length - MOST_BESIDE)
-        aim = f"bring the feet beside each other: one stands {distance:.0f} cm ahead"
-    elif not closed and abs(left) > 0.01:
-        aim = f"stop in double support: {100.0 * abs(left):.0f} % of a cycle are left"
-    else:
-        return
-    message = f"the walk is too short to {aim}; a path longer by a quarter of a stride mends it"
-    yield WalkNote("stops-in-mid-stride", "stop", message)
+def _left_notes(left: float) -> Iterator[WalkNote]:
+    """Yield a note on a stop that strides could not be scaled for. left: cycles."""
+    if abs(left) > 0.01:
+        yield WalkNote(
+            "stops-in-mid-stride",
+            "stop",
+            f"the walk is too short to stop in double support: {100.0 * abs(left):.0f} % of a "
+            "cycle are left; a path longer by a quarter of a stride mends it",
+        )
 
 
 PIVOT = 1.3
@@ -170,8 +170,8 @@ class WalkPlan:
     path: that the root follows in the mean over a cycle. distances: (F,), along it, m. places: (F,)
     and headings: (F,), rad, of the frame that travels with the walker. phases: (F,), of the cycle,
     without wrapping. controls: (F, d). speeds: (F,), m/s. steps: beyond the captured walk; None
-    without them. notes: on what is not as captured. stops: whether it ends standing. standing:
-    steps at standing ends; None without them.
+    without them. notes: on what is not as captured. stops: whether it ends standing. closes:
+    whether with a step that brings the feet beside each other.
     """
 
     walker: Walker
@@ -185,7 +185,7 @@ class WalkPlan:
     steps: Stepping | None = None
     notes: tuple[WalkNote, ...] = ()
     stops: bool = False
-    standing: StandingEnds | None = None
+    closes: bool = False
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -195,14 +195,7 @@ class WalkPlan:
         """Return the frames from `begin` until before `end`, on the same path."""
         names = ("distances", "places", "headings", "phases", "controls", "speeds")
         arrays = {name: getattr(self, name)[begin:end] for name in names}
-        standing = self.standing and self.standing.part(len(self), begin, end)
-        steps = self.steps and self.steps.part(begin, end)
-        return replace(self, **arrays, standing=standing, steps=steps)
-
-    @property
-    def closes(self) -> bool:
-        """Return whether the walk ends with a closing step."""
-        return self.standing is not None and self.standing.closing > 0
+        return replace(self, **arrays, steps=self.steps and self.steps.part(begin, end))
 
     @property
     def exit_rates(self) -> tuple[float, float]:
@@ -217,42 +210,74 @@ class WalkPlan:
 
 
 def plan_walk(
-    gait: Gait, request: WalkRequest, start: FloorMotion | None, phase: float
+    gait: Gait,
+    request: WalkRequest,
+    start: FloorMotion | None,
+    phase: float,
+    stretch: float = 1.0,
 ) -> WalkPlan:
     """Return the plan of a walk.
 
     start: place and heading where it begins; None to begin at the first waypoint of `along`, or at
     the origin. phase: of the cycle at the first frame, moved to a double support for a walk that
-    begins standing. Raises InvalidField, with the field of the request, for a walk that the model
-    cannot do.
+    begins standing. stretch: cycles over those that the strides take. Raises InvalidField, with the
+    field of the request, for a walk that the model cannot do.
     """
     walker = find_walker(gait, request.labels, request.controls)
     if request.facing is not None:
         return _plan_facing(walker, request, start or FloorMotion(), request.facing)
     path, distances, notes = _route(gait, request, start)
     walk_request.check_clear(path, request.obstacles)
-    speeds = np.gradient(distances, 1.0 / RATE)
-    knots = np.unique(np.append(np.arange(0, len(distances), STEP), len(distances) - 1))
+    frames, speeds = len(distances), np.gradient(distances, 1.0 / RATE)
+    knots = np.unique(np.append(np.arange(0, frames, STEP), frames - 1))
     rates, pivots = _rates(gait, request, path, distances[knots], speeds[knots])
     knot_controls = walker.controls(*rates)
-    controls = _between(len(distances), knots, knot_controls)
+    controls = _between(frames, knots, knot_controls)
     done = walker.strides(knot_controls)
-    ways = _between(len(distances), knots, np.abs(done.travels))
+    ways = _between(frames, knots, np.abs(done.travels))
+    centres, headings = path.at(distances)
+    slowest = gait.region.speeds[0]
+    turned = np.interp(np.arange(frames), knots, rates[1]) * np.minimum(speeds / slowest, 1.0)
+    beyond = np.gradient(headings) * RATE - turned
+    pivoted = bool(np.abs(beyond).max() > UNSTEPPED)
+    extra = _stepping_cadences(speeds / ways, beyond) / RATE if pivoted else 0.0
     end_kinds = (request.start, request.stop)
-    centres, tangents = path.at(distances)
-    turning = np.gradient(tangents) * RATE
-    beyond = turning - np.interp(np.arange(len(distances)), knots, rates[1]) * np.minimum(
-        speeds / gait.region.speeds[0], 1.0
+    phases, step_ends, phase_notes = plan_phases(
+        walker, distances, ways, phase, end_kinds, extra, stretch
     )
-    stepped = bool(np.abs(beyond).max() > UNSTEPPED)
-    extra = _stepping_cadences(speeds / ways, beyond) / RATE if stepped else 0.0
-    phases, standing, phase_notes = plan_phases(walker, distances, ways, phase, end_kinds, extra)
-    steps = _turning_steps(walker, phases, beyond) if stepped else None
-    headings = tangents - _between(len(distances), knots, done.drifts)
-    origins = centres - np.exp(1j * headings) * _offsets(walker, controls)
-    fields = walker, path, distances, origins, headings, phases, controls, speeds, steps
+    poses = step_plan.find_standing_poses([walker]) if pivoted or any(step_ends) else None
+    drifts, offsets = _between(frames, knots, done.drifts), _offsets(walker, controls)
+    steps = None
+    if poses is not None:
+        cadences = np.gradient(phases) * RATE
+        turns = _between(frames, knots, done.turns)
+        moving = cadences > step_plan.QUIET
+        course = Course(phases, moving, cadences, speeds.astype(complex), beyond, ways, turns)
+        anchors = centres + _nearing(centres, distances, step_ends)
+        placed = step_plan.place_feet(poses, 0, (centres, headings, anchors), course, slowest, RATE)
+        steps = step_plan.stepping_of(walker, poses, [placed])
+        drifts = (1.0 - placed.shares) * drifts
+        offsets = offsets + placed.shares * (poses.points[0] - offsets)
+    faced = headings - drifts
+    origins = centres - np.exp(1j * faced) * offsets
+    fields = walker, path, distances, origins, faced, phases, controls, speeds, steps
     all_notes = *notes, *pivots, *phase_notes
-    return WalkPlan(*fields, all_notes, request.stop == "standing", standing)
+    return WalkPlan(*fields, all_notes, request.stop == "standing", step_ends[1])
+
+
+def _nearing(
+    centres: Annotated[FloorVectors, "frames"], distances: Frames, step_ends: tuple[bool, bool]
+) -> Annotated[FloorVectors, "frames"]:
+    """Return the ways (F,), m, from points of a path to its standing ends, near to these."""
+    half = 0.5 * float(distances[-1] - distances[0])
+    near, far = min(BESIDE, 0.5 * half), max(min(NEARING, half), 1e-9)
+    ways = np.zeros(len(centres), complex)
+    for frame, end in zip((0, -1), step_ends, strict=True):
+        if end:
+            gaps = np.abs(distances - distances[frame])
+            share = 1.0 - quat.smoothstep(np.clip((gaps - near) / (far - near), 0.0, 1.0))
+            ways += share * (centres[frame] - centres)
+    return ways
 
 
 def _stepping_cadences(walked: Frames, beyond: Frames) -> Frames:
@@ -263,16 +288,6 @@ def _stepping_cadences(walked: Frames, beyond: Frames) -> Frames:
     turned = np.abs(beyond) / stepping.TURN_OF_CYCLE
     power = stepping.POWER
     return np.asarray((walked**power + turned**power) ** (1.0 / power) - walked)
-
-
-def _turning_steps(walker: Walker, phases: Frames, beyond: Frames) -> Stepping | None:
-    """Return turns of the legs with which feet stand in turns; None without two that step."""
-    poses = step_plan.find_standing_poses([walker])
-    if poses is None:
-        return None
-    turns = stepping.stepped(phases, np.cumsum(beyond) / RATE, poses.passings[0])[None]
-    parents, none = walker.card.skeleton.parents, np.zeros(turns.shape[:2])
-    return Stepping(poses, parents, none, none, turns, np.zeros(turns.shape, complex))
 
 
 def _plan_facing(
@@ -297,13 +312,13 @@ def _plan_facing(
     headings = np.pad(headings, (0, len(distances) - len(headings)), "edge")
     body = path.at(distances)[0], headings
     plan = step_plan.plan_steps(strider, body, 0.0, RATE)
-    steps = step_plan.stepping_of(strider, [plan])
+    steps = step_plan.stepping_of(walker, strider.poses, [plan])
     controls = walker.controls(plan.speeds, plan.turning)
     speeds = np.gradient(distances) * RATE
     note = WalkNote(f"{SYNTHESISED}-steps", "facing", FACING_NOTE)
     fields = walker, path, distances, plan.points, plan.headings, plan.phases, controls, speeds
     end = int(np.flatnonzero(plan.shares < STANDS)[-1]) + 2
-    return WalkPlan(*fields, steps, (note,), True).part(0, end)
+    return WalkPlan(*fields, steps, (note,), True, True).part(0, end)
 
 
 def _route(

@@ -94,7 +94,7 @@ def lead_to(
     entries = entries_of(script, staged, len(act))
     cycle = _last_cycle(script, index, plan, (act, entries))
     # A walk that begins standing begins in its own phase.
-    free = timeline.motion is None and plan.standing is None
+    free = timeline.motion is None and entry.request.start == "rolling"
     cut = cycle.find_cut([cycle.exits])
     for _ in range(APPROACHES):
         cancellation.check()
@@ -102,7 +102,8 @@ def lead_to(
         trail = _travelling(plan, -1).inverse().after(plan.end)
         rest = cycle.lies(cut).inverse().after(trail)
         by = staged.by or staged.facing(staged.act.heading + _turn(plan, rest, by, staged.goal))
-        plan = _plan_to(script, index, entry, by.after(rest), staged)
+        end = by.after(rest)
+        plan = _plan_to(script, index, entry, end, staged)
         if plan.closes:
             # Where a walk stands depends on the foot that closes.
             cycle = _last_cycle(script, index, plan, (act, entries))
@@ -115,7 +116,14 @@ def lead_to(
         if abs(away.shift) < NEAR and abs(away.turn) < STRAIGHT:
             break
     if not plan.closes:
-        plan = _ending_in(plan, float(cycle.plan.phases[cut.exit]), free)
+        gap = float(_gaps(cycle.plan.phases[cut.exit : cut.exit + 1], plan)[0])
+        cycles = max(float(plan.phases[-1] - plan.phases[0]), 1e-9)
+        stretch = 1.0 + float(np.clip(gap / cycles, -MOST_CHANGED, MOST_CHANGED))
+        # A walk that may not begin in another phase has longer or shorter strides.
+        entry, stretch = (
+            (replace(entry, phase=entry.phase + gap), 1.0) if free else (entry, stretch)
+        )
+        plan = _plan_to(script, index, entry, end, staged, stretch)
     return plan, replace(staged, by=by, adapted=act)
 
 
@@ -138,13 +146,18 @@ def _turn(plan: WalkPlan, rest: FloorMotion, by: FloorMotion, goal: complex) -> 
 
 
 def _plan_to(
-    script: Script, index: int, entry: WalkEntry, end: FloorMotion, staged: StagedAct
+    script: Script,
+    index: int,
+    entry: WalkEntry,
+    end: FloorMotion,
+    staged: StagedAct,
+    stretch: float = 1.0,
 ) -> WalkPlan:
     """Return the plan of a walk to a place; with the heading there of an act that has one."""
     _, source = walk_of(script, index)
     goal = {"end": end} if staged.by else {"to": (end.shift.imag, end.shift.real)}
     request = replace(entry.request, **goal)
-    return walk_plan.plan_walk(source.gait, request, entry.start, entry.phase)
+    return walk_plan.plan_walk(source.gait, request, entry.start, entry.phase, stretch)
 
 
 def _last_cycle(
@@ -205,19 +218,6 @@ def _arrival(act: Passage) -> FloorMotion:
     direction = complex(roots[1] - roots[0])
     turned = float(np.angle(direction)) if abs(direction) > MOVING else act.heading(0)
     return FloorMotion(turned, complex(roots[0]))
-
-
-def _ending_in(plan: WalkPlan, phase: float, free: bool) -> WalkPlan:
-    """Return a plan that ends in a phase of the cycle, or as near to it as strides allow.
-
-    free: whether the walk may begin in any phase; strides are made longer or shorter if not.
-    """
-    gap = float(_gaps(np.array([phase]), plan)[0])
-    if free:
-        return replace(plan, phases=plan.phases + gap)
-    cycles = float(plan.phases[-1] - plan.phases[0])
-    share = float(np.clip(gap / max(cycles, 1e-9), -MOST_CHANGED, MOST_CHANGED))
-    return replace(plan, phases=plan.phases[0] + (plan.phases - plan.phases[0]) * (1.0 + share))
 
 
 def add_walk(

@@ -67,5 +67,5 @@ def plan_people(
         columns["headings"],
         rate,
         gait.labels,
-        step_plan.stepping_of(striders[0], plans),
+        step_plan.stepping_of(striders[0].walker, striders[0].poses, plans),
     )

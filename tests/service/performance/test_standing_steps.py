@@ -14,7 +14,6 @@ from posefield.performance import (
     composition,
     joins,
     standing_pose,
-    standing_steps,
     walk_entries,
     walk_plan,
     walk_steps,
@@ -23,7 +22,6 @@ from posefield.performance.act_motion import Act, StagedAct
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.script import resolve_script
 from posefield.performance.standing_pose import find_walker
-from posefield.performance.standing_steps import StandingEnds
 from posefield.performance.timeline import Timeline
 from posefield.performance.walk_plan import plan_walk
 from posefield.performance.walk_request import WalkRequest
@@ -33,6 +31,8 @@ from posefield.synthesis.synthesizer import Synthesizer
 
 SHIPPED = Path(__file__).parents[3] / "service/posefield/shipped/cmu_walk.onnx"
 BOTH = {"start": "standing", "stop": "standing"}
+LAST = round(walk_plan.STEP_END * RATE)
+"""Frames of an opening or closing step."""
 
 
 @cache
@@ -88,7 +88,8 @@ def test_a_model_without_contacts_has_none_and_slows_down():
     own = replace(known, session=replace(known.session, card=card, digest="without contacts"))
     assert standing_pose.find_standing_pose(find_walker(own, {}, {})) is None
     plan = plan_walk(own, WalkRequest(1.0, seconds=5.0, **BOTH), None, 0.0)
-    assert plan.standing is None
+    assert plan.steps is None
+    assert not plan.closes
     assert [note.code for note in plan.notes].count("feet-apart") == 2
     assert "synthesised" in plan.notes[0].message
     assert plan.notes[0].code.startswith(walk_plan.SYNTHESISED)
@@ -107,23 +108,21 @@ def test_a_walk_begins_and_ends_with_its_feet_beside_each_other(length, end):
     assert np.hypot(root[0], root[2] - place) < 0.06
     assert root[0] == pytest.approx(feet[:, 0].mean(), abs=0.01)
     # Without the steps one foot is in the air or ahead.
-    bare = walk_entries.walk_passage(walk(), replace(plan, standing=None))
-    assert np.abs(balls(bare)[frame, :, 1] - pose().levels).max() > 0.01
-    none = standing_steps.add_standing_ends(
-        bare, plan.places, plan.headings, plan.phases, StandingEnds(pose())
-    )
-    assert none.rotations.tobytes() == bare.rotations.tobytes()
+    bare = walk_entries.walk_passage(walk(), replace(plan, steps=None))
+    found = balls(bare)[frame]
+    assert max(np.abs(found[:, 1] - pose().levels).max(), abs(found[0, 2] - found[1, 2])) > 0.1
 
 
 def test_a_closing_step_lifts_one_foot_and_stands_on_the_other():
-    plan, made = walked(WalkRequest(1.1, to=(0.0, 6.0), stop="standing"))
-    count = plan.standing.closing
-    feet, down = balls(made)[-count:], made.contacts[-count:] > 0.5
-    swinging = pose().passing_at(plan.phases[-1]).swinging
+    made = walked(WalkRequest(1.1, to=(0.0, 6.0), stop="standing"))[1]
+    down = made.contacts[-LAST:] > 0.5
+    swinging = int(np.argmin(down.sum(axis=0)))
     assert down[:, 1 - swinging].all()
     swing = np.flatnonzero(~down[:, swinging])
     assert 0.25 < len(swing) / RATE < 0.65
     assert down[swing[-1] + 1 :, swinging].all()
+    clip = performed({"kind": "walk", "to": [0, 6], "speed": 1.1, "stop": "standing"}).clip
+    feet = clip.positions()[-LAST:, [leg.tip for leg in pose().legs]]
     assert feet[swing, swinging, 1].max() > pose().levels[swinging] + 0.03
     moved = np.linalg.norm(np.diff(feet[:, :, [0, 2]], axis=0), axis=-1).sum(axis=0)
     assert moved[1 - swinging] < 0.03
@@ -134,22 +133,21 @@ def test_a_closing_step_lifts_one_foot_and_stands_on_the_other():
 
 
 def test_steps_are_no_more_sudden_than_walking():
-    plan, made = walked(WalkRequest(1.1, to=(0.0, 8.0), **BOTH))
-    found, own = accelerations(made), plan.standing
-    usual = np.percentile(found[own.opening : -own.closing], 99.0)
-    assert found[: own.opening].max() < usual
-    assert found[-own.closing :].max() < usual
+    made = walked(WalkRequest(1.1, to=(0.0, 8.0), **BOTH))[1]
+    found = accelerations(made)
+    usual = np.percentile(found[LAST:-LAST], 99.0)
+    assert found[:LAST].max() < usual
+    assert found[-LAST:].max() < usual
     # A pose that is put at the end is seen.
     still = walk_entries.still(pose()).rotations[0]
     sudden = made.rotations.copy()
-    sudden[len(made) - own.closing :] = still
+    sudden[-LAST:] = still
     assert accelerations(replace(made, rotations=sudden)).max() > usual
     # Knees turn smoothly, too.
     places = [walk().session.card.skeleton.names.index(name) for name in ("LeftLeg", "RightLeg")]
     bends = np.degrees(2.0 * np.arccos(np.abs(made.rotations[:, places, 0])))
     bent = np.abs(np.diff(bends, n=2, axis=0)).max(axis=1)
-    assert bent[: own.opening].max() < bent[own.opening : -own.closing].max()
-    assert bent[-own.closing :].max() < bent[own.opening : -own.closing].max()
+    assert max(bent[:LAST].max(), bent[-LAST:].max()) < bent[LAST:-LAST].max()
 
 
 def performed(*segments):
