@@ -1,5 +1,6 @@
 /** A page that computes with its model: sliders, a clip, walkers that are steered, a download. */
 
+import "../../viewer/src/colours.css";
 import "./page.css";
 
 import type { ModelCard } from "@posefield/client";
@@ -23,6 +24,10 @@ interface Entry {
   readonly integrity?: Readonly<Record<"model" | "character", string>>;
 }
 
+/** The view that is shown, and the number of the newest model, which overtakes earlier ones. */
+let view: View | null = null;
+let turn = 0;
+
 /** A way to show a model, until it is disposed. */
 export interface View {
   readonly ready: Promise<void>;
@@ -37,7 +42,7 @@ const ort = import("onnxruntime-web/wasm").then((build) => {
   return build;
 });
 const told = document.querySelector<HTMLElement>("#told")!;
-addEventListener("error", ({ message }) => tell(message));
+addEventListener("error", ({ error, message }) => tell(error ?? message));
 addEventListener("unhandledrejection", ({ reason }) => tell(reason));
 theme.start();
 const scene = new Scene(document.querySelector<HTMLElement>("#stage")!);
@@ -48,26 +53,29 @@ function tell(fault: unknown): void {
   told.textContent = fault instanceof Error ? fault.message : String(fault);
 }
 
-async function open(entries: readonly Entry[], entry: Entry): Promise<void> {
+/** Open the model that the address names, or the first. */
+async function open(entries: readonly Entry[]): Promise<void> {
+  const name = decodeURIComponent(location.hash.slice(1));
+  const entry = entries.find((one) => one.name === name) ?? entries[0]!;
+  turn += 1;
+  const number = turn;
   const [build, content, skin] = await Promise.all([
     ort,
     bytes(entry.model, entry.integrity?.model),
     bytes(entry.character, entry.integrity?.character),
   ]);
   const model = await load(content, { ort: build });
+  if (number !== turn) return;
+  view?.dispose();
   const character = characters.read(skin);
   const { skeleton } = model.card;
   const standing = { ...skeleton, offsets: [entry.root, ...skeleton.offsets.slice(1)] };
   const card = { ...model.card, skeleton: standing } as unknown as ModelCard;
-  let view: View | null = null;
   const panel = new Panel(form, model, entries, entry, {
     change: () => view?.change(),
     show: () => show(),
-    open: (name) => {
-      view?.dispose();
-      location.hash = name;
-      const next = entries.find((one) => one.name === name)!;
-      open(entries, next);
+    open: (chosen) => {
+      location.hash = chosen;
     },
     download: () => exported(model, panel, card, character),
   });
@@ -107,9 +115,13 @@ async function bytes(url: string, integrity = ""): Promise<Uint8Array<ArrayBuffe
 }
 
 async function start(): Promise<void> {
-  const entries = JSON.parse(new TextDecoder().decode(await bytes("models.json"))) as Entry[];
-  const name = decodeURIComponent(location.hash.slice(1));
-  await open(entries, entries.find((entry) => entry.name === name) ?? entries[0]!);
+  if (!("WebAssembly" in globalThis)) throw new Error("This browser runs no WebAssembly.");
+  const list = new TextDecoder().decode(await bytes("models.json"));
+  if (!list.startsWith("["))
+    throw new Error("models.json is another file than posefield page wrote.");
+  const entries = JSON.parse(list) as Entry[];
+  addEventListener("hashchange", () => open(entries));
+  await open(entries);
 }
 
 start();

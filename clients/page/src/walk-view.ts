@@ -1,10 +1,11 @@
 /** Walkers that are steered by keys, a disc for a finger or a click on the ground; a crowd walks by itself. */
 
 import type { Walkers } from "@posefield/runtime";
-import { MathUtils, Plane, Raycaster, Vector2, Vector3 } from "three";
+import { MathUtils, MeshLambertMaterial, Plane, Raycaster, Vector2, Vector3 } from "three";
 import { el } from "../../viewer/src/dom.ts";
-import { Figure } from "../../viewer/src/figure.ts";
+import { Figure, Stick } from "../../viewer/src/figure.ts";
 import { NOWHERE } from "../../viewer/src/playback.ts";
+import * as theme from "../../viewer/src/theme.ts";
 import type { Stage } from "./clip-view.ts";
 import type { View } from "./main.ts";
 
@@ -16,6 +17,8 @@ const KEYS: Readonly<Record<string, readonly [ahead: number, left: number]>> = {
 const TURN = 1.6;
 /** Walkers from which on all are sticks; metres between those of a crowd. */
 const [MANY, APART] = [12, 1.4];
+/** Pixels by which a pointer moves that turns the view. */
+const DRAG = 4;
 
 export class WalkView implements View {
   readonly ready: Promise<void>;
@@ -27,6 +30,9 @@ export class WalkView implements View {
   readonly #disc = el("div", { class: "disc", "aria-hidden": "true" });
   #walkers: Walkers | null = null;
   #figures: readonly Figure[] = [];
+  #crowd: Stick | null = null;
+  /** Where the pointer was pressed. */
+  #pressed: readonly [number, number] = [0, 0];
   #goals: (readonly [number, number] | null)[] = [];
   #computes = false;
 
@@ -39,6 +45,10 @@ export class WalkView implements View {
     addEventListener("blur", () => this.#held.clear(), { signal });
     const canvas = stage.scene.renderer.domElement;
     canvas.addEventListener("click", (event) => this.#click(event), { signal });
+    const press = ({ offsetX, offsetY }: MouseEvent) => {
+      this.#pressed = [offsetX, offsetY];
+    };
+    canvas.addEventListener("pointerdown", press, { signal });
     if (matchMedia("(hover: none)").matches) canvas.after(this.#disc);
     for (const kind of ["pointerdown", "pointermove", "lostpointercapture"] as const)
       this.#disc.addEventListener(kind, (event) => this.#drag(event));
@@ -50,6 +60,8 @@ export class WalkView implements View {
     this.#end.abort();
     this.#disc.remove();
     for (const figure of this.#figures) figure.dispose();
+    this.#crowd?.removeFromParent();
+    this.#crowd?.dispose();
   }
 
   async #begin(): Promise<void> {
@@ -57,19 +69,32 @@ export class WalkView implements View {
     const { count, body } = panel.state;
     const walkers = await model.walkers(count, panel.options);
     if (this.#end.signal.aborted) return;
-    this.#figures = Array.from({ length: count }, (_, index) => {
-      const side = Math.ceil(Math.sqrt(count));
-      const place = [index % side, Math.floor(index / side)].map((step) => step * APART);
-      walkers.put(index, [place[0]!, place[1]!], 0);
-      const figure = new Figure(card, character, false);
-      figure.wear(count > MANY ? "stick" : body);
-      scene.root.add(figure.group);
-      return figure;
-    });
+    const side = Math.ceil(Math.sqrt(count));
+    for (let index = 0; index < count; index++) {
+      // The first one, which is steered, in the middle.
+      const cell = (index + Math.floor((side * side + side) / 2)) % (side * side);
+      const place = [cell % side, Math.floor(cell / side)].map(
+        (step) => step - Math.floor(side / 2),
+      );
+      walkers.put(index, [APART * place[0]!, APART * place[1]!], 0);
+    }
+    if (count > MANY) {
+      const [bone, joint] = ["--ink", "--accent"].map(
+        (name) => new MeshLambertMaterial({ color: theme.colour(name) }),
+      );
+      this.#crowd = new Stick(card, bone!, joint!, count);
+      scene.root.add(this.#crowd);
+    } else
+      this.#figures = Array.from({ length: count }, () => {
+        const figure = new Figure(card, character, false);
+        figure.wear(body);
+        scene.root.add(figure.group);
+        return figure;
+      });
     this.#goals = Array.from({ length: count }, () => null);
     this.#walkers = walkers;
     this.#show();
-    scene.frame(count > 1 ? 2 : 1);
+    scene.frame(Math.sqrt(side));
     scene.add((seconds) => this.#step(seconds), this.#end.signal);
   }
 
@@ -113,13 +138,15 @@ export class WalkView implements View {
   #show(): void {
     const { poses } = this.#walkers!;
     const joints = poses.names.length;
-    for (const [index, figure] of this.#figures.entries())
-      figure.show({
+    for (let index = 0; index < this.#goals.length; index++) {
+      const pose = {
         rotations: poses.rotations.subarray(4 * joints * index, 4 * joints * (index + 1)),
         root: poses.rootPosition.subarray(3 * index, 3 * index + 3),
         offsets: poses.boneOffsets,
-        carried: NOWHERE,
-      });
+      };
+      this.#figures[index]?.show({ ...pose, carried: NOWHERE });
+      this.#crowd?.show(pose, index);
+    }
     this.#stage.scene.follow(poses.rootPosition[0]!, poses.rootPosition[2]!);
   }
 
@@ -143,6 +170,8 @@ export class WalkView implements View {
   }
 
   #click({ offsetX, offsetY, target }: MouseEvent): void {
+    const [x, y] = this.#pressed;
+    if (Math.hypot(offsetX - x, offsetY - y) > DRAG) return;
     const { camera } = this.#stage.scene;
     const { clientWidth, clientHeight } = target as HTMLElement;
     const at = new Vector2((2 * offsetX) / clientWidth - 1, 1 - (2 * offsetY) / clientHeight);

@@ -123,10 +123,24 @@ test("a walker goes where keys send it, and a crowd walks", async (context) => {
   await page.keyboard.up("ArrowUp");
   assert.ok(await stands(page));
   await pictures("walk-stopped");
+  // Who drags turns the view, and sends nobody.
+  await page.mouse.move(200, 250);
+  await page.mouse.down();
+  await page.mouse.move(320, 260, { steps: 4 });
+  await page.mouse.up();
+  assert.ok(await stands(page));
   await page.locator("input[type=range]").last().fill("40");
   await page.waitForTimeout(1500);
   await pictures("crowd");
   context.diagnostic(`${requests.length} requests`);
+});
+
+test("the button Back of the browser shows the model before", async () => {
+  await page.getByLabel("Model").selectOption("hdm05_kick");
+  await page.locator("#told", { hasText: "kick" }).waitFor();
+  await page.goBack();
+  await page.locator("#told", { hasText: "Walking" }).waitFor();
+  assert.equal(await page.getByLabel("Model").inputValue(), "cmu_walk");
 });
 
 test("a finger on the disc steers a walker", async () => {
@@ -152,6 +166,11 @@ test("a file that is missing, or another one, is told in a sentence", async () =
     [
       () => writeFileSync(`${site}/models/cmu_walk.glb`, "?"),
       /^models\/cmu_walk\.glb .* not the file/,
+    ],
+    // As hosts answer that have one page for all addresses.
+    [
+      () => writeFileSync(`${site}/models.json`, "<!doctype html>"),
+      /^models\.json is another file/,
     ],
     [() => rmSync(`${site}/models.json`), /^models\.json cannot be loaded: status 404\.$/],
   ] as const) {

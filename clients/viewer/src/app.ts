@@ -1,5 +1,6 @@
 /** The page as a whole: the shown model, its parts, and what happens when the service does not answer. */
 
+import "./colours.css";
 import "./style.css";
 import { type ModelCard, type ModelSummary, Problem, Unexpected } from "@posefield/client";
 

@@ -7,6 +7,7 @@ import {
   type BufferGeometry,
   CylinderGeometry,
   Group,
+  IcosahedronGeometry,
   InstancedMesh,
   type Material,
   Matrix4,
@@ -15,7 +16,6 @@ import {
   Quaternion,
   Skeleton,
   SkinnedMesh,
-  SphereGeometry,
   Vector3,
 } from "three";
 
@@ -182,33 +182,37 @@ interface Stretch {
   readonly length: number;
 }
 
-/** Sticks and balls: exactly the joints, and nothing that hides them. */
-class Stick extends Object3D {
+/** Sticks and balls of one body or of several: exactly the joints, and nothing that hides them. */
+export class Stick extends Object3D {
   readonly #parents: readonly number[];
   readonly #placed: Placed;
   readonly #bones: readonly Stretch[];
   readonly #sticks: InstancedMesh;
   readonly #balls: InstancedMesh;
 
-  constructor({ skeleton }: ModelCard, bone: Material, joint: Material) {
+  constructor({ skeleton }: ModelCard, bone: Material, joint: Material, count = 1) {
     super();
     this.#parents = skeleton.parents;
     this.#bones = stretches(skeleton);
     this.#placed = placed(skeleton.names.length);
-    const cone = new CylinderGeometry(0.55, 1, 1, 8).translate(0, 0.5, 0);
-    this.#sticks = new InstancedMesh(cone, bone, this.#bones.length);
-    this.#balls = new InstancedMesh(new SphereGeometry(1, 12, 8), joint, this.#bones.length + 1);
+    const one = count === 1;
+    const cone = new CylinderGeometry(0.55, 1, 1, one ? 8 : 5, 1, !one).translate(0, 0.5, 0);
+    const ball = new IcosahedronGeometry(1, one ? 3 : 0);
+    this.#sticks = new InstancedMesh(cone, bone, count * this.#bones.length);
+    this.#balls = new InstancedMesh(ball, joint, count * (this.#bones.length + 1));
     for (const mesh of [this.#sticks, this.#balls]) {
       mesh.frustumCulled = false;
-      mesh.castShadow = !bone.transparent;
+      mesh.castShadow = one && !bone.transparent;
       this.add(mesh);
     }
   }
 
-  show({ rotations, root, offsets }: BodyPose): void {
+  /** body: number of the body that takes the pose. */
+  show({ rotations, root, offsets }: BodyPose, body = 0): void {
     place(this.#placed, this.#parents, offsets, rotations, root, 0);
     const { positions } = this.#placed;
-    this.#setBall(0, start.fromArray(positions), BALL);
+    const [stick, ball] = [body * this.#bones.length, body * (this.#bones.length + 1)];
+    this.#setBall(ball, start.fromArray(positions), BALL);
     this.#bones.forEach(({ from, to, tip, length }, i) => {
       start.fromArray(positions, 3 * from);
       if (to === null) {
@@ -221,8 +225,12 @@ class Stick extends Object3D {
       const long = along.subVectors(end, start).length();
       turn.setFromUnitVectors(UP, along.divideScalar(long || 1));
       const thick = Math.min(STICK, SLENDER * length);
-      this.#sticks.setMatrixAt(i, matrix.compose(start, turn, size.set(thick, long, thick)));
-      this.#setBall(i + 1, end, to === null ? 0.5 * STICK : Math.min(BALL, 2 * SLENDER * length));
+      this.#sticks.setMatrixAt(
+        stick + i,
+        matrix.compose(start, turn, size.set(thick, long, thick)),
+      );
+      const radius = to === null ? 0.5 * STICK : Math.min(BALL, 2 * SLENDER * length);
+      this.#setBall(ball + i + 1, end, radius);
     });
     this.#sticks.instanceMatrix.needsUpdate = this.#balls.instanceMatrix.needsUpdate = true;
   }

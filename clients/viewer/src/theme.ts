@@ -36,7 +36,7 @@ export function listen(listener: Listener, signal?: AbortSignal): void {
   signal?.addEventListener("abort", () => listeners.delete(listener));
 }
 
-/** Return the value of a custom property of style.css. */
+/** Return the value of a custom property of colours.css. */
 export function colour(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
