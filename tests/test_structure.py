@@ -17,7 +17,7 @@ BUDGETS = {
     "model_export/posefield_train": 27_800,
     "clients/python": 2_160,
     "clients/blender": 1_280,
-    "clients/viewer/src": 8_190,
+    "clients/viewer/src": 7_890,
     "clients/typescript/src": 1_350,
     "clients/runtime/src": 2_803,
     "clients/page/src": 600,

@@ -31,7 +31,7 @@ let turn = 0;
 /** A way to show a model, until it is disposed. */
 export interface View {
   readonly ready: Promise<void>;
-  change(): void;
+  change?(): void;
   dispose(): void;
 }
 
@@ -72,12 +72,17 @@ async function open(entries: readonly Entry[]): Promise<void> {
   const standing = { ...skeleton, offsets: [entry.root, ...skeleton.offsets.slice(1)] };
   const card = { ...model.card, skeleton: standing } as unknown as ModelCard;
   const panel = new Panel(form, model, entries, entry, {
-    change: () => view?.change(),
+    change: () => view?.change?.(),
     show: () => show(),
     open: (chosen) => {
       location.hash = chosen;
     },
-    download: () => exported(model, panel, card, character),
+    download: async () => {
+      const { glb } = await import("./download.ts");
+      const clip = await model.clip(panel.state.controls, { ...panel.options, fps: 60 });
+      const content = await glb(card, clip, character);
+      saveFile(`${model.card.name}.glb`, new Blob([content], { type: "model/gltf-binary" }));
+    },
   });
   const show = () => {
     view?.dispose();
@@ -93,18 +98,6 @@ async function open(entries: readonly Entry[]): Promise<void> {
     });
   };
   show();
-}
-
-async function exported(
-  model: Model,
-  panel: Panel,
-  card: ModelCard,
-  character: characters.Character,
-) {
-  const { glb } = await import("./download.ts");
-  const clip = await model.clip(panel.state.controls, { ...panel.options, fps: 60 });
-  const content = new Blob([await glb(card, clip, character)], { type: "model/gltf-binary" });
-  saveFile(`${model.card.name}.glb`, content);
 }
 
 async function bytes(url: string, integrity = ""): Promise<Uint8Array<ArrayBuffer>> {

@@ -11,14 +11,12 @@ import type { View } from "./main.ts";
 
 const KEYS: Readonly<Record<string, readonly [ahead: number, left: number]>> = {
   ...{ ArrowUp: [1, 0], KeyW: [1, 0], ArrowLeft: [0, 1], KeyA: [0, 1] },
-  ...{ ArrowRight: [0, -1], KeyD: [0, -1], ShiftLeft: [0.6, 0] },
+  ...{ ArrowRight: [0, -1], KeyD: [0, -1], ShiftLeft: [-0.4, 0] },
 };
 /** Rate of turning, rad/s. */
 const TURN = 1.6;
-/** Walkers from which on all are sticks; metres between those of a crowd. */
-const [MANY, APART] = [12, 1.4];
-/** Pixels by which a pointer moves that turns the view. */
-const DRAG = 4;
+/** Walkers from which on all are sticks; metres between those of a crowd; pixels of a drag. */
+const [MANY, APART, DRAG] = [12, 1.4, 4];
 
 export class WalkView implements View {
   readonly ready: Promise<void>;
@@ -31,8 +29,8 @@ export class WalkView implements View {
   #walkers: Walkers | null = null;
   #figures: readonly Figure[] = [];
   #crowd: Stick | null = null;
-  /** Where the pointer was pressed. */
-  #pressed: readonly [number, number] = [0, 0];
+  /** Presses of the pointer since the last click. */
+  readonly #presses: MouseEvent[] = [];
   #goals: (readonly [number, number] | null)[] = [];
   #computes = false;
 
@@ -45,16 +43,11 @@ export class WalkView implements View {
     addEventListener("blur", () => this.#held.clear(), { signal });
     const canvas = stage.scene.renderer.domElement;
     canvas.addEventListener("click", (event) => this.#click(event), { signal });
-    const press = ({ offsetX, offsetY }: MouseEvent) => {
-      this.#pressed = [offsetX, offsetY];
-    };
-    canvas.addEventListener("pointerdown", press, { signal });
+    canvas.addEventListener("pointerdown", (event) => this.#presses.push(event), { signal });
     if (matchMedia("(hover: none)").matches) canvas.after(this.#disc);
     for (const kind of ["pointerdown", "pointermove", "lostpointercapture"] as const)
       this.#disc.addEventListener(kind, (event) => this.#drag(event));
   }
-
-  change(): void {}
 
   dispose(): void {
     this.#end.abort();
@@ -70,13 +63,12 @@ export class WalkView implements View {
     const walkers = await model.walkers(count, panel.options);
     if (this.#end.signal.aborted) return;
     const side = Math.ceil(Math.sqrt(count));
+    const half = Math.floor(side / 2);
     for (let index = 0; index < count; index++) {
       // The first one, which is steered, in the middle.
-      const cell = (index + Math.floor((side * side + side) / 2)) % (side * side);
-      const place = [cell % side, Math.floor(cell / side)].map(
-        (step) => step - Math.floor(side / 2),
-      );
-      walkers.put(index, [APART * place[0]!, APART * place[1]!], 0);
+      const cell = (index + half * (side + 1)) % side ** 2;
+      const [x, z] = [(cell % side) - half, Math.floor(cell / side) - half];
+      walkers.put(index, [APART * x, APART * z], 0);
     }
     if (count > MANY) {
       const [bone, joint] = ["--ink", "--accent"].map(
@@ -170,8 +162,8 @@ export class WalkView implements View {
   }
 
   #click({ offsetX, offsetY, target }: MouseEvent): void {
-    const [x, y] = this.#pressed;
-    if (Math.hypot(offsetX - x, offsetY - y) > DRAG) return;
+    const press = this.#presses.splice(0).at(-1);
+    if (press && Math.hypot(offsetX - press.offsetX, offsetY - press.offsetY) > DRAG) return;
     const { camera } = this.#stage.scene;
     const { clientWidth, clientHeight } = target as HTMLElement;
     const at = new Vector2((2 * offsetX) / clientWidth - 1, 1 - (2 * offsetY) / clientHeight);

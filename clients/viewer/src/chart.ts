@@ -208,86 +208,36 @@ function axes(pen: CanvasRenderingContext2D, { frame, controls }: Drawing): void
 
 const titled = (control: Control): string => `${control.name} (${control.unit})`;
 
-export type Point = readonly [x: number, y: number];
-
-/** Polygons and edges, in columns and rows of a grid. */
-export interface Shape {
-  readonly area: readonly (readonly Point[])[];
-  readonly edges: readonly (readonly [Point, Point])[];
-}
-
-const CORNERS = [
-  [0, 0],
-  [1, 0],
-  [1, 1],
-  [0, 1],
-] as const;
-
-/** Return the part without support, whose edges lie half-way to points with it (marching squares). */
-export function shape(supported: readonly (readonly boolean[])[]): Shape {
-  const area: Point[][] = [];
-  const edges: [Point, Point][] = [];
-  for (let row = 0; row + 1 < supported.length; row++) {
-    for (let column = 0; column + 1 < supported[0]!.length; column++) {
-      const corners = CORNERS.map(([x, y]): Point => [column + x, row + y]);
-      const { points, sides } = square(corners, ([x, y]) => supported[y]![x]!);
-      if (points.length) area.push(points);
-      edges.push(...sides);
-    }
-  }
-  return { area, edges };
-}
-
-/** Walk around a square: the polygon without support, and the edges across the square. */
-function square(corners: readonly Point[], supported: (point: Point) => boolean) {
-  const points: Point[] = [];
-  const crossings: Point[] = [];
-  for (const [i, from] of corners.entries()) {
-    const to = corners[(i + 1) % corners.length]!;
-    if (!supported(from)) points.push(from);
-    if (supported(from) === supported(to)) continue;
-    const middle: Point = [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2];
-    points.push(middle);
-    crossings.push(middle);
-  }
-  // The polygon is left and entered by turns.
-  if (supported(corners[0]!)) crossings.push(...crossings.splice(0, 1));
-  const sides = crossings.flatMap((from, i): [Point, Point][] =>
-    i % 2 ? [] : [[from, crossings[i + 1]!]],
-  );
-  return { points, sides };
-}
-
-/** The part without support as paths, and the size of their grid. */
+/** The part without support, in columns and rows of a grid, and the size of the grid. */
 export interface Veil {
   readonly area: Path2D;
-  readonly edge: Path2D;
   readonly columns: number;
   readonly rows: number;
 }
 
+/** Overlap of the squares around points of the grid, so that no seam shows. */
+const OVERLAP = 0.05;
+
 export function veil(grid: SigmaGrid): Veil {
   const supported = captured(grid);
-  const part = shape(supported);
-  const [area, edge] = [new Path2D(), new Path2D()];
-  for (const points of part.area) trace(area, points).closePath();
-  for (const side of part.edges) trace(edge, side);
-  return { area, edge, columns: supported[0]!.length, rows: supported.length };
-}
-
-function trace(path: Path2D, [first, ...rest]: readonly Point[]): Path2D {
-  path.moveTo(...first!);
-  for (const point of rest) path.lineTo(...point);
-  return path;
+  const area = new Path2D();
+  for (const [row, cells] of supported.entries())
+    for (const [column, inside] of cells.entries())
+      if (!inside) area.rect(column - 0.5, row - 0.5, 1 + OVERLAP, 1 + OVERLAP);
+  return { area, columns: supported[0]!.length, rows: supported.length };
 }
 
 /** Pixels from one stripe to the next. */
 const APART = 7;
 
-/** Hatch the part without support and draw its edge, and dash the sampled ranges. */
+/** Hatch the part without support, and dash the sampled ranges. */
 function hatch(pen: CanvasRenderingContext2D, frame: Frame, veil: Veil): void {
   pen.save();
-  pen.clip(onCanvas(veil.area, frame, veil));
+  const [right, up] = [frame.width / (veil.columns - 1), frame.height / (veil.rows - 1)];
+  const onMap = new Path2D();
+  // Rows go up, and down on a canvas.
+  onMap.addPath(veil.area, new DOMMatrix([right, 0, 0, -up, frame.left, frame.top + frame.height]));
+  pen.clip(onMap);
   pen.fillStyle = theme.colour("--veil");
   pen.fillRect(frame.left, frame.top, frame.width, frame.height);
   pen.strokeStyle = theme.colour("--stripe");
@@ -299,29 +249,11 @@ function hatch(pen: CanvasRenderingContext2D, frame: Frame, veil: Veil): void {
   }
   pen.stroke();
   pen.restore();
-  const edge = onCanvas(veil.edge, frame, veil);
-  pen.lineCap = "round";
-  for (const [width, colour] of [
-    [3.5, "#000a"],
-    [1.5, "#fff"],
-  ] as const) {
-    pen.lineWidth = width;
-    pen.strokeStyle = colour;
-    pen.stroke(edge);
-  }
   pen.strokeStyle = "#fffc";
   pen.lineWidth = 1;
   pen.setLineDash([4, 3]);
   pen.strokeRect(...frame.range);
   pen.setLineDash([]);
-}
-
-/** Transform from columns and rows to a canvas, on which rows go down. */
-function onCanvas(path: Path2D, frame: Frame, { columns, rows }: Veil): Path2D {
-  const [right, up] = [frame.width / (columns - 1), frame.height / (rows - 1)];
-  const onMap = new Path2D();
-  onMap.addPath(path, new DOMMatrix([right, 0, 0, -up, frame.left, frame.top + frame.height]));
-  return onMap;
 }
 
 // Viridis (van der Walt and Smith, 2015): even steps look even, to the colour-blind too.

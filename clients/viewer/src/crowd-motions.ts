@@ -1,13 +1,13 @@
 /** Motions that a crowd shares, and its characters: positions, headings and levels, filled in place. */
 
 import type { CrowdPoses, CrowdQuestion, ModelCard } from "@posefield/client";
-import type { Vector3 } from "three";
+import { Matrix4, type Vector3 } from "three";
 
 import { standing } from "./character.ts";
 import { choose, type Ladder, type Lens, pixels } from "./detail.ts";
 import { labelsOf, otherSets, performerOf } from "./examples.ts";
 import type { Session } from "./player.ts";
-import { type Placed, place, placed } from "./skeleton.ts";
+import { Joints } from "./skeleton.ts";
 
 /** Number of motions, and frames of each, between which the graphics card interpolates. */
 export const [MOTIONS, FRAMES] = [24, 24];
@@ -149,50 +149,27 @@ function turnBetween(from: Float32Array, to: Float32Array, at: number): number {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }
 
-/** Write the matrices of the joints of all poses; walks begin at the origin. */
+/** Write the matrices of the joints of all poses, three rows of four; walks begin at the origin. */
 function writeMatrices(
   out: Float32Array,
   rest: Float32Array,
   poses: CrowdPoses,
   walks: boolean,
 ): void {
-  const joints = poses.names.length;
-  const frame = placed(joints);
-  const [turns, shifts] = [4 * joints, 3 * joints];
+  const joints = new Joints(poses.parents);
+  const [matrix, back] = [new Matrix4(), new Matrix4()];
+  const rootPosition = poses.rootPosition.slice();
   for (let row = 0; row < poses.levels.length; row++) {
     const first = 3 * (row - (row % (FRAMES + 1)));
-    const root = poses.rootPosition.slice(3 * row, 3 * row + 3);
-    if (walks) {
-      root[0]! -= poses.rootPosition[first]!;
-      root[2]! -= poses.rootPosition[first + 2]!;
+    if (walks)
+      for (const axis of [0, 2]) rootPosition[3 * row + axis]! -= poses.rootPosition[first + axis]!;
+    joints.place({ ...poses, rootPosition }, row);
+    for (const [joint, bone] of joints.bones.entries()) {
+      const [x, y, z] = rest.subarray(3 * joint, 3 * joint + 3) as unknown as Four;
+      matrix.multiplyMatrices(bone.matrixWorld, back.makeTranslation(-x, -y, -z)).transpose();
+      out.set(matrix.elements.slice(0, SIZE), SIZE * (row * joints.bones.length + joint));
     }
-    const offsets = poses.boneOffsets.subarray(shifts * row, shifts * (row + 1));
-    const rotations = poses.rotations.subarray(turns * row, turns * (row + 1));
-    place(frame, poses.parents, offsets, rotations, root, 0);
-    for (let joint = 0; joint < joints; joint++)
-      writeMatrix(out, SIZE * (row * joints + joint), rest, frame, joint);
   }
-}
-
-/** Write the three rows of four numbers that move a point of the skin at rest with a joint. */
-function writeMatrix(
-  out: Float32Array,
-  at: number,
-  rest: Float32Array,
-  { positions, rotations }: Placed,
-  joint: number,
-): void {
-  const [w, x, y, z] = rotations.subarray(4 * joint, 4 * joint + 4) as unknown as Four;
-  const [a, b, c] = rest.subarray(3 * joint, 3 * joint + 3) as unknown as Four;
-  const rows = [
-    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-  ] as const;
-  rows.forEach(([i, j, k], row) => {
-    const shift = positions[3 * joint + row]! - i * a - j * b - k * c;
-    out.set([i, j, k, shift], at + 4 * row);
-  });
 }
 
 type Four = readonly [number, number, number, number];

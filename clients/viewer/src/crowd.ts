@@ -1,6 +1,6 @@
 /** The view of a crowd, coloured by level of detail, each character at the coarsest that does not show. */
 
-import { Frustum, GridHelper, Group, Matrix4, Sphere, Vector3 } from "three";
+import { Frustum, Group, Matrix4, Sphere, Vector3 } from "three";
 
 import { CrowdDrawing } from "./crowd-drawing.ts";
 import { Crowd, fetchMotions, half, type Motions, TAKES } from "./crowd-motions.ts";
@@ -17,8 +17,8 @@ const [FEWEST, MOST] = [50, 10_000];
 const [SHARP, COARSE] = [-2, 4];
 /** Most characters that the camera shows all of. */
 const SHOWN = 1000;
-/** Metres between lines of the ground, and seconds between two changes of the numbers. */
-const [GROUND, READING] = [5, 0.25];
+/** Seconds between two changes of the numbers. */
+const READING = 0.25;
 /** Pixels to a metre from which on a character has all triangles. */
 const FINE = 90;
 /** Radius about a character that contains its body with arms out, m. */
@@ -40,7 +40,6 @@ class CrowdView {
   #loading = false;
   #crowd: Crowd | null = null;
   #drawing: CrowdDrawing | null = null;
-  #ground: GridHelper | null = null;
   /** Camera of the view before. */
   #before: { position: Vector3; target: Vector3 } | null = null;
   /** Time of the last change of the numbers, and frames since then. */
@@ -146,20 +145,16 @@ class CrowdView {
     this.#crowd = new Crowd(this.#motions!, count);
     const joints = card.skeleton.names.length;
     this.#drawing = new CrowdDrawing(character, this.#motions!, joints, count);
-    this.#ground = ground(this.#crowd.half);
-    this.#group.add(this.#drawing.group, this.#ground);
+    this.#group.add(this.#drawing.group);
     this.#tint();
   }
 
   #disposeDrawing(): void {
     this.#drawing?.dispose();
-    this.#ground?.dispose();
-    this.#ground?.removeFromParent();
   }
 
   #tint(): void {
     this.#drawing?.tint(this.#session.card.levels.map((_, level) => theme.levelColour(level)));
-    this.#ground?.material.color.set(theme.colour("--line"));
     this.#session.scene.redraw();
   }
 
@@ -204,13 +199,6 @@ class CrowdView {
     this.#panel.count(this.#crowd!.counts, seen, frame);
     this.#read = { since: begun, frames: 0 };
   }
-}
-
-function ground(half: number): GridHelper {
-  const lines = Math.ceil(half / GROUND);
-  const grid = new GridHelper(2 * lines * GROUND, 2 * lines);
-  grid.material.vertexColors = false;
-  return grid;
 }
 
 /** Settings of the crowd, and its counts and times. */

@@ -1,8 +1,8 @@
 /** A body on the stage, as sticks or as a mannequin, solid or as a ghost. */
 
 import type { ModelCard } from "@posefield/client";
+import { applyPose } from "@posefield/client/three";
 import {
-  Bone,
   type BufferAttribute,
   type BufferGeometry,
   CylinderGeometry,
@@ -22,7 +22,7 @@ import {
 import type { Character } from "./character.ts";
 import * as characters from "./character.ts";
 import type { Shown } from "./player.ts";
-import { type Placed, place, placed } from "./skeleton.ts";
+import { Joints } from "./skeleton.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
 
@@ -105,7 +105,6 @@ export class SkinnedBody extends Object3D {
   readonly #card: ModelCard;
   readonly #character: Character;
   readonly #rest: Float32Array;
-  readonly #joints: readonly Bone[];
   readonly #skeleton: Skeleton;
   readonly #geometry: BufferGeometry;
   #offsets: Float32Array;
@@ -113,18 +112,16 @@ export class SkinnedBody extends Object3D {
   /** materials: the skin is drawn once with each, in this order. */
   constructor(card: ModelCard, character: Character, materials: readonly Material[]) {
     super();
-    const { names, offsets, parents } = card.skeleton;
+    const { offsets, parents } = card.skeleton;
     this.#card = card;
     this.#character = character;
     this.#offsets = Float32Array.from(offsets.flat());
     this.#rest = characters.standing(card, this.#offsets);
-    this.#joints = names.map(() => new Bone());
-    parents.forEach((parent, joint) => {
-      (parent < 0 ? this : this.#joints[parent]!).add(this.#joints[joint]!);
-    });
+    const { bones } = new Joints(parents);
+    this.add(bones[0]!);
     this.#skeleton = new Skeleton(
-      [...this.#joints],
-      names.map(() => new Matrix4()),
+      [...bones],
+      bones.map(() => new Matrix4()),
     );
     this.#geometry = characters.geometry(character, character.fine);
     this.#bind(this.#rest);
@@ -141,12 +138,7 @@ export class SkinnedBody extends Object3D {
   show({ rotations, root, offsets }: BodyPose): void {
     // The root's own offset moves no bone.
     if (offsets.some((x, i) => i > 2 && Math.abs(x - this.#offsets[i]!) > SAME)) this.#fit(offsets);
-    this.#joints.forEach((joint, at) => {
-      const [w, x, y, z] = rotations.subarray(4 * at, 4 * at + 4);
-      joint.quaternion.set(x!, y!, z!, w!);
-      if (this.#card.skeleton.parents[at]! < 0) joint.position.fromArray(root);
-      else joint.position.fromArray(offsets, 3 * at);
-    });
+    applyPose(this.#skeleton.bones, { rotations, rootPosition: root, boneOffsets: offsets }, 0);
   }
 
   override dispose(): void {
@@ -184,17 +176,15 @@ interface Stretch {
 
 /** Sticks and balls of one body or of several: exactly the joints, and nothing that hides them. */
 export class Stick extends Object3D {
-  readonly #parents: readonly number[];
-  readonly #placed: Placed;
+  readonly #joints: Joints;
   readonly #bones: readonly Stretch[];
   readonly #sticks: InstancedMesh;
   readonly #balls: InstancedMesh;
 
   constructor({ skeleton }: ModelCard, bone: Material, joint: Material, count = 1) {
     super();
-    this.#parents = skeleton.parents;
     this.#bones = stretches(skeleton);
-    this.#placed = placed(skeleton.names.length);
+    this.#joints = new Joints(skeleton.parents);
     const one = count === 1;
     const cone = new CylinderGeometry(0.55, 1, 1, one ? 8 : 5, 1, !one).translate(0, 0.5, 0);
     const ball = new IcosahedronGeometry(1, one ? 3 : 0);
@@ -209,19 +199,14 @@ export class Stick extends Object3D {
 
   /** body: number of the body that takes the pose. */
   show({ rotations, root, offsets }: BodyPose, body = 0): void {
-    place(this.#placed, this.#parents, offsets, rotations, root, 0);
-    const { positions } = this.#placed;
+    const joints = this.#joints;
+    joints.place({ rotations, rootPosition: root, boneOffsets: offsets });
     const [stick, ball] = [body * this.#bones.length, body * (this.#bones.length + 1)];
-    this.#setBall(ball, start.fromArray(positions), BALL);
+    this.#setBall(ball, joints.position(0, start), BALL);
     this.#bones.forEach(({ from, to, tip, length }, i) => {
-      start.fromArray(positions, 3 * from);
-      if (to === null) {
-        const [w, x, y, z] = this.#placed.rotations.subarray(4 * from, 4 * from + 4);
-        end
-          .fromArray(tip)
-          .applyQuaternion(turn.set(x!, y!, z!, w!))
-          .add(start);
-      } else end.fromArray(positions, 3 * to);
+      joints.position(from, start);
+      if (to === null) end.fromArray(tip).applyMatrix4(joints.bones[from]!.matrixWorld);
+      else joints.position(to, end);
       const long = along.subVectors(end, start).length();
       turn.setFromUnitVectors(UP, along.divideScalar(long || 1));
       const thick = Math.min(STICK, SLENDER * length);

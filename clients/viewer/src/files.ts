@@ -1,4 +1,4 @@
-/** Downloads: the shown clip or crowd as a file, a video, and text that asks for the same. */
+/** Downloads: the shown clip or crowd as a file, and text that asks for the same. */
 
 import {
   type ClipFormat,
@@ -19,7 +19,6 @@ import {
   targetFields,
 } from "./questions.ts";
 import { type Changes, has, valuesOf } from "./state.ts";
-import { videoButton } from "./video.ts";
 import { figure, title } from "./written.ts";
 
 export const FORMATS = [
@@ -111,13 +110,7 @@ class Files {
         "section",
         { class: "files", "aria-label": "Download" },
         el("h2", {}, "Download"),
-        el(
-          "div",
-          { class: "files-main row" },
-          this.#get,
-          videoButton(session, (text) => this.#say(text)),
-        ),
-        ...[this.#status, this.#paths],
+        ...[this.#get, this.#status, this.#paths],
         el("div", { class: "files-fields" }, ...this.#fields()),
         ...this.#options(),
         el("h3", {}, "The same from a program"),

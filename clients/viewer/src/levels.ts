@@ -19,7 +19,7 @@ import { SkinnedBody } from "./figure.ts";
 import { Latest } from "./latest.ts";
 import type { Session } from "./player.ts";
 import { RATE, TAKE_AND_FEET, takeAndFeet } from "./questions.ts";
-import { type Placed, place, placed } from "./skeleton.ts";
+import { Joints } from "./skeleton.ts";
 import { type Changes, has, type State } from "./state.ts";
 import * as theme from "./theme.ts";
 import { figure as digits, whole } from "./written.ts";
@@ -138,7 +138,7 @@ class Levels {
 /** One level's character, with the finest level's bones as lines over it, and its note. */
 class LevelFigure {
   readonly body: SkinnedBody;
-  readonly joints: Placed;
+  readonly joints: Joints;
   readonly bones: LineSegments<BufferGeometry, LineBasicMaterial>;
   readonly note: HTMLElement;
   motion: Motion | null = null;
@@ -153,7 +153,7 @@ class LevelFigure {
     // The light's shadows reach as far as one body.
     for (const skin of this.body.children) skin.castShadow = false;
     const joints = card.skeleton.parents.length;
-    this.joints = placed(joints);
+    this.joints = new Joints(card.skeleton.parents);
     this.bones = new LineSegments(
       new BufferGeometry().setAttribute(
         "position",
@@ -173,10 +173,10 @@ class LevelFigure {
   }
 
   /** finest: joints of level 0. */
-  place(time: number, shift: Vector3, finest: Placed): void {
+  place(time: number, shift: Vector3, finest: Joints): void {
     const { boneOffsets, frames, parents, rate, rootPosition, rotations } = this.motion!;
     const frame = Math.min(frames - 1, Math.max(0, Math.round(time * rate)));
-    place(this.joints, parents, boneOffsets, rotations, rootPosition, frame);
+    this.joints.place(this.motion!, frame);
     const [turns, root] = [4 * parents.length, 3 * frame];
     this.body.show({
       rotations: rotations.subarray(frame * turns, (frame + 1) * turns),
@@ -188,14 +188,13 @@ class LevelFigure {
     this.bones.position.copy(shift);
     const ends = this.bones.geometry.getAttribute("position") as BufferAttribute;
     parents.forEach((parent, joint) => {
-      const from = 3 * Math.max(0, parent);
-      ends.array.set(finest.positions.subarray(from, from + 3), 6 * joint);
-      ends.array.set(finest.positions.subarray(3 * joint, 3 * joint + 3), 6 * joint + 3);
+      finest.position(Math.max(0, parent), ONE).toArray(ends.array, 6 * joint);
+      finest.position(joint, ONE).toArray(ends.array, 6 * joint + 3);
     });
     ends.needsUpdate = true;
   }
 
-  describe(camera: PerspectiveCamera, seen: Lens, ladder: Ladder, finest: Placed): void {
+  describe(camera: PerspectiveCamera, seen: Lens, ladder: Ladder, finest: Joints): void {
     const { most, rms } = apart(camera, seen.height, finest, this.joints, this.body.position);
     const now = `${pixels(rms)} px, worst ${pixels(most)}`;
     this.#now.textContent = this.#level ? now : "reference";
@@ -244,19 +243,15 @@ const [ONE, OTHER] = [new Vector3(), new Vector3()];
 function apart(
   camera: PerspectiveCamera,
   height: number,
-  finest: Placed,
-  other: Placed,
+  finest: Joints,
+  other: Joints,
   shift: Vector3,
 ): { most: number; rms: number } {
   let [most, sum] = [0, 0];
-  const joints = other.positions.length / 3;
+  const joints = other.bones.length;
   for (let joint = 0; joint < joints; joint++) {
-    ONE.fromArray(finest.positions, 3 * joint)
-      .add(shift)
-      .project(camera);
-    OTHER.fromArray(other.positions, 3 * joint)
-      .add(shift)
-      .project(camera);
+    finest.position(joint, ONE).add(shift).project(camera);
+    other.position(joint, OTHER).add(shift).project(camera);
     const x = ((ONE.x - OTHER.x) * height * camera.aspect) / 2;
     const y = ((ONE.y - OTHER.y) * height) / 2;
     most = Math.max(most, Math.hypot(x, y));

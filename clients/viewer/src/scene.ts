@@ -1,21 +1,25 @@
 /** The stage: a camera, a ground, light, and one loop that draws when something has changed. */
 
 import {
+  CanvasTexture,
   Color,
   DirectionalLight,
+  Fog,
   HemisphereLight,
   Mesh,
+  MeshBasicMaterial,
   PCFShadowMap,
   PerspectiveCamera,
   PlaneGeometry,
+  RepeatWrapping,
   Scene as Root,
-  ShaderMaterial,
-  UniformsLib,
-  UniformsUtils,
+  ShadowMaterial,
+  type Texture,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+import { el } from "./dom.ts";
 import * as theme from "./theme.ts";
 
 /** Called before each drawing with the seconds since the last; true asks to be called again. */
@@ -31,7 +35,10 @@ export class Scene {
   readonly orbit: OrbitControls;
   readonly #quality: Quality;
   readonly #steps = new Set<Step>();
-  readonly #ground = new Ground();
+  /** Lines a metre apart, which fade into the distance, and the ground in shadow. */
+  readonly #lines = new Mesh(GROUND, new MeshBasicMaterial({ map: squares(), transparent: true }));
+  readonly #shade = new Mesh(GROUND, new ShadowMaterial({ fog: false }));
+  readonly #fog = new Fog(0);
   #leash = LEASH;
   #floor = 0;
   readonly #sun = sun();
@@ -58,7 +65,11 @@ export class Scene {
     this.frame();
     this.orbit.addEventListener("change", () => this.redraw());
     const sky = new HemisphereLight(0xffffff, 0x8d8f98, 1.7);
-    this.root.add(sky, this.#sun, this.#sun.target, this.#ground.mesh);
+    this.root.add(sky, this.#sun, this.#sun.target, this.#lines, this.#shade);
+    this.root.fog = this.#fog;
+    this.#shade.receiveShadow = true;
+    // Shadows fall near the middle, and cost where they are looked for.
+    this.#shade.scale.setScalar(5.2 / SIZE);
     this.tint();
     theme.listen(() => this.tint());
     new ResizeObserver(() => this.#fit(host)).observe(host);
@@ -118,11 +129,9 @@ export class Scene {
 
   tint(): void {
     this.root.background = new Color(theme.colour("--paper"));
-    this.#ground.tint(
-      theme.colour("--paper"),
-      theme.colour("--grid"),
-      theme.isDark() ? 0.55 : 0.82,
-    );
+    this.#fog.color.set(theme.colour("--paper"));
+    this.#lines.material.color.set(theme.colour("--grid"));
+    this.#shade.material.opacity = theme.isDark() ? 0.45 : 0.18;
     this.redraw();
   }
 
@@ -131,7 +140,8 @@ export class Scene {
     const { x, z } = this.orbit.target;
     this.#sun.position.set(x + 1.8, 4.5, z + 2.2);
     this.#sun.target.position.set(x, 0.6, z);
-    this.#ground.mesh.position.set(x, this.#floor, z);
+    this.#lines.position.set(Math.round(x), this.#floor, Math.round(z));
+    this.#shade.position.set(x, this.#floor + 0.002, z);
   }
 
   #draw(now: number): void {
@@ -141,6 +151,8 @@ export class Scene {
     this.#quality.drawing(since);
     this.#asked = false;
     const again = [...this.#steps].map((step) => step(seconds)).some(Boolean);
+    const far = this.camera.position.distanceTo(this.orbit.target);
+    [this.#fog.near, this.#fog.far] = [far, 2.5 * far + 8];
     this.renderer.render(this.root, this.camera);
     if (again) this.redraw();
   }
@@ -154,6 +166,24 @@ export class Scene {
   }
 }
 
+/** Metres of the ground's sides, and pixels of the picture of a square metre. */
+const [SIZE, PIXELS] = [60, 128];
+const GROUND = new PlaneGeometry(SIZE, SIZE).rotateX(-Math.PI / 2);
+
+/** White lines a metre apart. */
+function squares(): Texture {
+  const canvas = el("canvas", { width: PIXELS, height: PIXELS });
+  const pen = canvas.getContext("2d")!;
+  pen.strokeStyle = "#fff6";
+  pen.lineWidth = 2;
+  pen.strokeRect(0, 0, PIXELS, PIXELS);
+  const texture = new CanvasTexture(canvas);
+  texture.wrapS = texture.wrapT = RepeatWrapping;
+  texture.repeat.setScalar(SIZE);
+  texture.anisotropy = 8;
+  return texture;
+}
+
 function sun(): DirectionalLight {
   const light = new DirectionalLight(0xffffff, 2);
   light.castShadow = true;
@@ -163,76 +193,6 @@ function sun(): DirectionalLight {
   light.shadow.normalBias = 0.01;
   Object.assign(light.shadow.camera, { left: -1.6, right: 1.6, top: 1.8, bottom: -1.6, far: 12 });
   return light;
-}
-
-const VERTEX = `
-#include <common>
-#include <shadowmap_pars_vertex>
-varying vec3 place;
-varying vec2 local;
-void main() {
-  vec3 objectNormal = vec3(0.0, 0.0, 1.0);
-  vec3 transformedNormal = normalMatrix * objectNormal;
-  local = position.xy;
-  vec4 worldPosition = modelMatrix * vec4(position, 1.0);
-  place = worldPosition.xyz;
-  gl_Position = projectionMatrix * viewMatrix * worldPosition;
-  #include <shadowmap_vertex>
-}`;
-
-const FRAGMENT = `
-#include <common>
-#include <packing>
-#include <lights_pars_begin>
-#include <shadowmap_pars_fragment>
-#include <shadowmask_pars_fragment>
-uniform vec3 paper;
-uniform vec3 ink;
-uniform float dim;
-varying vec3 place;
-varying vec2 local;
-float lines(float every) {
-  vec2 at = place.xz / every;
-  vec2 wide = fwidth(at);
-  vec2 far = abs(fract(at - 0.5) - 0.5) / max(wide, 1e-6);
-  return (1.0 - min(min(far.x, far.y), 1.0)) * (1.0 - smoothstep(0.2, 0.6, max(wide.x, wide.y)));
-}
-void main() {
-  float fade = 1.0 - smoothstep(0.1, 1.0, length(local) / 12.0);
-  float line = max(0.55 * lines(1.0), 0.2 * lines(0.25));
-  vec3 colour = mix(paper, ink, line * fade * 0.5);
-  // Shadows fall near the middle, and cost where they are looked for.
-  if (length(local) < 2.6) colour = mix(colour, colour * dim, 1.0 - getShadowMask());
-  gl_FragColor = vec4(colour, 1.0);
-  #include <colorspace_fragment>
-}`;
-
-/** The floor: lines a metre and a quarter of one apart, which fade into the distance. */
-class Ground {
-  readonly mesh: Mesh<PlaneGeometry, ShaderMaterial>;
-
-  constructor() {
-    const uniforms = UniformsUtils.merge([
-      UniformsLib.lights,
-      { paper: { value: new Color() }, ink: { value: new Color() }, dim: { value: 0.8 } },
-    ]);
-    const material = new ShaderMaterial({
-      vertexShader: VERTEX,
-      fragmentShader: FRAGMENT,
-      uniforms,
-      lights: true,
-    });
-    this.mesh = new Mesh(new PlaneGeometry(60, 60), material);
-    this.mesh.rotation.x = -Math.PI / 2;
-    this.mesh.receiveShadow = true;
-  }
-
-  tint(paper: string, ink: string, dim: number): void {
-    const { uniforms } = this.mesh.material;
-    (uniforms["paper"]!.value as Color).set(paper);
-    (uniforms["ink"]!.value as Color).set(ink);
-    uniforms["dim"]!.value = dim;
-  }
 }
 
 /** Pixels a CSS pixel, in one direction. */

@@ -7,7 +7,7 @@ import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { el, id, titled } from "./dom.ts";
 import { pose, sample } from "./playback.ts";
 import type { Session } from "./player.ts";
-import { place, placed } from "./skeleton.ts";
+import { Joints } from "./skeleton.ts";
 import { type State, valuesOf } from "./state.ts";
 import * as theme from "./theme.ts";
 import * as written from "./written.ts";
@@ -139,11 +139,10 @@ class Target {
     const { parents } = this.#session.card.skeleton;
     const now = pose(parents.length);
     sample(now, clip, this.#event.share * clip.trust.duration);
-    const joints = placed(parents.length);
-    const { positions } = place(joints, parents, clip.boneOffsets, now.rotations, now.root, 0);
-    const point = [...positions.subarray(3 * this.#event.joint, 3 * this.#event.joint + 3)];
-    this.#handle.position.fromArray(point);
-    this.#write(point);
+    const joints = new Joints(parents);
+    joints.place({ ...clip, rotations: now.rotations, rootPosition: now.root });
+    joints.position(this.#event.joint, this.#handle.position);
+    this.#write(this.#handle.position.toArray());
     this.#miss.textContent = written.centimetres(0);
   }
 

@@ -1,7 +1,6 @@
-/** The page as users meet it: on a phone and a desk, at the first visit, with presets and a video. */
+/** The page as users meet it: on a phone and a desk, at the first visit, with presets. */
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
 import { after, before, describe, it } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
@@ -132,23 +131,6 @@ it("the link that is copied is the address", async () => {
   await page.getByRole("button", { name: "Copy link" }).click();
   await page.getByRole("button", { name: "Copied" }).waitFor();
   assert.equal(await page.evaluate(() => navigator.clipboard.readText()), page.url());
-  await page.close();
-});
-
-it("a video of the clip is recorded", async () => {
-  const { page, faults } = await opened(from, "/#cmu_walk?~playing=no");
-  await settled(page);
-  const [got] = await Promise.all([
-    page.waitForEvent("download", { timeout: 60_000 }),
-    page.getByRole("button", { name: "Record video" }).click(),
-  ]);
-  assert.equal(got.suggestedFilename(), "cmu_walk.webm");
-  const content = readFileSync(await got.path());
-  // The head of an EBML document, of which WebM is one.
-  assert.equal(content.subarray(0, 4).toString("hex"), "1a45dfa3");
-  assert.ok(content.length > 10_000, String(content.length));
-  await page.locator(".files-said", { hasText: "cmu_walk.webm saved" }).waitFor();
-  assert.deepEqual(faults, []);
   await page.close();
 });
 
