@@ -123,7 +123,7 @@ test("a walker goes where keys send it, and a crowd walks", async (context) => {
   await page.keyboard.up("ArrowUp");
   assert.ok(await stands(page));
   await pictures("walk-stopped");
-  // Who drags turns the view, and sends nobody.
+  // A drag turns the view, and moves no walker.
   await page.mouse.move(200, 250);
   await page.mouse.down();
   await page.mouse.move(320, 260, { steps: 4 });

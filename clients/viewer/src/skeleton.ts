@@ -1,4 +1,4 @@
-/** Joints in space, as bones that no skin hangs on. */
+/** Joints in space, as bones without a skin. */
 
 import { applyPose } from "@posefield/client/three";
 import { Bone, Vector3 } from "three";
