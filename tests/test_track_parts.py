@@ -117,6 +117,10 @@ def test_unusable_people_are_refused_or_named(tmp_path):
     assert failed.returncode == 3
     assert "person 'p0': jumps" in failed.stderr
     assert list((tmp_path / "a").iterdir()) == []
+    words += ["-o", str(tmp_path / "a.osi")]
+    twice = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert twice.returncode == 2
+    assert "output: the same file twice" in twice.stderr
     report = run(tracks, tmp_path / "a.bones.npz", "--skip-bad", "-o", str(tmp_path / "a.arrow"))
     assert list(report["skipped"]) == ["p0", "p3", "p4", "p5"]
     # A part without people has no file, and the clock begins with the first usable track.

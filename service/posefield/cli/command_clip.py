@@ -165,6 +165,8 @@ def crowd(
     from posefield.cli import crowd_files
 
     process_pool.limit_threads()
+    if len(set(output)) < len(output):
+        raise InvalidField("output", "the same file twice, expected each once")
     reading = TrackReading(heading_unit, y_down, split)
     if people_per_file is not None:
         if trajectories is None or paths or count is not None:

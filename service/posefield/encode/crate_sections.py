@@ -171,26 +171,19 @@ def _append_samples(values: bytearray, rows: Singles) -> Indices:
 def repeated_rows(rows: Singles) -> Indices | None:
     """Return for each row (F, ...) the index of the first equal row; None if all rows differ.
 
-    Rows are compared by their first numbers, then by sums of a few numbers, and in full only if
-    some of these are equal.
+    Rows are compared by sums of a few numbers, and in full only where these are equal.
     """
-    flat = rows.reshape(len(rows), -1)
-    if _all_distinct(flat[:, 0]):
+    probes = np.add.reduce(rows.reshape(len(rows), -1)[:, :PROBED_NUMBERS], axis=1)
+    order = np.argsort(probes)
+    alike = np.flatnonzero(probes[order[1:]] == probes[order[:-1]])
+    if not len(alike):
         return None
-    probes = np.add.reduce(flat[:, :PROBED_NUMBERS], axis=1)
-    if _all_distinct(probes):
-        return None
-    first = dict[Any, int]()
-    first_equal = [first.setdefault(probe, index) for index, probe in enumerate(probes.tolist())]
-    if not np.array_equal(rows, rows[first_equal]):
-        first = {}
-        first_equal = [first.setdefault(row.tobytes(), index) for index, row in enumerate(rows)]
-    return np.array(first_equal) if len(first) < len(rows) else None
-
-
-def _all_distinct(numbers: Singles) -> bool:
-    ordered = np.sort(numbers)
-    return not np.count_nonzero(ordered[1:] == ordered[:-1])
+    compared = np.zeros(len(rows), bool)
+    compared[order[alike]] = compared[order[alike + 1]] = True
+    first_equal, first = np.arange(len(rows)), dict[bytes, int]()
+    for index in np.flatnonzero(compared).tolist():
+        first_equal[index] = first.setdefault(rows[index].tobytes(), index)
+    return first_equal if len(first) < np.count_nonzero(compared) else None
 
 
 LARGEST_INTEGER = 2**63 - 1

@@ -186,6 +186,7 @@ def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
     for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
             prims = [layers.prim(characters, character_name(i), "SkelRoot") for i in indices]
+            set_names(crowd, prims, indices)
             for prim, motion in zip(prims, crowd.motion[indices], strict=True):
                 prim.SetInfo("references", prototype)
                 if instanced:
@@ -203,6 +204,13 @@ def character_blocks(crowd: CrowdClip) -> Iterator[Indices]:
     for first in range(0, len(crowd.motion), BLOCK_SIZE):
         cancellation.check()
         yield np.arange(first, min(first + BLOCK_SIZE, len(crowd.motion)))
+
+
+def set_names(crowd: CrowdClip, prims: Sequence[Any], indices: Indices) -> None:
+    """Set the ids of people on tracks as display names of their prims."""
+    if people := crowd.facts.get("people"):
+        for prim, index in zip(prims, indices.tolist(), strict=True):
+            prim.SetInfo("displayName", people[index])
 
 
 def set_transforms(prims: Sequence[Any], placement: Placement) -> None:
@@ -339,6 +347,7 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
             for prim in prims:
                 layers.add_blend_shapes(prim, rig, crowd.curves)
                 layers.set_character(prim, values)
+            set_names(crowd, prims, indices)
             set_transforms(prims, crowd.placement.select(indices))
             if crowd.presence is not None:
                 set_visibility(layer, prims, crowd.presence[indices], crowd.frames)

@@ -1,7 +1,7 @@
 """Crowds of walking characters: validation, plans, and motions computed on demand."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
@@ -311,23 +311,25 @@ def _placed(
 
 
 def overlap_facts(
-    places: Annotated[FloorVectors, "characters frames"], rate: float
+    places: Annotated[FloorVectors, "characters frames"], rate: float, names: Sequence[Any] = ()
 ) -> dict[str, Any]:
-    """Return the facts of the pairs of characters that overlap, with a warning of any."""
+    """Return the facts of the pairs of characters that overlap, with a warning of any.
+
+    names: of the characters; their numbers by default.
+    """
     overlaps = collision_avoidance.find_overlaps(places, rate)
     if not overlaps:
         return {"overlaps": {"pairs": 0}}
+    names = names or range(len(places))
     told = overlaps[:MOST_OVERLAPS]
-    columns = {name: [getattr(overlap, name) for overlap in told] for name in vars(told[0])}
-    first = told[0]
+    first, second = ([names[getattr(o, name)] for o in told] for name in ("first", "second"))
+    seconds = [overlap.seconds for overlap in told]
     warning = (
         f"pairs of characters that come nearer than {2.0 * RADIUS:g} m: {len(overlaps)}, the first "
-        f"at {first.seconds:.1f} s ({first.first} and {first.second})"
+        f"at {seconds[0]:.1f} s ({first[0]} and {second[0]})"
     )
-    return {
-        "overlaps": {"pairs": len(overlaps), **columns},
-        "warnings": [warning],
-    }
+    pairs = {"pairs": len(overlaps), "first": first, "second": second, "seconds": seconds}
+    return {"overlaps": pairs, "warnings": [warning]}
 
 
 def build_schedule(

@@ -108,13 +108,12 @@ def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> Tr
     """
     rows: dict[str, list[tuple[TrackRows, Indices]]] = {}
     for block in blocks:
-        people, whose = np.unique(np.asarray(block.people), return_inverse=True)
+        numbers: dict[str, int] = {}
+        whose = np.array([numbers.setdefault(person, len(numbers)) for person in block.people])
         order = np.argsort(whose, kind="stable")
-        stops = np.searchsorted(whose[order], np.arange(len(people)), "right")
-        firsts = np.array([indices[0] for indices in np.split(order, stops[:-1])])
-        groups = np.split(order, stops[:-1])
-        for index in np.argsort(firsts, kind="stable").tolist():
-            rows.setdefault(str(people[index]), []).append((block, groups[index]))
+        stops = np.searchsorted(whose[order], np.arange(len(numbers)), "right")
+        for person, indices in zip(numbers, np.split(order, stops[:-1]), strict=True):
+            rows.setdefault(person, []).append((block, indices))
         if len(rows) > MAX_PEOPLE:
             raise FileError(path, f"more than {MAX_PEOPLE} people, expected at most as many")
     tracks = check((_joined(person, pieces) for person, pieces in rows.items()), path, skip_bad)

@@ -301,7 +301,8 @@ def _overlaps(crowd: TrackCrowd) -> dict[str, Any]:
     points = np.tile(away[:, None], crowd.frames).astype(np.complex128)
     for row, person in zip(points, crowd.people, strict=True):
         row[person.path.first : person.path.first + len(person.path)] = person.path.points
-    return walking_crowd.overlap_facts(points, rate)
+    names = [person.track.person for person in crowd.people]
+    return walking_crowd.overlap_facts(points, rate, names)
 
 
 def _limits(crowd: TrackCrowd, person: Person) -> Iterator[PersonLimit]:
