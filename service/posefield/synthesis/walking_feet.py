@@ -1,7 +1,9 @@
 """Feet of walking crowds that stand: which crowds, and their motions."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from itertools import islice
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.constraints import take_variation
 from posefield.feet import body_plans, foot_placement, footsteps
-from posefield.feet.footsteps import Character, FeetPlan, PlanRequest
+from posefield.feet.footsteps import Character, PlanRequest
 from posefield.inference.onnx_runtime import CONTACTS
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.session import Session
@@ -19,10 +21,7 @@ from posefield.locomotion import locomotion_plan, stride, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
 from posefield.locomotion.stride import RelativePoses
-from posefield.locomotion.walking_crowd import (
-    MotionMaker,
-    PoseMaker,
-)
+from posefield.locomotion.walking_crowd import PoseMaker
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import hinges, skeleton
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
@@ -34,6 +33,9 @@ from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 KNOT_SECONDS = 0.2
 """Interval between points of a path at which deviations are computed, s, with lines between: a
 character changes its speed over seconds."""
+Made = TypeVar("Made")
+PredictedMotions = tuple[Motions, Annotated[Floats, "motions frames contacts"]]
+"""Motions as predicted, and the probabilities of their contacts."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,7 @@ def build_crowd(model: Synthesizer, gait: Gait, question: WalkQuestion) -> Crowd
     """
     takes = of_question(model.session.card, question)
     standing = wants_standing_feet(gait.session.card, question)
-    make = motion_maker(model, takes, standing)
+    make = with_takes(standing_motions if standing else walking_crowd.motions, model, takes)
     crowd = walking_crowd.build_crowd(model, gait, question, make)
     facts: dict[str, Any] = {"feet_stand": standing}
     if takes is not None:
@@ -228,15 +230,16 @@ def build_crowd(model: Synthesizer, gait: Gait, question: WalkQuestion) -> Crowd
     return replace(crowd, facts={**crowd.facts, **facts})
 
 
-def motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool) -> MotionMaker:
-    """Return what makes motions of takes, or of the prediction, with standing feet or without."""
-    make = standing_motions if standing else walking_crowd.motions
+def with_takes(
+    make: Callable[..., Made], model: Synthesizer, takes: WalkerTakes | None
+) -> Callable[..., Made]:
+    """Return a function of motions, such as `standing_motions`, with the poses of takes."""
     if takes is None:
         return make
 
     def vary(
         session: Session, plan: LocomotionPlan, walkers: Indices, schedule: LevelSchedule
-    ) -> Motions:
+    ) -> Made:
         pose = pose_maker(model, takes, plan, walkers)
         return make(session, plan, walkers, schedule, pose)
 
@@ -291,50 +294,68 @@ def standing_motions(
 
     Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
     """
+    predicted = predict(session, plan, walkers, schedule, pose)
+    return stand(session.card, plan.rate, [predicted])[0]
+
+
+def predict(
+    session: Session,
+    plan: LocomotionPlan,
+    walkers: Indices,
+    schedule: LevelSchedule,
+    pose: PoseMaker = locomotion_plan.synthesize_poses,
+) -> PredictedMotions:
+    """Return what `standing_motions` makes stand."""
     motions, likely = walking_crowd.motions_with_contacts(session, plan, walkers, schedule, pose)
     if plan.stepping is not None:
         likely += plan.stepping.firm[walkers][..., None] * (1.0 - likely)
-    plans = _plan_feet(session.card, plan.rate, motions, likely)
-    count, frames, *shape = motions.rotations.shape
-    # The rotations of the legs are written into those of the motions.
-    shift, *paths = foot_placement.place_grids(plans, motions.rotations.reshape(-1, *shape))
-    roots = motions.root_position + shift.reshape(count, frames, 3)
-    before, after = (path.reshape(count, frames, -1, 3) for path in paths)
-    skate_before, skate = (
-        walking_crowd.measure_skate_of_feet(session.card, feet, plan.rate).mean(axis=1)
-        for feet in (before, after)
-    )
-    feet = StandingFeet(
-        skate_before,
-        skate,
-        np.array(foot_placement.largest_drifts(plans, list(after))),
-        np.array([(walker.lowered - walker.followed).max() for walker in plans]),
-    )
-    return replace(motions, root_position=roots.astype(np.float32), feet=feet)
+    return motions, likely
 
 
-def _plan_feet(
-    card: ModelCard,
-    rate: float,
-    motions: Motions,
-    probabilities: Annotated[Floats, "motions frames contacts"],
-) -> list[FeetPlan]:
+def stand(card: ModelCard, rate: float, groups: Sequence[PredictedMotions]) -> list[Motions]:
+    """Return groups of motions with standing feet, computed at once.
+
+    The motions of a group have equal lengths. Each has the same bytes as if it were alone.
+    """
     character, feet = choose_legs(card)
     contacts = [foot_contacts(card)[index] for index in feet]
     columns = [card.contacts.index(contact) for contact in contacts]
-    likely = probabilities[..., columns]
-    doubles = (motions.bone_offsets, motions.rotations, motions.root_position)
-    bones, rotations, roots = (array.astype(np.float64) for array in doubles)
-    return body_plans.plan_motions(
-        [
-            PlanRequest(
-                replace(character, bones=bones[walker]),
-                rotations[walker],
-                roots[walker],
-                rate,
-                contacts,
-                likely[walker],
-            )
-            for walker in range(len(bones))
-        ]
-    )
+    requests = [
+        PlanRequest(replace(character, bones=bones), rotations, roots, rate, contacts, likely)
+        for motions, probabilities in groups
+        for bones, rotations, roots, likely in zip(
+            motions.bone_offsets.astype(np.float64),
+            motions.rotations.astype(np.float64),
+            motions.root_position.astype(np.float64),
+            probabilities[..., columns],
+            strict=True,
+        )
+    ]
+    plans = body_plans.plan_motions(requests)
+    shape = len(card.skeleton), 4
+    # The rotations of the legs are written into those of the motions.
+    rotations = np.concatenate([motions.rotations.reshape(-1, *shape) for motions, _ in groups])
+    placed = rotations, *foot_placement.place_grids(plans, rotations)
+    standing, walkers = [], iter(plans)
+    first = 0
+    for motions, _ in groups:
+        count, frames = motions.levels.shape
+        rows = slice(first, first + count * frames)
+        first = rows.stop
+        turns, shift, before, after = (
+            array[rows].reshape(count, frames, *array.shape[1:]) for array in placed
+        )
+        skate_before, skate = (
+            walking_crowd.measure_skate_of_feet(card, paths, rate).mean(axis=1)
+            for paths in (before, after)
+        )
+        some = list(islice(walkers, count))
+        facts = StandingFeet(
+            skate_before,
+            skate,
+            np.array(foot_placement.largest_drifts(some, list(after))),
+            np.array([(plan.lowered - plan.followed).max() for plan in some]),
+        )
+        roots = (motions.root_position + shift).astype(np.float32)
+        standing.append(replace(motions, rotations=turns, root_position=roots, feet=facts))
+    return standing

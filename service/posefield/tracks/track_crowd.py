@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from posefield.performance.step_plan import Strider
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.walking_feet import PredictedMotions
 from posefield.tracks import track_path, track_plan
 from posefield.tracks.track import Track
 from posefield.tracks.track_path import TrackPath
@@ -93,12 +94,45 @@ class TrackCrowd:
         """Strides of the model's walkers."""
         return track_plan.find_striders(self.gait)
 
-    def motions(self, people: Sequence[Person]) -> tuple[LocomotionPlan, Motions]:
-        """Return the plan and the motions of people, each from the first frame of its own path.
+    @cached_property
+    def feet_stand(self) -> bool:
+        """Whether feet stand."""
+        return walking_feet.wants_standing_feet(self.gait.session.card, self.question)
 
-        The paths have equal lengths. The plan is in the world and in the model's size; the motions
-        begin at the start of their paths, and each has its person's size.
+    def batches(self) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
+        """Yield people with their plans and motions, neighbours of equal length together.
+
+        The plan is in the world and in the model's size. Motions begin at the start of their paths,
+        each from its first frame, and have their people's sizes. None depends on other people: a
+        crowd may be made in parts.
         """
+        batch, poses = list[Person](), 0
+        for person in self.people:
+            if batch and poses + len(person.path) > POSES_PER_BATCH:
+                yield from self._motions(batch)
+                batch, poses = [], 0
+            batch.append(person)
+            poses += len(person.path)
+        if batch:
+            yield from self._motions(batch)
+
+    def _motions(
+        self, people: Sequence[Person]
+    ) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
+        groups = [list(group) for _, group in groupby(people, lambda person: len(person.path))]
+        plans, predicted = zip(*map(self._predict, groups), strict=True)
+        if self.feet_stand:
+            made = walking_feet.stand(self.gait.session.card, self.question.fps, predicted)
+        else:
+            made = [motions for motions, _ in predicted]
+        for group, plan, motions in zip(groups, plans, made, strict=True):
+            size = np.array([person.scale for person in group], np.float32)[:, None, None]
+            roots, bones = motions.root_position * size, motions.bone_offsets * size
+            yield group, plan, replace(motions, root_position=roots, bone_offsets=bones)
+
+    def _predict(self, people: Sequence[Person]) -> tuple[LocomotionPlan, PredictedMotions]:
+        """Return the plan and the motions of people of equal length, in the model's size."""
+        cancellation.check()
         rate, card = self.question.fps, self.gait.session.card
         combinations = self.gait.labels.draw(np.array([person.number for person in people]))
         numbers = np.array([(person.phase, person.sway) for person in people])
@@ -108,36 +142,12 @@ class TrackCrowd:
         takes = walking_feet.of_question(card, structs.replace(self.question, count=len(people)))
         if takes is not None and takes.take == "index":
             takes = replace(takes, seeds=np.array([person.take for person in people]))
-        make = walking_feet.motion_maker(
-            self.model, takes, walking_feet.wants_standing_feet(card, self.question)
-        )
+        predict = walking_feet.with_takes(walking_feet.predict, self.model, takes)
         starts = np.array([path.points[0] for path in paths]) / scales
         relative = replace(plan, places=plan.places - starts[:, None])
         world = replace(plan, places=plan.places * scales[:, None])
         levels = walking_crowd.build_schedule(self.model, world, self.question)
-        motions = make(self.gait.session, relative, np.arange(len(people)), levels)
-        size = scales.astype(np.float32)[:, None, None]
-        return plan, replace(
-            motions,
-            root_position=motions.root_position * size,
-            bone_offsets=motions.bone_offsets * size,
-        )
-
-    def batches(self) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
-        """Yield people with their plans and motions, neighbours of equal length together.
-
-        The motion of a person does not depend on the others: a crowd may be made in parts.
-        """
-        first = 0
-        while first < len(self.people):
-            cancellation.check()
-            end, frames = first + 1, len(self.people[first].path)
-            most = first + max(1, POSES_PER_BATCH // frames)
-            while end < min(most, len(self.people)) and len(self.people[end].path) == frames:
-                end += 1
-            people = self.people[first:end]
-            yield people, *self.motions(people)
-            first = end
+        return plan, predict(self.gait.session, relative, np.arange(len(people)), levels)
 
 
 def find_people(
