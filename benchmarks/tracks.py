@@ -128,8 +128,6 @@ def walk(model: Synthesizer, kinds: Kinds, copies: int = COPIES, takes: int = 0)
         _, likely = walking_crowd.motions_with_contacts(
             crowd.gait.session, plan, np.arange(len(group)), levels
         )
-        if plan.stepping is not None:
-            likely += plan.stepping.firm[..., None] * (1.0 - likely)
         for index, person in enumerate(group):
             rows = slice(0, len(person.path))
             rotations = motions.rotations[index, rows].astype(float)

@@ -51,6 +51,8 @@ def write_crowd(
     feet = _FootSkateMeter(opened, question.fps)
     watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
     crowd_formats.write_files(watched, outputs, question, model.session.card.roles)
+    followed = [] if tracks is None else ["people", "begin", "scales", "path_error_cm"]
+    skipped = {} if tracks is None else {"skipped": {**tracks.skipped, **crowd.facts["skipped"]}}
     return {
         "file": str(outputs[0]),
         "files": [str(output) for output in outputs],
@@ -66,7 +68,8 @@ def write_crowd(
         "take": crowd.facts.get("take", {}),
         "overlaps": crowd.facts.get("overlaps", {}),
         "warnings": crowd.facts.get("warnings", []),
-        **_track_facts(crowd, tracks),
+        **{name: crowd.facts[name] for name in followed},
+        **skipped,
         **feet.facts(),
     }
 
@@ -130,15 +133,6 @@ def parts_text(manifest: dict[str, Any], folder: Path) -> str:
     pairs = (zip(record["excess"], record["warnings"], strict=True) for record in records)
     worst_first = [line for _, line in sorted(chain(*pairs), key=lambda pair: -pair[0])]
     return "\n".join(lines + track_crowd.shorten(skipped) + track_crowd.shorten(worst_first))
-
-
-def _track_facts(crowd: CrowdClip, tracks: TrackSet | None) -> dict[str, Any]:
-    """Return the facts of people on tracks, with those who were left out."""
-    if tracks is None:
-        return {}
-    names = ("people", "begin", "scales", "path_error_cm")
-    skipped = {**tracks.skipped, **crowd.facts["skipped"]}
-    return {name: crowd.facts[name] for name in names} | {"skipped": skipped}
 
 
 def routes(path: Path) -> Sequence[Route]:

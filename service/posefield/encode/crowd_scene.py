@@ -186,7 +186,6 @@ def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
     for indices in character_blocks(crowd):
         with Sdf.ChangeBlock():
             prims = [layers.prim(characters, character_name(i), "SkelRoot") for i in indices]
-            set_names(crowd, prims, indices)
             for prim, motion in zip(prims, crowd.motion[indices], strict=True):
                 prim.SetInfo("references", prototype)
                 if instanced:
@@ -195,8 +194,7 @@ def add_references(layer: Any, crowd: CrowdClip, instanced: bool) -> None:
                     prim, "skel:animationSource", MOTIONS.AppendChild(motion_name(motion))
                 )
             set_transforms(prims, crowd.placement.select(indices))
-            if crowd.presence is not None:
-                set_visibility(layer, prims, crowd.presence[indices], crowd.frames)
+            set_presence(layer, crowd, prims, indices)
 
 
 def character_blocks(crowd: CrowdClip) -> Iterator[Indices]:
@@ -204,13 +202,6 @@ def character_blocks(crowd: CrowdClip) -> Iterator[Indices]:
     for first in range(0, len(crowd.motion), BLOCK_SIZE):
         cancellation.check()
         yield np.arange(first, min(first + BLOCK_SIZE, len(crowd.motion)))
-
-
-def set_names(crowd: CrowdClip, prims: Sequence[Any], indices: Indices) -> None:
-    """Set the ids of people on tracks as display names of their prims."""
-    if people := crowd.facts.get("people"):
-        for prim, index in zip(prims, indices.tolist(), strict=True):
-            prim.SetInfo("displayName", people[index])
 
 
 def set_transforms(prims: Sequence[Any], placement: Placement) -> None:
@@ -224,11 +215,15 @@ def set_transforms(prims: Sequence[Any], placement: Placement) -> None:
         layers.uniform_attribute(prim, "xformOpOrder", ValueTypes.TokenArray, order)
 
 
-def set_visibility(layer: Any, prims: Sequence[Any], presence: Indices, frames: int) -> None:
-    """Hide characters in the frames in which they are not there. presence: as of the crowd."""
-    for prim, (begin, end) in zip(prims, presence.tolist(), strict=True):
+def set_presence(layer: Any, crowd: CrowdClip, prims: Sequence[Any], indices: Indices) -> None:
+    """Name people on tracks by their ids, and hide them in the frames in which they are away."""
+    if crowd.presence is None:
+        return
+    for prim, index in zip(prims, indices.tolist(), strict=True):
+        prim.SetInfo("displayName", crowd.facts["people"][index])
+        begin, end = crowd.presence[index].tolist()
         visibility = {0: begin == 0, begin: True}
-        if end < frames:
+        if end < crowd.frames:
             visibility[end] = False
         layers.varying_attribute(prim, "visibility", ValueTypes.Token, "inherited")
         for frame, visible in visibility.items():
@@ -347,10 +342,8 @@ def _copy_prototype(layer: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
             for prim in prims:
                 layers.add_blend_shapes(prim, rig, crowd.curves)
                 layers.set_character(prim, values)
-            set_names(crowd, prims, indices)
             set_transforms(prims, crowd.placement.select(indices))
-            if crowd.presence is not None:
-                set_visibility(layer, prims, crowd.presence[indices], crowd.frames)
+            set_presence(layer, crowd, prims, indices)
 
 
 def _copy_motion(

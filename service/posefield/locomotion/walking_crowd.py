@@ -49,6 +49,7 @@ MotionMaker = Callable[[Session, LocomotionPlan, Indices, LevelSchedule], Motion
 """Computes the motions of characters (M,) of a plan, as `motions` does."""
 PoseMaker = Callable[[Session, LocomotionPlan, Indices, Indices, int], RelativePoses]
 """Computes poses of a plan, as `locomotion_plan.synthesize_poses` does."""
+MotionsWithContacts = tuple[Motions, Annotated[Floats, "motions frames contacts"]]
 _PoseMaker = Callable[[Indices, Indices, int], RelativePoses]
 
 
@@ -150,7 +151,7 @@ def motions_with_contacts(
     characters: Annotated[Indices, "motions"],
     levels: LevelSchedule,
     pose: PoseMaker = locomotion_plan.synthesize_poses,
-) -> tuple[Motions, Annotated[Floats, "motions frames contacts"]]:
+) -> MotionsWithContacts:
     """Return motions as `motions` does, and the probabilities (M, F, C) of the contacts."""
     shape = (len(characters), plan.phases.shape[1])
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
@@ -174,7 +175,10 @@ def motions_with_contacts(
     turns = rotations.reshape(*shape, joints, 4)
     motion_curves = values.reshape(*shape, -1) if values.size else None
     synthesized = Motions(turns, roots.reshape(*shape, 3), bones, levels.levels, motion_curves)
-    return synthesized, likely.reshape(*shape, -1)
+    likely = likely.reshape(*shape, -1)
+    if plan.stepping is not None:
+        likely += plan.stepping.firm[characters][..., None] * (1.0 - likely)
+    return synthesized, likely
 
 
 def _blended_poses(pose: _PoseMaker, pairs: Pairs, levels: LevelSchedule) -> RelativePoses:
@@ -313,10 +317,7 @@ def _placed(
 def overlap_facts(
     places: Annotated[FloorVectors, "characters frames"], rate: float, names: Sequence[Any] = ()
 ) -> dict[str, Any]:
-    """Return the facts of the pairs of characters that overlap, with a warning of any.
-
-    names: of the characters; their numbers by default.
-    """
+    """Return the facts of pairs of characters, by name or number, that overlap, and a warning."""
     overlaps = collision_avoidance.find_overlaps(places, rate)
     if not overlaps:
         return {"overlaps": {"pairs": 0}}

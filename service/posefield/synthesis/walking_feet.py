@@ -21,7 +21,7 @@ from posefield.locomotion import locomotion_plan, stride, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LevelSchedule, LocomotionPlan
 from posefield.locomotion.stride import RelativePoses
-from posefield.locomotion.walking_crowd import PoseMaker
+from posefield.locomotion.walking_crowd import MotionsWithContacts, PoseMaker
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import hinges, skeleton
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
@@ -34,8 +34,6 @@ KNOT_SECONDS = 0.2
 """Interval between points of a path at which deviations are computed, s, with lines between: a
 character changes its speed over seconds."""
 Made = TypeVar("Made")
-PredictedMotions = tuple[Motions, Annotated[Floats, "motions frames contacts"]]
-"""Motions as predicted, and the probabilities of their contacts."""
 
 
 @dataclass(frozen=True)
@@ -294,29 +292,12 @@ def standing_motions(
 
     Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
     """
-    predicted = predict(session, plan, walkers, schedule, pose)
+    predicted = walking_crowd.motions_with_contacts(session, plan, walkers, schedule, pose)
     return stand(session.card, plan.rate, [predicted])[0]
 
 
-def predict(
-    session: Session,
-    plan: LocomotionPlan,
-    walkers: Indices,
-    schedule: LevelSchedule,
-    pose: PoseMaker = locomotion_plan.synthesize_poses,
-) -> PredictedMotions:
-    """Return what `standing_motions` makes stand."""
-    motions, likely = walking_crowd.motions_with_contacts(session, plan, walkers, schedule, pose)
-    if plan.stepping is not None:
-        likely += plan.stepping.firm[walkers][..., None] * (1.0 - likely)
-    return motions, likely
-
-
-def stand(card: ModelCard, rate: float, groups: Sequence[PredictedMotions]) -> list[Motions]:
-    """Return groups of motions with standing feet, computed at once.
-
-    The motions of a group have equal lengths. Each has the same bytes as if it were alone.
-    """
+def stand(card: ModelCard, rate: float, groups: Sequence[MotionsWithContacts]) -> list[Motions]:
+    """Return groups of motions with standing feet; each has the same bytes as if it were alone."""
     character, feet = choose_legs(card)
     contacts = [foot_contacts(card)[index] for index in feet]
     columns = [card.contacts.index(contact) for contact in contacts]
@@ -335,14 +316,15 @@ def stand(card: ModelCard, rate: float, groups: Sequence[PredictedMotions]) -> l
     shape = len(card.skeleton), 4
     # The rotations of the legs are written into those of the motions.
     rotations = np.concatenate([motions.rotations.reshape(-1, *shape) for motions, _ in groups])
-    placed = rotations, *foot_placement.place_grids(plans, rotations)
+    placed = foot_placement.place_grids(plans, rotations)
     standing, walkers = [], iter(plans)
     first = 0
     for motions, _ in groups:
         count, frames = motions.levels.shape
         rows = slice(first, first + count * frames)
         first = rows.stop
-        turns, shift, before, after = (
+        turns = rotations[rows].reshape(motions.rotations.shape)
+        shift, before, after = (
             array[rows].reshape(count, frames, *array.shape[1:]) for array in placed
         )
         skate_before, skate = (

@@ -16,13 +16,12 @@ from posefield.common.errors import InvalidField
 from posefield.locomotion import collision_avoidance, floor_plane, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH
+from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH, MotionsWithContacts
 from posefield.motion.clip import CrowdClip, Motions, Placement, StandingFeet
 from posefield.performance.step_plan import Strider
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.synthesis.walking_feet import PredictedMotions
 from posefield.tracks import track_path, track_plan
 from posefield.tracks.track import Track
 from posefield.tracks.track_path import TrackPath
@@ -94,11 +93,6 @@ class TrackCrowd:
         """Strides of the model's walkers."""
         return track_plan.find_striders(self.gait)
 
-    @cached_property
-    def feet_stand(self) -> bool:
-        """Whether feet stand."""
-        return walking_feet.wants_standing_feet(self.gait.session.card, self.question)
-
     def batches(self) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
         """Yield people with their plans and motions, neighbours of equal length together.
 
@@ -121,16 +115,15 @@ class TrackCrowd:
     ) -> Iterator[tuple[Sequence[Person], LocomotionPlan, Motions]]:
         groups = [list(group) for _, group in groupby(people, lambda person: len(person.path))]
         plans, predicted = zip(*map(self._predict, groups), strict=True)
-        if self.feet_stand:
-            made = walking_feet.stand(self.gait.session.card, self.question.fps, predicted)
-        else:
-            made = [motions for motions, _ in predicted]
+        card, made = self.gait.session.card, [motions for motions, _ in predicted]
+        if walking_feet.wants_standing_feet(card, self.question):
+            made = walking_feet.stand(card, self.question.fps, predicted)
         for group, plan, motions in zip(groups, plans, made, strict=True):
             size = np.array([person.scale for person in group], np.float32)[:, None, None]
             roots, bones = motions.root_position * size, motions.bone_offsets * size
             yield group, plan, replace(motions, root_position=roots, bone_offsets=bones)
 
-    def _predict(self, people: Sequence[Person]) -> tuple[LocomotionPlan, PredictedMotions]:
+    def _predict(self, people: Sequence[Person]) -> tuple[LocomotionPlan, MotionsWithContacts]:
         """Return the plan and the motions of people of equal length, in the model's size."""
         cancellation.check()
         rate, card = self.question.fps, self.gait.session.card
@@ -142,7 +135,7 @@ class TrackCrowd:
         takes = walking_feet.of_question(card, structs.replace(self.question, count=len(people)))
         if takes is not None and takes.take == "index":
             takes = replace(takes, seeds=np.array([person.take for person in people]))
-        predict = walking_feet.with_takes(walking_feet.predict, self.model, takes)
+        predict = walking_feet.with_takes(walking_crowd.motions_with_contacts, self.model, takes)
         starts = np.array([path.points[0] for path in paths]) / scales
         relative = replace(plan, places=plan.places - starts[:, None])
         world = replace(plan, places=plan.places * scales[:, None])
