@@ -27,7 +27,7 @@ MOVING, CREEPING = 0.25, 0.05
 """Speed from which on a person has a direction of travel, m/s, and mean speed: noise has less."""
 TRAVEL_SPEED = (0.35, 0.5)
 """Speeds between which a person turns from a stated heading to the direction of travel, m/s."""
-HEADING_WINDOW = 0.12
+HEADING_WINDOW = 0.17
 """Standard deviation of the average of headings, s."""
 
 
