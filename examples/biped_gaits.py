@@ -70,7 +70,7 @@ table = "clips.csv"
 file = "file"
 
 [motion]
-frames = 40
+frames = 41
 cyclic = true
 root = "travelling"
 

@@ -508,7 +508,12 @@ def test_the_guides_recipe_reads_gaits_without_doubt_of_their_unit(family, file,
     recipe = posefield_train.read_recipe(tmp_path / "recipe.toml")
     examples, notes = ingest.ingest(recipe, tmp_path)
     assert len(examples) == 8
-    assert not any("metres_per_unit" in note for note in notes)
+    assert not any("metres_per_unit" in note or "motion.frames" in note for note in notes)
+
+
+def test_frames_that_a_model_of_a_robot_does_not_have_are_told(family):
+    _, notes = ingest.ingest(posefield_train.read_recipe(family / "recipe.toml"), family)
+    assert any("motion.frames is 24, and clips have up to 41 frames" in note for note in notes)
 
 
 def test_a_model_of_a_robot_answers_with_its_angles_between_the_commands(family, robot):

@@ -151,6 +151,8 @@ def ingest(
         examples.append(_example(recipe, row, captured, last, facing))
         changes.append(canonical.largest_stretch(captured))
         positions.append(captured.positions())
+    if robot:
+        notes += frame_notes(motion.frames, [len(example.clip) for example in examples])
     landmarks = [example.landmarks for example in examples]
     measured_controls.expect_same_order(recipe.landmark_names, rows, landmarks)
     notes += stretch_notes(rows, changes)
@@ -324,6 +326,21 @@ def stretch_notes(rows: Sequence[ClipRow], stretches: Sequence[float]) -> list[s
     return [
         f"{count} of {len(rows)} clips: {largest}, the most in {rows[worst].file}; their mean is "
         "kept"
+    ]
+
+
+def frame_notes(frames: int, lengths: Sequence[int]) -> list[str]:
+    """Return the note on poses of a robot's motions between those of the model; none if all are.
+
+    frames: of the model. lengths: frames of each clip. Reference motions are exact in each frame
+    and turn abruptly at contacts, so that poses between two frames are not those of the file.
+    """
+    longest = max(lengths)
+    if frames > longest or (frames - 1) % (longest - 1) == 0:
+        return []
+    return [
+        f"motion.frames is {frames}, and clips have up to {longest} frames: poses between those of "
+        f"the model are interpolated; expected {longest} frames to keep them"
     ]
 
 
