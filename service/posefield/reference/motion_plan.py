@@ -34,7 +34,8 @@ TO_Z_UP = [2, 0, 1]
 class Arrays(NamedTuple):
     """A module of arrays.
 
-    xp: `numpy`, `torch` or `jax.numpy`. constant: makes an array of NumPy's. whole: an array's
+    xp: `numpy`, `torch` or `jax.numpy`. constant: makes an array of NumPy's, or of one of another
+    precision. whole: an array's
     numbers, rounded down, as indices. take: rows of an array (R, C) at indices.
     """
 
@@ -100,7 +101,8 @@ class ReferenceModel:
         self.controls = tuple(control.name for control in card.controls)
         self.hinges = self.robot.hinges
         self.feet = tuple(self.robot.bodies[body] for body in self._foot_bodies)
-        self._weights = onnx_file.initializers(opened.content)
+        # Copies: torch takes no arrays that are read alone.
+        self._weights = {n: w.copy() for n, w in onnx_file.initializers(opened.content).items()}
         self.labels = question_validation.label_weights(card, None, labels or {})[0]
         self.bounds = opened.bounds
 
@@ -155,6 +157,9 @@ class ReferenceModel:
             **{f"support_{name}": np.asarray(value) for name, value in captured.items()},
             **self._tensor(),
             "contacts": self._contacts(),
+            "ranges": self.robot.ranges.T,
+            "products": rotations.PRODUCTS,
+            "matrices": rotations.MATRICES,
             "conjugate": np.array([1.0, -1.0, -1.0, -1.0]),
             "commanded": 1.0 * np.array([[q == name for name in QUANTITIES] for q in quantities]),
         }
@@ -221,7 +226,7 @@ def _check(path: str | Path, card: ModelCard) -> None:
 class Evaluator:
     """Evaluation of a model by one module of arrays.
 
-    fine: arrays in which plans are made. fast: those in which samples are.
+    fine: arrays in which plans are made. fast: those in which feet are solved, and samples made.
     """
 
     def __init__(self, model: ReferenceModel, fine: Arrays, fast: Arrays) -> None:
@@ -231,34 +236,35 @@ class Evaluator:
         self._fine = {name: fine.constant(values) for name, values in constants.items()}
         self._fast = {
             name: fast.constant(constants[name])
-            for name in ("warp_breaks", "base", "joint_sigma", "mean")
+            for name in ("warp_breaks", "base", "joint_sigma", "products", "ranges")
         }
         self._whole, self._take, self._steps = fast.whole, fast.take, model.card.frames - 1
         self._hinges, self._feet = len(model.hinges), len(model.feet)
-        arguments = model.robot, model.card.soles, self._steps
-        self._soles = StandingSoles(fine.xp, fine.constant, *arguments)
-        self._limits = StandingSoles(fast.xp, fast.constant, *arguments)
+        self._single = fast.constant
+        soles = model.card.soles
+        self._soles = StandingSoles(fast.xp, fast.constant, model.robot, soles, self._steps)
         self._covariance = COVARIANCE_MODELS[model.card.kriging.covariance]
 
     def plan(self, commands: Array) -> Plan:
         """Return the cycles of commands (E, d), in the model's units and the order of controls."""
         xp, w = self._xp, self._fine
         limited = xp.clip(commands, w["least"], w["greatest"])
-        values = self._basis(limited) @ w["weights"]
-        logarithms, travel, _, duration, warp, pose = (
-            values[:, first:end]
+        inside = xp.clip(commands, w["low"], w["high"])
+        # Duration keeps to what it is inside, and sigma is that of the commands as they are.
+        cases, count = xp.concatenate([limited, inside, commands], 0), len(commands)
+        bases = self._basis(cases)
+        basis = bases[2 * count :]
+        powers = xp.log(xp.maximum(cases[: 2 * count], w["floor"])) @ w["exponents"]
+        both = bases[: 2 * count] @ w["weights"]
+        logarithms, travel, _, _, warp, pose = (
+            both[:count, first:end]
             for first, end in zip([0, *self._splits[:-1]], self._splits, strict=True)
         )
-        raw = xp.exp(duration[:, 0] + self._power(limited))
-        inside = xp.clip(commands, w["low"], w["high"])
-        nearest = self._basis(inside) @ w["weights"]
-        place = self._splits[2]
-        nearest = xp.exp(nearest[:, place] + self._power(inside))
-        shortest = xp.minimum(nearest, nearest * 0.0 + w["shortest"][0])
-        longest = xp.maximum(nearest, nearest * 0.0 + w["shortest"][1])
-        durations = xp.clip(raw, shortest, longest)
-        # Sigma is that of the commands as they are.
-        basis = self._basis(commands)
+        both = xp.exp(both[:, self._splits[2]] + powers)
+        nearest, (shortest, longest) = both[count:], w["shortest"]
+        durations = xp.clip(
+            both[:count], xp.minimum(nearest, shortest), xp.maximum(nearest, longest)
+        )
         variance = w["sill"] * xp.sum((basis @ w["form"]) * basis, -1)
         variance = variance + xp.exp(logarithms[:, 0])
         goals, chosen = limited @ w["commanded"], xp.sum(w["commanded"], 0)
@@ -284,12 +290,6 @@ class Evaluator:
         leading = half[:, :1] * 0.0 + w["leading"]
         return xp.concatenate([leading, half, near], -1)
 
-    def _power(self, commands: Array) -> Array:
-        w = self._fine
-        return (
-            self._xp.log(self._xp.maximum(commands, w["floor"] + 0.0 * commands)) @ w["exponents"]
-        )
-
     def _supported(self, commands: Array) -> Array:
         xp, w = self._xp, self._fine
         scale, bounds = w["support_scale"], w["support_bounds"]
@@ -308,31 +308,24 @@ class Evaluator:
         angles, position and rotation by frame, and contacts.
         """
         xp, w, steps = self._xp, self._fine, self._steps
-        r1 = w["moves"].shape[0]
-        reduced = (pose @ w["core"]).reshape(len(pose), -1, r1)
+        reduced = (pose @ w["core"]).reshape(len(pose), -1, len(w["moves"]))
         numbers = w["mean"] + (w["time"] @ reduced) @ w["moves"]
-        frames = xp.cumsum(numbers[:1, :, 0] * 0.0 + 1.0, -1) - 1.0
-        share = frames / steps
-        path, turns = placed(xp, w["base"], numbers, travel, share)
+        share = (xp.cumsum(numbers[:1, :, 0] * 0.0 + 1.0, -1) - 1.0) / steps
+        path, turns = placed(xp, w, numbers, travel, share)
         angles = numbers[..., 6:]
         if self._model.card.soles:
-            changed = self._soles.corrected(path, rotations.matrices(xp, turns), angles)
-            angles = angles + (changed - self._soles.limited(angles))
+            matrices = rotations.bilinear(turns, turns, w["matrices"])
+            matrices = matrices.reshape(*turns.shape[:2], 3, 3)
+            cycle = [self._single(values) for values in (path, matrices, angles)]
+            angles = angles + (self._soles.corrected(*cycle) - self._soles.limited(cycle[2]))
         before = turns[:, :-1] * w["conjugate"]
-        spins = rotations.rotation_vectors(xp, rotations.product(xp, turns[:, 1:], before))
-        cycle = travel[:, 2]
+        spins = rotations.bilinear(turns[:, 1:], before, w["products"])
+        spins = rotations.rotation_vectors(xp, spins)
+        moves = xp.stack([path[:, 1:] - path[:, :-1], spins], 2)
+        moves = central(xp, moves, travel[:, 2:]).reshape(*path.shape[:2], 6)
+        turned = central(xp, angles[:, 1:] - angles[:, :-1], None)
         contacts = w["contacts"] + 0.0 * numbers[..., : self._feet]
-        return xp.concatenate(
-            [
-                numbers[..., :6],
-                angles,
-                central(xp, angles[:, 1:] - angles[:, :-1], None),
-                central(xp, path[:, 1:] - path[:, :-1], cycle),
-                central(xp, spins, cycle),
-                contacts,
-            ],
-            -1,
-        )
+        return xp.concatenate([numbers[..., :6], angles, turned, moves, contacts], -1)
 
     def sample(self, plan: Plan, phase: Array) -> Reference:
         """Return the reference at phases (E,), in cycles; whole cycles do not count."""
@@ -353,10 +346,10 @@ class Evaluator:
         h = self._hinges
         numbers, changes = row[:, : 6 + h], row[:, 6 + h : 12 + 2 * h] * pace[:, None]
         done = (frame / steps)[:, None]
-        path, turns = placed(xp, w["base"], numbers[:, None], plan.travels, done)
+        path, turns = placed(xp, w, numbers[:, None], plan.travels, done)
         sigmas = plan.sigmas[:, None] * w["joint_sigma"]
         return Reference(
-            self._limits.limited(numbers[:, 6:]),
+            xp.clip(numbers[:, 6:], *w["ranges"]),
             changes[:, :h],
             path[:, 0],
             turns[:, 0],
@@ -371,10 +364,12 @@ class Evaluator:
         )
 
 
-def placed(xp: Any, base: Array, numbers: Array, travel: Array, share: Array) -> list[Array]:
+def placed(
+    xp: Any, w: Mapping[str, Array], numbers: Array, travel: Array, share: Array
+) -> list[Array]:
     """Return base positions (E, S, 3), m, and rotations (E, S, 4) with the travel in them.
 
-    numbers (E, S, 6 or more): position without travel and rotation about the mean `base` (4,).
+    w: constants. numbers (E, S, 6 or more): position without travel and rotation about the mean.
     travel (E, 3): ahead, to the left and of the heading. share (E or 1, S): of the cycle done.
     """
     done = travel[:, None] * share[..., None]
@@ -385,14 +380,15 @@ def placed(xp: Any, base: Array, numbers: Array, travel: Array, share: Array) ->
     angle = 0.5 * done[..., 2]
     zero = angle * 0.0
     heading = xp.stack([xp.cos(angle), zero, zero, xp.sin(angle)], -1)
-    turned = rotations.product(xp, heading, rotations.product(xp, base + 0.0 * turn, turn))
+    products = w["products"]
+    turned = rotations.bilinear(heading, rotations.bilinear(w["base"], turn, products), products)
     return [numbers[..., :3] + flat, turned]
 
 
 def central(xp: Any, steps: Array, turn: Array | None) -> Array:
-    """Return central differences (E, N + 1, n) of a cycle's steps (E, N, n) from frame to frame.
+    """Return central differences (E, N + 1, ...) of a cycle's steps (E, N, ...) between frames.
 
-    turn (E,): of the next cycle about the vertical, rad; None for values that it does not turn.
+    turn (E, 1): of the next cycle about the vertical, rad; None for values that it does not turn.
     """
     before, after = steps[:, -1:], steps[:, :1]
     if turn is not None:

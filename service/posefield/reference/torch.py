@@ -20,9 +20,9 @@ ROWS = 256
 class ReferenceMotion(Evaluator):
     """Reference motions of a robot's model, by commands and phase.
 
-    device, dtype: of the tensors that are taken and returned. Cycles are planned in double
-    precision, or in `dtype` on a device that lacks it. labels: name by label set, such as a style.
-    Raises ModelError for a file that is no robot's gaits.
+    device, dtype: of the tensors that are taken and returned. Cycles are predicted in double
+    precision, or in `dtype` on a device that lacks it; feet are solved in `dtype`. labels: name by
+    label set, such as a style. Raises ModelError for a file that is no robot's gaits.
 
     Attributes: controls, hinges and feet are names in the order of commands, joints and contacts.
     """
@@ -79,7 +79,7 @@ class ReferenceMotion(Evaluator):
 def _arrays(device: torch.device, dtype: torch.dtype) -> Arrays:
     return Arrays(
         torch,
-        lambda values: torch.tensor(values, dtype=dtype, device=device),
+        lambda values: torch.as_tensor(values, dtype=dtype, device=device),
         lambda values: values.long(),
         lambda values, indices: values.index_select(0, indices),
     )

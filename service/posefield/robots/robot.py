@@ -79,25 +79,18 @@ class Robot:
         positions = np.empty((len(angles), len(self.bodies), 3))
         rotations = np.empty((len(angles), len(self.bodies), 4))
         positions[:, 0], rotations[:, 0] = base_path, base_rotations
-        hinges = self._hinges_of_bodies()
         for body, parent in enumerate(self.parents):
             if body:
                 turn = rotations[:, parent]
                 positions[:, body] = positions[:, parent] + quat.rotate(turn, self.offsets[body])
                 rotations[:, body] = quat.mul(turn, self.turns[body])
-            for hinge in hinges[body]:
+            for hinge in np.flatnonzero(np.array(self.hinge_bodies) == body):
                 fixed = quat.rotate(rotations[:, body], self.anchors[hinge])
                 turn = quat.from_axis_angle(self.axes[hinge], angles[:, hinge])
                 rotations[:, body] = quat.mul(rotations[:, body], turn)
                 # A hinge beside the body's origin moves the origin on a circle.
                 positions[:, body] += fixed - quat.rotate(rotations[:, body], self.anchors[hinge])
         return positions, rotations
-
-    def _hinges_of_bodies(self) -> list[list[int]]:
-        hinges: list[list[int]] = [[] for _ in self.bodies]
-        for hinge, body in enumerate(self.hinge_bodies):
-            hinges[body].append(hinge)
-        return hinges
 
     def foot_points(
         self, positions: BodyPositions, rotations: BodyRotations

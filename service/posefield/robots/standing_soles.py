@@ -3,9 +3,10 @@
 The frames in which each point of a sole stands are those that the captured cycles have in common,
 known at training. In a run of them the point stays at the mean of its predicted positions, so that
 its displacement is linear in them; from one run to the next the displacement changes smoothly. The
-hinges of each leg follow by a fixed number of damped Gauss-Newton steps within their limits.
-Nothing is searched or decided, and so NumPy, torch and JAX evaluate the same functions, which take
-their module as `xp`, and gradients pass through them. Legs of one kind are solved at once.
+hinges of each leg follow by a fixed number of damped Gauss-Newton steps within their limits. A foot
+below the floor is raised. Nothing is searched or decided, and so NumPy, torch and JAX evaluate the
+same functions, which take their module as `xp`, and gradients pass through them. Legs of one kind
+are solved at once.
 
 Positions are metres, Z up. A cycle of N steps has frames 0 to N, and frame N is frame 0 moved on.
 """
@@ -98,30 +99,51 @@ class LegGroup:
     """
 
     def __init__(
-        self, xp: Any, constant: Constant, robot: Robot, points: Points, group: list[Leg]
+        self,
+        xp: Any,
+        constant: Constant,
+        robot: Robot,
+        points: Points,
+        steps: int,
+        group: list[Leg],
     ) -> None:
-        chains = [_links(robot, leg.bodies) for leg in group]
-        self._xp, self.rows = xp, [row for leg in group for row in leg.rows]
+        chains, self._xp = [_links(robot, leg.bodies) for leg in group], xp
         self._turning = [chains[0][0].index(hinge) for hinge in group[0].hinges]
         self._links = constant(np.stack([links for _, links, _ in chains]))
         identity, turned = np.eye(len(robot.hinges)), [h for leg in group for h in leg.hinges]
         self._chains = constant(identity[[hinge for chain, _, _ in chains for hinge in chain]])
         self._columns, self._identity = (
             constant(identity[turned]),
-            constant(np.eye(len(self._turning))[..., None]),
+            constant(np.eye(len(self._turning), len(self._turning) + 1)[..., None]),
         )
         lines = np.stack([_homogeneous(robot.axes, 0.0), _homogeneous(robot.anchors, 1.0)], axis=-1)
         self._lines = constant(lines[turned].reshape(len(group), -1, 1, 4, 2).swapaxes(3, 4))
-        corners = [
-            _homogeneous(np.array([points[row].position for row in leg.rows]), 1.0) @ last.T
-            for leg, (_, _, last) in zip(group, chains, strict=True)
+        feet = {foot.body: foot.points for foot in robot.feet}
+        # Corners, and behind them the surface; of a foot of fewer points some are there twice.
+        corners, shape = len(group[0].rows), (max(len(foot) for foot in feet.values()), 3)
+        soles = [
+            np.vstack(
+                [
+                    *(points[row].position for row in leg.rows),
+                    np.resize(feet[leg.bodies[-1]], shape),
+                ]
+            )
+            for leg in group
         ]
-        self._corners = constant(np.stack(corners)[:, None])
+        ends = zip(soles, chains, strict=True)
+        self._soles = constant(np.stack([_homogeneous(p, 1.0) @ last.T for p, (*_, last) in ends]))
+        self._corners = self._soles[:, None, :corners]
+        # Matrices of stances, from the frames of two cycles and of one, and when frames stand.
+        stances = [_stance_matrices(points[row], steps) for leg in group for row in leg.rows]
+        self.displace, self.smooth, self.when = (
+            constant(np.stack(values).reshape(len(group), -1, *values[0].shape))
+            for values in zip(*stances, strict=True)
+        )
 
-    def points(self, angles: Array) -> tuple[Array, list[Array]]:
+    def points(self, angles: Array) -> tuple[Array, list[Array], Array]:
         """Return sole points (L, 3, p, R), m, from the base, and slopes (L, p, h, R) of each axis.
 
-        angles (R, H): of all hinges of the robot, rad.
+        The last are poses (L, 3, 4, R) of the feet. angles (R, H): of all hinges of the robot, rad.
         """
         xp, (legs, hinges) = self._xp, self._links.shape[:2]
         turned = (self._chains @ angles.T).reshape(legs, hinges, -1)
@@ -135,20 +157,26 @@ class LegGroup:
         axes = [lines[:, None, :, axis, 0] for axis in range(3)]
         arms = [points[:, a, :, None] - lines[:, None, :, a, 1] for a in range(3)]
         pairs = ((1, 2), (2, 0), (0, 1))
-        return points, [axes[i] * arms[j] - axes[j] * arms[i] for i, j in pairs]
+        return points, [axes[i] * arms[j] - axes[j] * arms[i] for i, j in pairs], poses[-1]
+
+    def lowest(self, poses: Array, ups: Array) -> Array:
+        """Return the height (L, R), m, of the lowest point of each foot over the base.
+
+        ups (3, R): the vertical in the frame of the base.
+        """
+        return self._xp.amin(self._soles @ sum(poses[:, a] * ups[a] for a in range(3)), 1)
 
     def turns(self, goals: Array, points: Array, slopes: Sequence[Array]) -> Array:
         """Return the turns (R, H), rad, of all hinges of a step from points to goals."""
-        xp, gaps = self._xp, goals - points
-        matrix = sum(xp.sum(slope[:, :, :, None] * slope[:, :, None], 1) for slope in slopes)
-        vector = sum(xp.sum(slope * gaps[:, a, :, None], 1) for a, slope in enumerate(slopes))
+        xp, gaps, system = self._xp, goals - points, DAMPING * self._identity
+        for axis, slope in enumerate(slopes):
+            columns = xp.concatenate([slope, gaps[:, axis, :, None]], 2)
+            system = system + xp.sum(slope[:, :, :, None] * columns[:, :, None], 1)
         # By elimination over all systems at once: a library solves one after the other.
-        system = xp.concatenate([matrix + DAMPING * self._identity, vector[:, :, None]], 2)
-        for pivot, unit in enumerate(self._identity):
-            row = system[:, pivot] / system[:, pivot, pivot, None]
-            system = system - (system[:, :, pivot] - unit)[:, :, None] * row[:, None]
-        solved = system[:, :, -1]
-        return solved.reshape(-1, solved.shape[-1]).T @ self._columns
+        for pivot, unit in enumerate(self._identity[:, :-1]):
+            row = system[:, pivot, 1:] / system[:, pivot, :1]
+            system = system[:, :, 1:] - (system[:, :, 0] - unit)[:, :, None] * row[:, None]
+        return system.reshape(-1, system.shape[-1]).T @ self._columns
 
 
 def _links(robot: Robot, bodies: Sequence[int]) -> tuple[list[int], Floats, Floats]:
@@ -190,15 +218,9 @@ class StandingSoles:
             hinges = [h for h, body in enumerate(robot.hinge_bodies) if body in leg.bodies]
             alone = tuple(hinge in leg.hinges for hinge in hinges)
             kinds.setdefault((alone, len(leg.rows)), []).append(leg)
-        self._groups = [LegGroup(xp, constant, robot, points, group) for group in kinds.values()]
-        runs = [
-            _stance_matrices(points[row], steps) for group in self._groups for row in group.rows
+        self._groups = [
+            LegGroup(xp, constant, robot, points, steps, group) for group in kinds.values()
         ]
-        # Without sole points there are only limits.
-        if runs:
-            self._displace, self._smooth, self._when = (
-                constant(np.stack(matrices)) for matrices in zip(*runs, strict=True)
-            )
         self._shares = constant(np.arange(steps) / steps)
         self._low, self._high = (constant(robot.ranges[:, side]) for side in range(2))
 
@@ -213,65 +235,63 @@ class StandingSoles:
         (..., N + 1, H), rad. All are within the limits.
         """
         xp, steps = self._xp, self._steps
-        path, turns = base_path[..., :steps, None, :], base_turns[..., :steps, :, :]
+        # All frames of all cycles come last.
+        path = base_path[..., :steps, :].reshape(-1, 3).T
+        turns = base_turns[..., :steps, :, :].reshape(-1, 9).T.reshape(3, 3, -1)
         rows = self.limited(angles[..., :steps, :]).reshape(-1, angles.shape[-1])
-        reached = [group.points(rows) for group in self._groups]
-        shape = (*path.shape[:-2], -1, 3)
-        predicted = [
-            xp.swapaxes(xp.swapaxes(points, 1, 3), 0, 1).reshape(shape) for points, _ in reached
-        ]
-        predicted = xp.concatenate(predicted, -2) @ xp.swapaxes(turns, -1, -2) + path
-        # From the base, goals are where its motion leaves them.
-        goals = (self._goals(base_path, base_turns, predicted) - path) @ turns
-        goals, first = goals.reshape(len(rows), -1, 3), 0
-        for group, (points, slopes) in zip(self._groups, reached, strict=True):
-            goal = goals[:, first : first + len(group.rows)].reshape(len(rows), len(points), -1, 3)
-            goal, first = xp.swapaxes(xp.swapaxes(goal, 0, 1), 1, 3), first + len(group.rows)
+        for group in self._groups:
+            points, slopes, feet = group.points(rows)
+            predicted = sum(turns[:, a, None] * points[:, None, a] for a in range(3))
+            predicted = predicted + path[:, None]
+            # Soles bulge below their corners, and so the whole foot is raised.
+            sunk = xp.clip(group.lowest(feet, turns[2]) + path[2], None, 0.0)
+            level = self._level_goals(group, base_path, base_turns, predicted)
+            goals = xp.concatenate([level, predicted[:, 2:] - sunk[:, None, None]], 1)
+            goals = goals - path[:, None]
+            # From the base, goals are where its motion leaves them.
+            goals = sum(turns[axis, :, None] * goals[:, axis, None] for axis in range(3))
             for iteration in range(ITERATIONS):
                 if iteration:
-                    points, slopes = group.points(rows)
-                rows = self.limited(rows + group.turns(goal, points, slopes))
+                    points, slopes, _ = group.points(rows)
+                rows = self.limited(rows + group.turns(goals, points, slopes))
         solved = rows.reshape(*angles.shape[:-2], steps, -1)
         return xp.concatenate([solved, solved[..., :1, :]], -2)
 
-    def _goals(self, base_path: Array, base_turns: Array, predicted: Array) -> Array:
-        """Return where sole points (..., N, P, 3), m, are that stand, of the predicted ones."""
+    def _level_goals(
+        self, group: LegGroup, base_path: Array, base_turns: Array, predicted: Array
+    ) -> Array:
+        """Return where over the floor sole points (L, 2, p, R), m, are that stand."""
         xp, steps = self._xp, self._steps
-        x, y, z = (xp.swapaxes(predicted[..., axis], -1, -2) for axis in range(3))
+        legs, _, corners, count = predicted.shape
+        level = xp.swapaxes(predicted[:, :2].reshape(legs, 2, corners, -1, steps), 1, 2)
         # The next cycle is this one turned about the vertical and moved on.
         closing = base_turns[..., steps, :, :] @ xp.swapaxes(base_turns[..., 0, :, :], -1, -2)
         turn = xp.arctan2(
             closing[..., 1, 0] - closing[..., 0, 1], closing[..., 0, 0] + closing[..., 1, 1]
-        )[..., None, None]
-        end, start = base_path[..., steps, :, None, None], base_path[..., 0, :, None, None]
-        turned = _turned(xp, turn, x - start[..., 0, :, :], y - start[..., 1, :, :])
-        x2 = xp.concatenate([x, turned[0] + end[..., 0, :, :]], -1)
-        y2 = xp.concatenate([y, turned[1] + end[..., 1, :, :]], -1)
-        displaced = [self._linear(self._displace, values) for values in (x2, y2)]
+        ).reshape(-1, 1)
+        start, end = (base_path[..., at, :2].reshape(-1, 2).T[..., None] for at in (0, steps))
+        following = _turned(xp, turn, level - start) + end
+        displaced = xp.concatenate([level, following], -1).reshape(legs, corners, -1, 2 * steps)
+        displaced = (displaced @ group.displace).reshape(level.shape)
         # In a frame that turns with the cycle displacements repeat, and change smoothly in swings.
-        displaced = _turned(xp, -turn * self._when, *displaced)
-        displaced = [self._linear(self._smooth, values) for values in displaced]
-        displaced = _turned(xp, turn * self._shares, *displaced)
-        above = xp.clip(z, 0.0, None)
-        goals = xp.stack([x + displaced[0], y + displaced[1], above], -1)
-        return xp.swapaxes(goals, -2, -3)
-
-    def _linear(self, functions: Array, values: Array) -> Array:
-        return self._xp.einsum("...pj,pij->...pi", values, functions)
+        displaced = _turned(xp, -turn * group.when[:, :, None], displaced)
+        displaced = displaced.reshape(legs, corners, -1, steps) @ group.smooth
+        goals = level + _turned(xp, turn * self._shares, displaced.reshape(level.shape))
+        return xp.swapaxes(goals, 1, 2).reshape(legs, 2, corners, count)
 
 
-def _turned(xp: Any, angle: Array, x: Array, y: Array) -> list[Array]:
-    """Return planar vectors turned by an angle, rad."""
-    cosine, sine = xp.cos(angle), xp.sin(angle)
-    return [cosine * x - sine * y, sine * x + cosine * y]
+def _turned(xp: Any, angle: Array, level: Array) -> Array:
+    """Return planar vectors (L, p, 2, E, n) turned by angles, rad."""
+    cosine, sine, x, y = xp.cos(angle), xp.sin(angle), level[:, :, 0], level[:, :, 1]
+    return xp.stack([cosine * x - sine * y, sine * x + cosine * y], 2)
 
 
 def _stance_matrices(point: SolePoint, steps: int) -> tuple[Floats, Floats, Floats]:
     """Return the linear functions that make a point stand in a cycle of N steps.
 
-    The first (N, 2 N) takes positions in this cycle and the next to displacements of standing
-    frames, the second (N, N) takes these to displacements of all frames, and the last (N,) is when
-    each frame stands, as a share of the cycle, on beyond it.
+    The first (2 N, N) takes positions in this cycle and the next to displacements of standing
+    frames, the second (N, N) takes these to displacements of all frames, both from the left, and
+    the last (N,) is when each frame stands, as a share of the cycle, on beyond it.
     """
     displace, smooth = np.zeros((steps, 2 * steps)), np.zeros((steps, steps))
     when = np.arange(steps) / steps
@@ -287,4 +307,4 @@ def _stance_matrices(point: SolePoint, steps: int) -> tuple[Floats, Floats, Floa
         shares = quat.smoothstep((frames - last) / (first - last))
         np.add.at(smooth, (frames % steps, np.full(len(frames), last % steps)), 1.0 - shares)
         np.add.at(smooth, (frames % steps, np.full(len(frames), first % steps)), shares)
-    return displace, smooth, when
+    return displace.T, smooth.T, when
