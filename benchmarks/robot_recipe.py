@@ -25,13 +25,13 @@ file = "file"
 first_frame = "first"
 last_frame = "last"
 [motion]
-frames = 60
+frames = 100
 cyclic = true
 root = "travelling"
 [alignment]
 warp = "identity"
 [size]
-rms_budget_cm = 0.02
+rms_budget_cm = 0.005
 """
 
 

@@ -78,7 +78,7 @@ root = "travelling"
 warp = "identity"
 
 [size]
-rms_budget_cm = 0.02
+rms_budget_cm = 0.005
 """
 CONTROL = """
 [[controls]]

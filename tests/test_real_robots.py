@@ -151,16 +151,14 @@ def test_clips_of_a_robot_stand_on_their_soles_within_limits(kind, request):
         mixed = rng.dirichlet(np.ones(4)) @ commands[rng.choice(len(commands), 4, replace=False)]
         command = dict(zip(names, mixed.tolist(), strict=True))
         clip = opened.clip(fps=137, **command)
-        told = {fault.kind for fault in doctor.diagnose(clip.robot_motion(), card.robot).findings}
-        # Between captured velocities gaits are so slow that a foot seems to stand while it swings.
-        assert told <= ({"skating"} if kind == "measured" else set())
+        assert not doctor.diagnose(clip.robot_motion(), card.robot).findings
         if kind == "measured":
             assert list(clip.trust.measured.values()) == pytest.approx(list(command.values()))
         skates.append((clip.trust.feet.skate_before, clip.trust.feet.skate))
         loop = opened.clip(fps=50, loop=True, **command).robot_motion()
         np.testing.assert_allclose(loop.angles[0], loop.angles[-1], atol=1e-7)
     before, after = np.mean(skates, axis=0)
-    assert before > 0.01
+    assert before > 0.005
     assert after < 0.003
     with pytest.raises(InvalidField, match="robots stand as they were recorded"):
         opened.clip(floor=0.1)

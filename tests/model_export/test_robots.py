@@ -267,6 +267,24 @@ def test_the_example_writes_gaits_that_stand_and_follow_their_commands(tmp_path)
         assert way == pytest.approx(arc, rel=0.2, abs=0.01)
 
 
+def test_feet_that_stand_do_not_slide_in_slow_low_or_noisy_gaits(tmp_path):
+    """Control: the same gaits carried sideways at 8 cm/s, of which both feet are told."""
+    example, rng = runpy.run_path(str(EXAMPLE)), np.random.default_rng(0)
+    example["main"](tmp_path / "biped")
+    body = robot_file.read(tmp_path / "biped/biped.xml")
+    for command in np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0, 0.1, 0.0], [0.4, 0.0, 0.0]]):
+        for lift, noise in ((0.015, 0.0), (0.05, 0.003)):
+            example["gait"].__globals__["LIFT"] = lift
+            motion = replace(example["gait"](command), loops=None)
+            angles = motion.angles + noise * rng.normal(size=motion.angles.shape)
+            carried = motion.base_path + np.arange(len(motion))[:, None] * [0, 0.08 / 50, 0]
+            for path, slides in ((motion.base_path, []), (carried, [8.0, 8.0])):
+                moved = replace(motion, angles=angles, base_path=path)
+                findings = doctor.diagnose(moved, body).findings
+                speeds = [finding.value for finding in findings if finding.kind == "skating"]
+                assert speeds == pytest.approx(slides, rel=0.25)
+
+
 class Hostile:
     def __reduce__(self):
         return os.mkdir, ("made-by-a-pickle",)

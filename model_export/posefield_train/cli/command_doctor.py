@@ -91,6 +91,8 @@ def doctor(
     refused = []
     for file in files:
         try:
+            if file.is_dir():
+                raise MotionFileError(str(file), f"is a folder, expected files: {file}/*")
             motion = robot_formats.read(file, conventions)
             motion_doctor.expect_same_robot(motion, motions[0] if motions else motion)
             motions.append(motion)

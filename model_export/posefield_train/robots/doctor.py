@@ -1,7 +1,7 @@
 """Faults of reference motions of a robot: limits, speeds, feet, seams, jumps, outliers."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -12,11 +12,13 @@ from posefield.motion.contact_detection import ContactThresholds, detect_contact
 from posefield.robots.robot import Robot, velocities
 from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
 
-SUNK, FLOATING, SKATING = 0.002, 0.02, 0.05
+SUNK, FLOATING, SKATING, SLIDE = 0.002, 0.02, 0.05, 0.1
 """Depth of a sole below the floor, m, height of the lowest sole above it, m, and mean speed of a
-standing foot, m/s, from which each is told."""
+standing foot, m/s, from which each is told; seconds over which a foot slides."""
 CONTACTS = ContactThresholds(height=0.012, grown_height=0.02)
 """Thresholds of contacts: robots lift their feet by a few centimetres."""
+LIFT_SHARE, LEAST_GROWN = 0.4, 0.004
+"""Share of the height by which a foot is lifted, and least height, m, below which it may stand."""
 JUMP, JUMP_RATIO = np.radians(5.0), 8.0
 """Change of an angle's step from one frame to the next that is told as a jump: so large, and so
 many times its 90th percentile in the motion."""
@@ -192,7 +194,12 @@ def _feet(motion: RobotMotion, robot: Robot) -> tuple[Booleans, Floats, list[Fin
         name = robot.bodies[robot.feet[foot].body]
         middle = points.mean(axis=1)
         path = np.stack([middle[:, 0], heights[:, foot], middle[:, 1]], axis=-1)
-        contacts[:, foot] = detect_contacts(path, motion.rate, cyclic=False, thresholds=CONTACTS)
+        # A foot that is lifted little and slowly swings below the usual thresholds.
+        lift = float(np.ptp(np.percentile(heights[:, foot], (2.0, 98.0))))
+        grown = np.clip(LIFT_SHARE * lift, LEAST_GROWN, CONTACTS.grown_height)
+        height = CONTACTS.height * grown / CONTACTS.grown_height
+        thresholds = replace(CONTACTS, height=height, grown_height=grown)
+        contacts[:, foot] = detect_contacts(path, motion.rate, cyclic=False, thresholds=thresholds)
         findings += _of_foot(motion, name, points, heights[:, foot], contacts[:, foot])
     lowest = heights.min(axis=1)
     standing = contacts.any(axis=1)
@@ -212,12 +219,15 @@ def _of_foot(
     if heights.min() < -SUNK:
         frame, count = int(np.argmin(heights)), int((heights < -SUNK).sum())
         findings.append(Finding("sunk", name, frame, -100 * float(heights.min()), "cm", count))
-    if contacts.any():
-        speeds = sliding_speeds(points, motion.rate)
-        mean = float(speeds[contacts].mean())
+    # Between frames that lie apart: in one step, noise of a tenth of a degree looks like sliding.
+    frames = max(2, round(SLIDE * motion.rate))
+    stands = np.convolve(contacts, np.ones(frames + 1), "valid") > frames + 0.5
+    if len(points) > frames and stands.any():
+        steps = np.linalg.norm(points[frames:, :, :2] - points[:-frames, :, :2], axis=-1)
+        speeds = np.where(stands, steps.min(axis=1) * motion.rate / frames, 0.0)
+        mean = float(speeds.sum() / stands.sum())
         if mean > SKATING:
-            frame = int(np.argmax(np.where(contacts, speeds, 0.0)))
-            count = int(contacts.sum())
+            frame, count = int(np.argmax(speeds)) + frames // 2, int(contacts.sum())
             findings.append(Finding("skating", name, frame, 100 * mean, "cm/s", count))
     return findings
 
