@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import orjson
+from threadpoolctl import threadpool_limits
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
@@ -136,7 +137,8 @@ def compose(script: Script) -> Timeline:
     for index, segment in enumerate(script.segments):
         cancellation.check()
         following = _stage_ahead(script, index)
-        with errors_under("segments", index):
+        # Last bits of poses depend on the number of threads, and a walk is planned by those before.
+        with errors_under("segments", index), threadpool_limits(1, user_api="blas"):
             if isinstance(segment, Walk):
                 staged = walk_steps.add_walk(timeline, script, index, following)
             elif isinstance(segment, Hold):
