@@ -29,8 +29,8 @@ export class WalkView implements View {
   #walkers: Walkers | null = null;
   #figures: readonly Figure[] = [];
   #crowd: Stick | null = null;
-  /** Presses of the pointer since the last click. */
-  readonly #presses: MouseEvent[] = [];
+  /** Last press of the pointer. */
+  #press: MouseEvent | null = null;
   #goals: (readonly [number, number] | null)[] = [];
   #computes = false;
 
@@ -43,7 +43,7 @@ export class WalkView implements View {
     addEventListener("blur", () => this.#held.clear(), { signal });
     const canvas = stage.scene.renderer.domElement;
     canvas.addEventListener("click", (event) => this.#click(event), { signal });
-    canvas.addEventListener("pointerdown", (event) => this.#presses.push(event), { signal });
+    canvas.addEventListener("pointerdown", (event) => (this.#press = event), { signal });
     if (matchMedia("(hover: none)").matches) canvas.after(this.#disc);
     for (const kind of ["pointerdown", "pointermove", "lostpointercapture"] as const)
       this.#disc.addEventListener(kind, (event) => this.#drag(event));
@@ -162,7 +162,7 @@ export class WalkView implements View {
   }
 
   #click({ offsetX, offsetY, target }: MouseEvent): void {
-    const press = this.#presses.splice(0).at(-1);
+    const press = this.#press;
     if (press && Math.hypot(offsetX - press.offsetX, offsetY - press.offsetY) > DRAG) return;
     const { camera } = this.#stage.scene;
     const { clientWidth, clientHeight } = target as HTMLElement;

@@ -15,6 +15,7 @@ from scipy.stats import qmc
 
 from posefield.model import Clip, Model
 from posefield.model_file.model_card import Control
+from posefield.robots.robot import velocities
 from posefield.robots.robot_motion import RobotMotion
 from posefield_train.report import significant_digits
 from posefield_train.report.page import (
@@ -208,7 +209,9 @@ def _skate(motion: RobotMotion, dynamics: Dynamics, contacts: np.ndarray[Any, An
     A mean would tell how they touch down and lift off, which no frame separates from standing.
     """
     soles = dynamics.robot.foot_points(*motion.body_poses(dynamics.robot))
-    speeds = np.stack([doctor.sliding_speeds(points, motion.rate) for points in soles], axis=1)
+    moves = (velocities(points, motion.rate)[..., :2] for points in soles)
+    # Of the points of a sole the slowest one tells whether it stands.
+    speeds = np.stack([np.linalg.norm(move, axis=-1).min(axis=1) for move in moves], axis=1)
     return float(np.median(speeds[contacts])) if contacts.any() else None
 
 

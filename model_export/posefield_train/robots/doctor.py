@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posefield.common.units import Booleans, Floats, Frames
+from posefield.common.units import Booleans, Floats
 from posefield.motion.contact_detection import ContactThresholds, detect_contacts
 from posefield.robots.robot import Robot, velocities
 from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
@@ -230,11 +230,6 @@ def _of_foot(
             frame, count = int(np.argmax(speeds)) + frames // 2, int(contacts.sum())
             findings.append(Finding("skating", name, frame, 100 * mean, "cm/s", count))
     return findings
-
-
-def sliding_speeds(points: Annotated[Floats, "frames points 3"], rate: float) -> Frames:
-    """Return the speed (F,), m/s, over the floor of the slowest of a sole's points."""
-    return np.asarray(np.linalg.norm(velocities(points, rate)[..., :2], axis=-1).min(axis=1))
 
 
 def expect_same_robot(motion: RobotMotion, first: RobotMotion) -> None:

@@ -19,6 +19,8 @@ GROUND_BAND = 0.03
 """Height above the robot's lowest point at rest, m, within which the lowest of a foot lies."""
 DIRECTIONS = 64
 """Directions in which the outermost points of a foot are kept."""
+KINDS = ("free", "ball", "slide", "hinge")
+"""Kinds of joints by MuJoCo's numbers."""
 
 
 def read(path: Path) -> Robot:
@@ -78,10 +80,6 @@ def model_of(path: Path) -> "mujoco.MjModel":
     except ValueError as fault:
         reason = " ".join(str(fault).split())
         raise MotionFileError(str(path), f"MuJoCo refuses it: {reason}") from None
-
-
-KINDS = ("free", "ball", "slide", "hinge")
-"""Kinds of joints by MuJoCo's numbers."""
 
 
 class _Joint:

@@ -82,7 +82,7 @@ def write(crowd: CrowdClip, path: Path, question: WalkQuestion, roles: Roles) ->
 def write_files(crowd: CrowdClip, paths: list[Path], question: WalkQuestion, roles: Roles) -> None:
     """Write a crowd to several files, each as `write` does, of motions that are computed once.
 
-    A temporary file has the motions, half a kilobyte a pose, but no facts of feet, as all files.
+    A temporary file has the motions meanwhile, half a kilobyte a pose, without facts of feet.
     """
     if len(paths) == 1:
         write(crowd, paths[0], question, roles)

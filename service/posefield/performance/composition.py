@@ -137,7 +137,7 @@ def compose(script: Script) -> Timeline:
     for index, segment in enumerate(script.segments):
         cancellation.check()
         following = _stage_ahead(script, index)
-        # Last bits of poses depend on the number of threads, and a walk is planned by those before.
+        # Last bits of poses depend on the number of threads, and plans of walks follow from poses.
         with errors_under("segments", index), threadpool_limits(1, user_api="blas"):
             if isinstance(segment, Walk):
                 staged = walk_steps.add_walk(timeline, script, index, following)

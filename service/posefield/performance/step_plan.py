@@ -25,8 +25,8 @@ cadence up to which a person stands, cycles a second."""
 SLOW, SLOW_WINDOW = 0.2, 0.5
 """Speed below which steps follow the average velocity, m/s, and its standard deviation, s."""
 SETTLING, LEAST_SETTLED, LAST_STEPS = 0.6, 0.5, 2.7
-"""Mean cadence of the last steps after a stop, cycles a second, their fewest cycles, and the
-longest time in which a person comes to stand, s."""
+"""Mean cadence of the last steps after a stop, cycles a second, their fewest cycles, and their
+longest time, s."""
 EASE, LEAST_WALKED = 0.1, 0.4
 """Standard deviation of the average with which standing and stepping are blended, s, and smallest
 share of the walk in the pose of a person who steps."""

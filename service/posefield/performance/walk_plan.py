@@ -18,11 +18,7 @@ from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.stepping import Stepping
 from posefield.motion import quat
-from posefield.performance import (
-    step_plan,
-    walk_paths,
-    walk_request,
-)
+from posefield.performance import step_plan, walk_paths, walk_request
 from posefield.performance.passage import RATE, FloorMotion
 from posefield.performance.standing_pose import Walker, find_walker
 from posefield.performance.step_plan import Course

@@ -28,7 +28,10 @@ def about_vertical(xp: Any, vectors: Array, angle: Array) -> Array:
 
 
 def bilinear(a: Array, b: Array, table: Array) -> Array:
-    """Return the products of quaternions (..., 4), or with MATRICES matrices (..., 9) of a is b."""
+    """Return products (..., 4) of quaternions; matrices (..., 9) of a, if b is a.
+
+    table: PRODUCTS or MATRICES.
+    """
     outer = a[..., None] * b[..., None, :]
     return outer.reshape(*outer.shape[:-2], 16) @ table
 

@@ -34,9 +34,9 @@ TO_Z_UP = [2, 0, 1]
 class Arrays(NamedTuple):
     """A module of arrays.
 
-    xp: `numpy`, `torch` or `jax.numpy`. constant: makes an array of NumPy's, or of one of another
-    precision. whole: an array's
-    numbers, rounded down, as indices. take: rows of an array (R, C) at indices.
+    xp: `numpy`, `torch` or `jax.numpy`. constant: makes an array from one of NumPy, or from one of
+    another precision. whole: an array's numbers, rounded down, as indices. take: rows of an array
+    (R, C) at indices.
     """
 
     xp: Any

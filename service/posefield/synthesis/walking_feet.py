@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
-from posefield.common import cancellation
+from posefield.common import cancellation, frame_groups
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.constraints import take_variation
@@ -33,7 +33,7 @@ from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 KNOT_SECONDS = 0.2
 """Interval between points of a path at which deviations are computed, s, with lines between: a
 character changes its speed over seconds."""
-Made = TypeVar("Made")
+MadeMotions = TypeVar("MadeMotions", Motions, MotionsWithContacts)
 
 
 @dataclass(frozen=True)
@@ -229,15 +229,15 @@ def build_crowd(model: Synthesizer, gait: Gait, question: WalkQuestion) -> Crowd
 
 
 def with_takes(
-    make: Callable[..., Made], model: Synthesizer, takes: WalkerTakes | None
-) -> Callable[..., Made]:
+    make: Callable[..., MadeMotions], model: Synthesizer, takes: WalkerTakes | None
+) -> Callable[..., MadeMotions]:
     """Return a function of motions, such as `standing_motions`, with the poses of takes."""
     if takes is None:
         return make
 
     def vary(
         session: Session, plan: LocomotionPlan, walkers: Indices, schedule: LevelSchedule
-    ) -> Made:
+    ) -> MadeMotions:
         pose = pose_maker(model, takes, plan, walkers)
         return make(session, plan, walkers, schedule, pose)
 
@@ -313,30 +313,27 @@ def stand(card: ModelCard, rate: float, groups: Sequence[MotionsWithContacts]) -
         )
     ]
     plans = body_plans.plan_motions(requests)
-    shape = len(card.skeleton), 4
     # The rotations of the legs are written into those of the motions.
-    rotations = np.concatenate([motions.rotations.reshape(-1, *shape) for motions, _ in groups])
+    rotations = np.concatenate([np.concatenate(motions.rotations) for motions, _ in groups])
     placed = foot_placement.place_grids(plans, rotations)
+    frames_of_groups = frame_groups.FrameGroups(
+        np.array([motions.levels.size for motions, _ in groups])
+    )
+    parts = (frames_of_groups.split(array) for array in (rotations, *placed))
     standing, walkers = [], iter(plans)
-    first = 0
-    for motions, _ in groups:
-        count, frames = motions.levels.shape
-        rows = slice(first, first + count * frames)
-        first = rows.stop
-        turns = rotations[rows].reshape(motions.rotations.shape)
-        shift, before, after = (
-            array[rows].reshape(count, frames, *array.shape[1:]) for array in placed
-        )
+    for (motions, _), *arrays in zip(groups, *parts, strict=True):
+        shape = motions.levels.shape
+        turns, shift, before, after = (array.reshape(*shape, *array.shape[1:]) for array in arrays)
         skate_before, skate = (
             walking_crowd.measure_skate_of_feet(card, paths, rate).mean(axis=1)
             for paths in (before, after)
         )
-        some = list(islice(walkers, count))
+        planned = list(islice(walkers, len(motions.levels)))
         facts = StandingFeet(
             skate_before,
             skate,
-            np.array(foot_placement.largest_drifts(some, list(after))),
-            np.array([(plan.lowered - plan.followed).max() for plan in some]),
+            np.array(foot_placement.largest_drifts(planned, list(after))),
+            np.array([(plan.lowered - plan.followed).max() for plan in planned]),
         )
         roots = (motions.root_position + shift).astype(np.float32)
         standing.append(replace(motions, rotations=turns, root_position=roots, feet=facts))
