@@ -4,7 +4,7 @@ import "../../viewer/src/colours.css";
 import "./page.css";
 
 import type { ModelCard } from "@posefield/client";
-import { load, type Model } from "@posefield/runtime";
+import { load } from "@posefield/runtime";
 import * as characters from "../../viewer/src/character.ts";
 import { saveFile } from "../../viewer/src/dom.ts";
 import { Scene } from "../../viewer/src/scene.ts";
@@ -56,7 +56,8 @@ function tell(fault: unknown): void {
 /** Open the model that the address names, or the first. */
 async function open(entries: readonly Entry[]): Promise<void> {
   const name = decodeURIComponent(location.hash.slice(1));
-  const entry = entries.find((one) => one.name === name) ?? entries[0]!;
+  const named = entries.find((one) => one.name === name);
+  const entry = named ?? entries[0]!;
   turn += 1;
   const number = turn;
   const [build, content, skin] = await Promise.all([
@@ -92,7 +93,9 @@ async function open(entries: readonly Entry[]): Promise<void> {
     view.ready.then(() => {
       told.textContent = walks
         ? "Arrow keys, W A D or the disc walk and turn, Shift slows; click the ground to walk there."
-        : `${model.card.description}`;
+        : name && !named
+          ? `This page has no model ${name}: this is ${entry.name}.`
+          : model.card.description;
       // The frame after the first drawing.
       requestAnimationFrame(() => requestAnimationFrame(() => performance.mark("moving")));
     });

@@ -22,6 +22,8 @@ export interface Listeners {
   readonly download: () => void;
 }
 
+const STICKS = "More than 12 are drawn as sticks";
+
 export class Panel {
   readonly state: PageState;
   readonly #form: HTMLFormElement;
@@ -52,13 +54,17 @@ export class Panel {
         // Arrow keys then steer, and choose no other view.
         (document.activeElement as HTMLElement).blur();
         put({ view: view as PageState["view"] }, show);
+        form.dataset["view"] = view;
       });
-    for (const { name, description, minimum, maximum, unit } of card.controls) {
+    form.dataset["view"] = "clip";
+    for (const { name, description, minimum, maximum, unit, measure } of card.controls) {
       const text = `${name}${unit ? `, ${unit}` : ""}`;
       const range = [minimum, maximum, (maximum - minimum) / 200] as const;
       const set = (value: number) =>
         put({ controls: { ...this.state.controls, [name]: value } }, change);
-      this.#slider(text, range, defaults[name]!, set, description);
+      // Steering sets the turn, and the other controls follow the speed.
+      const only = measure?.quantity === "speed" ? "" : "clip";
+      this.#slider(text, range, defaults[name]!, set, description, only);
     }
     const performers = card.labels.find(({ name }) => name === "performer")?.names ?? [];
     if (performers.length)
@@ -66,17 +72,16 @@ export class Panel {
     const levels = card.levels.map((_, level) => String(level));
     this.#choice("Level of detail", levels, "0", (level) => put({ level: Number(level) }, show));
     const feet = ["stand", "as predicted"];
-    this.#choice("Feet", feet, feet[0]!, (word) => put({ feet: word === feet[0] }, change));
+    this.#choice("Feet", feet, feet[0]!, (word) => put({ feet: word === feet[0] }, change), "clip");
     const bodies = ["mannequin", "stick"] as const;
     this.#choice("Body", bodies, bodies[0], (body) =>
       put({ body: body as PageState["body"] }, show),
     );
     if (isWalk(model))
-      this.#slider("Walkers", [1, 200, 1], 1, (count) =>
-        put({ count }, () => this.state.view === "walk" && show()),
-      );
+      this.#slider("Walkers", [1, 200, 1], 1, (count) => put({ count }, show), STICKS, "walk");
     const download = textButton("Download GLB", listeners.download);
     download.title = "The clip with its skin; the command posefield clip writes VRMA, USD and BVH";
+    download.dataset["only"] = "clip";
     form.append(download);
   }
 
@@ -95,9 +100,10 @@ export class Panel {
     values: readonly string[],
     chosen: string,
     set: (value: string) => void,
+    only: PageState["view"] | "" = "",
   ): void {
     const names = values.map((value) => [value, value || "unseen"] as const);
-    this.#form.append(el("label", {}, text, chooser(names, chosen, set)));
+    this.#form.append(el("label", { "data-only": only }, text, chooser(names, chosen, set)));
   }
 
   #slider(
@@ -106,6 +112,7 @@ export class Panel {
     value: number,
     set: (value: number) => void,
     title = "",
+    only: PageState["view"] | "" = "",
   ): void {
     const input = el("input", { type: "range", min, max, step, title, value });
     const output = el("output");
@@ -117,7 +124,9 @@ export class Panel {
       set(input.valueAsNumber);
     });
     write();
-    this.#form.append(el("label", {}, text, output, input));
+    // Arrow keys then steer, and move no slider.
+    input.addEventListener("pointerup", () => input.blur());
+    this.#form.append(el("label", { "data-only": only }, text, output, input));
   }
 }
 

@@ -106,7 +106,9 @@ export class WalkView implements View {
   }
 
   #steer(walkers: Walkers): void {
-    const { speed = walkers.speeds[1] } = this.#stage.panel.state.controls;
+    const { card, panel } = this.#stage;
+    const { name } = card.controls.find(({ measure }) => measure?.quantity === "speed")!;
+    const speed = panel.state.controls[name]!;
     const keys = [...[...this.#held].map((code) => KEYS[code]!), this.#push];
     const steered = keys.some(([ahead, left]) => ahead || left);
     for (const [index, goal] of this.#goals.entries()) {

@@ -98,6 +98,22 @@ test("a slider changes the motion", async () => {
   assert.notEqual(await slider.evaluate((input: HTMLInputElement) => input.value), before);
 });
 
+test("a view shows what acts in it", async () => {
+  const shown = () =>
+    page
+      .locator("#panel label:visible")
+      .evaluateAll((labels) => labels.map((label) => label.firstChild!.textContent!.split(",")[0]));
+  const always = ["Performer", "Level of detail"];
+  const controls = ["speed", "turn", "stride_length"];
+  const clip = ["Model", "View", ...controls, ...always, "Feet", "Body"];
+  assert.deepEqual(await shown(), clip);
+  await page.getByLabel("View").selectOption("walk");
+  assert.deepEqual(await shown(), ["Model", "View", "speed", ...always, "Body", "Walkers"]);
+  assert.ok(await page.getByRole("button", { name: "Download GLB" }).isHidden());
+  await page.getByLabel("View").selectOption("clip");
+  assert.deepEqual(await shown(), clip);
+});
+
 test("a clip is saved as binary glTF with a skin and an animation", async () => {
   const saved = page.waitForEvent("download");
   await page.getByRole("button", { name: "Download GLB" }).click();
@@ -112,6 +128,7 @@ test("a walker goes where keys send it, and a crowd walks", async (context) => {
   await page.getByLabel("View").selectOption("walk");
   await page.locator("#told", { hasText: "Arrow keys" }).waitFor();
   await page.getByLabel("View").blur();
+  await page.locator("input[type=range]").first().click();
   await page.keyboard.down("ArrowUp");
   for (const name of ["walk-1", "walk-2", "walk-3", "walk-4"]) {
     await page.waitForTimeout(350);
@@ -141,6 +158,16 @@ test("the button Back of the browser shows the model before", async () => {
   await page.goBack();
   await page.locator("#told", { hasText: "Walking" }).waitFor();
   assert.equal(await page.getByLabel("Model").inputValue(), "cmu_walk");
+});
+
+test("a model that the page does not have is told in a sentence", async () => {
+  const names = ["walk", "cmu_walk"];
+  const sentences = ["This page has no model walk: this is cmu_walk.", "Walking"];
+  for (const [index, name] of names.entries()) {
+    await page.goto(`${address}#${name}`);
+    await page.locator("#told", { hasText: sentences[index]! }).waitFor();
+    assert.equal(await page.getByLabel("Model").inputValue(), "cmu_walk");
+  }
 });
 
 test("a finger on the disc steers a walker", async () => {
