@@ -59,7 +59,7 @@ export class ClipView implements View {
       do {
         this.#changed = false;
         const cycle = model.card.cyclic ? ({ loop: true, root: "in_place" } as const) : {};
-        const options = { ...panel.options, ...cycle, fps: 60 };
+        const options = { ...panel.state.options, ...cycle, fps: 60 };
         this.#clip = await model.clip(panel.state.controls, options);
       } while (this.#changed);
     } finally {

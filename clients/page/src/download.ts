@@ -2,34 +2,23 @@
 
 import type { ModelCard } from "@posefield/client";
 import type { Clip } from "@posefield/runtime";
-import { animationClip, skeletonOf } from "@posefield/runtime/three";
-import { type BufferAttribute, MeshStandardMaterial, SkinnedMesh } from "three";
+import { animationClip, nodeNames } from "@posefield/runtime/three";
+import { MeshStandardMaterial } from "three";
 import { GLTFExporter } from "three/addons/exporters/GLTFExporter.js";
-import * as characters from "../../viewer/src/character.ts";
+import type { Character } from "../../viewer/src/character.ts";
+import { SkinnedBody } from "../../viewer/src/figure.ts";
 
 /** The bytes of a file with one skinned mesh and one animation. */
-export async function glb(
-  card: ModelCard,
-  clip: Clip,
-  character: characters.Character,
-): Promise<ArrayBuffer> {
-  const rest = Float32Array.from(card.skeleton.offsets.flat());
-  const offsets = clip.boneOffsets.slice();
-  offsets.set(rest.subarray(0, 3));
-  const rig = skeletonOf({ ...clip, boneOffsets: offsets });
-  const geometry = characters.geometry(character, character.fine);
-  const points = geometry.getAttribute("position") as BufferAttribute;
-  const standing = characters.standing(card, rest);
-  characters.fitted(
-    points.array as Float32Array,
-    character,
-    standing,
-    characters.standing(card, offsets),
-  );
-  const mesh = new SkinnedMesh(geometry, new MeshStandardMaterial({ color: 0xcfb698 }));
-  mesh.add(rig.root);
-  mesh.bind(rig.skeleton);
+export async function glb(card: ModelCard, clip: Clip, skin: Character): Promise<ArrayBuffer> {
+  const body = new SkinnedBody(card, skin, [new MeshStandardMaterial({ color: 0xcfb698 })]);
+  const names = nodeNames(clip.names);
+  for (const [joint, bone] of body.skeleton.bones.entries()) bone.name = names[joint]!;
+  const rotations = Float32Array.from(names.flatMap(() => [1, 0, 0, 0]));
+  const root = Float32Array.from(card.skeleton.offsets[0]!);
+  body.show({ rotations, root, offsets: clip.boneOffsets });
+  // The exporter finds animated nodes below one object, and the validator wants its skin at the top.
+  const [hips, mesh] = body.children;
   const animations = [animationClip(clip, card.name)];
-  const content = await new GLTFExporter().parseAsync(mesh, { binary: true, animations });
-  return content as ArrayBuffer;
+  const options = { binary: true, animations };
+  return (await new GLTFExporter().parseAsync(mesh!.add(hips!), options)) as ArrayBuffer;
 }

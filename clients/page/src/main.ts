@@ -80,7 +80,7 @@ async function open(entries: readonly Entry[]): Promise<void> {
     },
     download: async () => {
       const { glb } = await import("./download.ts");
-      const clip = await model.clip(panel.state.controls, { ...panel.options, fps: 60 });
+      const clip = await model.clip(panel.state.controls, { ...panel.state.options, fps: 60 });
       const content = await glb(card, clip, character);
       saveFile(`${model.card.name}.glb`, new Blob([content], { type: "model/gltf-binary" }));
     },

@@ -1,22 +1,19 @@
 /** The controls of a model as sliders, and the choices of the page. */
 
-import type { Model, Options } from "@posefield/runtime";
+import type { ClipOptions, Model } from "@posefield/runtime";
 import { chooser, el, textButton } from "../../viewer/src/dom.ts";
 
 export interface PageState {
   controls: Record<string, number>;
-  performer: string;
-  level: number;
-  feet: boolean;
+  options: ClipOptions;
   body: "mannequin" | "stick";
   view: "clip" | "walk";
   count: number;
 }
 
+/** Actions for another value of a control, another view or model, and the button. */
 export interface Listeners {
-  /** Another value of a control or an option. */
   readonly change: () => void;
-  /** Another view. */
   readonly show: () => void;
   readonly open: (model: string) => void;
   readonly download: () => void;
@@ -37,10 +34,7 @@ export class Panel {
   ) {
     const { card, defaults } = model;
     this.#form = form;
-    this.state = {
-      ...{ controls: defaults, performer: "", level: 0, feet: true, body: "mannequin" },
-      ...{ view: "clip", count: 1 },
-    };
+    this.state = { controls: defaults, options: {}, body: "mannequin", view: "clip", count: 1 };
     form.replaceChildren();
     const names = models.map(({ name }) => name);
     if (names.length > 1) this.#choice("Model", names, opened.name, listeners.open);
@@ -66,13 +60,18 @@ export class Panel {
       const only = measure?.quantity === "speed" ? "" : "clip";
       this.#slider(text, range, defaults[name]!, set, description, only);
     }
+    const choose = (values: ClipOptions, then = show) =>
+      put({ options: { ...this.state.options, ...values } }, then);
     const performers = card.labels.find(({ name }) => name === "performer")?.names ?? [];
     if (performers.length)
-      this.#choice("Performer", ["", ...performers], "", (performer) => put({ performer }, show));
+      this.#choice("Performer", ["", ...performers], "", (performer) =>
+        choose({ performer: performer || undefined }),
+      );
     const levels = card.levels.map((_, level) => String(level));
-    this.#choice("Level of detail", levels, "0", (level) => put({ level: Number(level) }, show));
-    const feet = ["stand", "as predicted"];
-    this.#choice("Feet", feet, feet[0]!, (word) => put({ feet: word === feet[0] }, change), "clip");
+    this.#choice("Level of detail", levels, "0", (level) => choose({ level: Number(level) }));
+    const set = (feet: string) =>
+      choose({ feet: feet === "stand" ? undefined : "as_predicted" }, change);
+    if (card.contacts.length) this.#choice("Feet", ["stand", "as predicted"], "stand", set, "clip");
     const bodies = ["mannequin", "stick"] as const;
     this.#choice("Body", bodies, bodies[0], (body) =>
       put({ body: body as PageState["body"] }, show),
@@ -83,16 +82,6 @@ export class Panel {
     download.title = "The clip with its skin; the command posefield clip writes VRMA, USD and BVH";
     download.dataset["only"] = "clip";
     form.append(download);
-  }
-
-  /** Options of questions. */
-  get options(): Options & { readonly feet?: "as_predicted" } {
-    const { performer, level, feet } = this.state;
-    return {
-      level,
-      ...(performer ? { performer } : {}),
-      ...(feet ? {} : { feet: "as_predicted" as const }),
-    };
   }
 
   #choice(

@@ -60,7 +60,7 @@ export class WalkView implements View {
   async #begin(): Promise<void> {
     const { scene, model, card, character, panel } = this.#stage;
     const { count, body } = panel.state;
-    const walkers = await model.walkers(count, panel.options);
+    const walkers = await model.walkers(count, panel.state.options);
     if (this.#end.signal.aborted) return;
     const side = Math.ceil(Math.sqrt(count));
     const half = Math.floor(side / 2);

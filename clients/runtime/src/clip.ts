@@ -32,7 +32,7 @@ export interface ClipOptions extends Options {
   readonly loop?: boolean;
   readonly root?: "travelling" | "in_place";
   /** By default feet stand, where the model travels and knows their contacts. */
-  readonly feet?: "stand" | "as_predicted";
+  readonly feet?: "stand" | "as_predicted" | undefined;
 }
 
 /** A stance of a foot: its joint, when it is flat, s, and its place, m. */

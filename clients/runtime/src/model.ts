@@ -13,7 +13,7 @@ export type Controls = Readonly<Record<string, number>>;
 
 export interface Options {
   /** Name of the performer; an unseen one by default. */
-  readonly performer?: string;
+  readonly performer?: string | undefined;
   /** Name, or weights of names, by label set; sets that are not given are left open. */
   readonly labels?: Readonly<Record<string, string | Readonly<Record<string, number>>>>;
   /** Level of detail; 0 is the finest. */

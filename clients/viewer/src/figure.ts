@@ -102,10 +102,10 @@ const SAME = 0.0005;
 
 /** The skin of the model's files, fitted to the bones of each answer. */
 export class SkinnedBody extends Object3D {
+  readonly skeleton: Skeleton;
   readonly #card: ModelCard;
   readonly #character: Character;
   readonly #rest: Float32Array;
-  readonly #skeleton: Skeleton;
   readonly #geometry: BufferGeometry;
   #offsets: Float32Array;
 
@@ -119,7 +119,7 @@ export class SkinnedBody extends Object3D {
     this.#rest = characters.standing(card, this.#offsets);
     const { bones } = new Joints(parents);
     this.add(bones[0]!);
-    this.#skeleton = new Skeleton(
+    this.skeleton = new Skeleton(
       [...bones],
       bones.map(() => new Matrix4()),
     );
@@ -127,7 +127,7 @@ export class SkinnedBody extends Object3D {
     this.#bind(this.#rest);
     materials.forEach((material, order) => {
       const mesh = new SkinnedMesh(this.#geometry, material);
-      mesh.bind(this.#skeleton, new Matrix4());
+      mesh.bind(this.skeleton, new Matrix4());
       mesh.frustumCulled = false;
       mesh.renderOrder = order;
       mesh.castShadow = !material.transparent && material.colorWrite;
@@ -138,12 +138,12 @@ export class SkinnedBody extends Object3D {
   show({ rotations, root, offsets }: BodyPose): void {
     // The root's own offset moves no bone.
     if (offsets.some((x, i) => i > 2 && Math.abs(x - this.#offsets[i]!) > SAME)) this.#fit(offsets);
-    applyPose(this.#skeleton.bones, { rotations, rootPosition: root, boneOffsets: offsets }, 0);
+    applyPose(this.skeleton.bones, { rotations, rootPosition: root, boneOffsets: offsets }, 0);
   }
 
   override dispose(): void {
     this.#geometry.dispose();
-    this.#skeleton.dispose();
+    this.skeleton.dispose();
   }
 
   #fit(offsets: Float32Array): void {
@@ -156,7 +156,7 @@ export class SkinnedBody extends Object3D {
   }
 
   #bind(rest: Float32Array): void {
-    this.#skeleton.boneInverses.forEach((inverse, at) => {
+    this.skeleton.boneInverses.forEach((inverse, at) => {
       inverse.makeTranslation(-rest[3 * at]!, -rest[3 * at + 1]!, -rest[3 * at + 2]!);
     });
   }
