@@ -1,5 +1,7 @@
 """Command `posefield doctor`: what is wrong with reference motions of robots, and other formats."""
 
+import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -64,6 +66,13 @@ def doctor(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for converted files")
     ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file for a recipe: each file that repeats, with the frames of a cycle",
+            metavar="FILE",
+        ),
+    ] = None,
     picture: Annotated[
         Path | None, typer.Option(help="file for a picture, .png or .svg", metavar="FILE")
     ] = None,
@@ -73,8 +82,9 @@ def doctor(
 
     Format, rate, order of joints and quaternions are told with how they were known. Faults are told
     with joint or foot, frame and size: limits, sunk, floating and sliding feet, jumps, the seam of
-    a loop, and motions that are unlike the others. Files that cannot be read are named with the
-    reason; none is then converted, and the exit status is 1.
+    a loop, and motions that are unlike the others. Of motions that repeat a cycle is told, all in
+    one phase. Files that cannot be read are named with the reason; none is then converted, no table
+    is written, and the exit status is 1.
     """
     from posefield.robots import robot_formats
     from posefield.robots.file_conventions import Conventions
@@ -85,6 +95,8 @@ def doctor(
     target = _target(to, output, robot)
     if picture and picture.suffix not in (".png", ".svg"):
         raise InvalidField("--picture", f"found {picture.name!r}, expected a .png or .svg file")
+    if table and (table.exists() or not robot):
+        raise InvalidField("--table", f"{table} exists already" if robot else "needs --robot")
     body = robot_file.read(robot) if robot else None
     conventions = Conventions(body, rate, quaternions, order, degrees)
     motions: list[RobotMotion] = []
@@ -101,6 +113,8 @@ def doctor(
     diagnoses = _diagnose(motions, body)
     if target and output and body and not refused:
         _convert(diagnoses, target, body, output)
+    if table and not refused:
+        _write_table(diagnoses, table)
     if picture and diagnoses:
         content = doctor_report.picture(diagnoses, body, picture.suffix[1:])
         atomic_files.write(content, picture)
@@ -135,16 +149,27 @@ def _target(to: str | None, output: Path | None, robot: Path | None) -> "RobotFo
 
 
 def _diagnose(motions: "list[RobotMotion]", body: "Robot | None") -> "list[Diagnosis]":
-    from posefield_train.robots import doctor
+    from posefield_train.robots import cycle_search, doctor
 
-    unlike = doctor.outliers(motions, body)
-    diagnoses = [doctor.diagnose(motion, body) for motion in motions]
-    return [
-        replace(diagnosis, findings=(*diagnosis.findings, unlike[index]))
-        if index in unlike
-        else diagnosis
-        for index, diagnosis in enumerate(diagnoses)
-    ]
+    unlike, diagnoses = doctor.outliers(motions, body), []
+    for index, cycle in enumerate(cycle_search.find(motions, body)):
+        diagnosis = doctor.diagnose(motions[index], body)
+        findings = (*diagnosis.findings, *([unlike[index]] if index in unlike else []))
+        diagnoses.append(replace(diagnosis, findings=findings, cycle=cycle))
+    return diagnoses
+
+
+def _write_table(diagnoses: "list[Diagnosis]", path: Path) -> None:
+    from posefield_train.source import clip_table
+
+    rows: list[Sequence[object]] = [("file", "first_frame", "last_frame")]
+    for diagnosis in diagnoses:
+        file = Path(os.path.relpath(diagnosis.motion.source, path.parent)).as_posix()
+        if diagnosis.cycle:
+            rows.append((file, diagnosis.cycle.first, diagnosis.cycle.last))
+        else:
+            typer.echo(f"left out of {path.name}: {file}: does not repeat", err=True)
+    atomic_files.write(clip_table.csv_text(rows).encode(), path)
 
 
 def _convert(

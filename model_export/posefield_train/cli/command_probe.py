@@ -55,6 +55,7 @@ def init(
     Complete recipe.toml where it says TODO, then train it. Controls and an event are proposed for
     clips of a known body that have no table. No file is overwritten.
     """
+    from posefield.robots.robot_formats import SUFFIXES
     from posefield_train.probe import recipe_draft
     from posefield_train.source import motion_readers
 
@@ -69,7 +70,9 @@ def init(
     else:
         files = recipe_draft.files_of(table_draft, folder)
     if not files:
-        raise InvalidField("FOLDER", f"{folder} has no motion files, expected one or more")
+        robots = sorted(path.name for suffix in SUFFIXES for path in folder.rglob(f"*{suffix}"))
+        hint = f"; if {robots[0]} is of a robot, see posefield doctor --table" if robots else ""
+        raise InvalidField("FOLDER", f"{folder} has no motion files, expected one or more{hint}")
     report = _probe(files)
     paths = [recipe]
     if table_draft is None:

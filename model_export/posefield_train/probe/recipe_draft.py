@@ -4,7 +4,11 @@ import json
 import re
 import textwrap
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader
 
 from posefield.common.errors import RecipeError
 from posefield_train.probe.probe_report import ProbeReport
@@ -36,20 +40,40 @@ def recipe_text(
     name: of the folder. table: a table that exists already; None for that of `table_text`.
     proposed: lines of the event and the controls; none for places where to write them.
     """
-    controls = [*proposed, ""] if proposed else [*_controls(report, table), *_event(report, table)]
-    return "\n".join(
-        [
-            *_head(name),
-            *source_lines(report),
-            *_clips(table),
-            *controls,
-            *motion_lines(report),
-            *role_lines(report),
-            "[size]",
-            "rms_budget_cm = 1.0",
-            "",
-        ]
+    environment = Environment(
+        loader=PackageLoader("posefield_train.probe"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
+    comment = partial(textwrap.fill, width=96, initial_indent="# ", subsequent_indent="# ")
+    environment.filters |= {"quote": quote, "names": names, "comment": comment}
+    roles = report.roles
+    joint = roles.get("rightHand", report.joints[-1])
+    return environment.get_template("recipe.toml").render(
+        name=name,
+        recipe_name=recipe_name,
+        control_name=control_name,
+        source="\n".join(source_lines(report)[:-1]),
+        columns=table and _columns(table),
+        proposed="\n".join(proposed),
+        hand=roles.get("rightHand") or roles.get("leftFoot") or joint,
+        joint=joint,
+        motion="\n".join([*motion_lines(report), *role_lines(report)]),
+    )
+
+
+def _columns(table: ClipTable) -> dict[str, Any]:
+    """Return the name of a table, and its columns by what they seem to hold."""
+    marks = frame_columns(table)
+    return {
+        "table": Path(table.name).name,
+        "file": _first_of(table, FILE_COLUMNS),
+        "performer": _first_of(table, PERFORMER_COLUMNS),
+        "recording": _first_of(table, RECORDING_COLUMNS),
+        "marks": marks,
+        "numbers": [name for name in number_columns(table) if name not in marks],
+    }
 
 
 def recipe_name(name: str) -> str:
@@ -90,18 +114,6 @@ def names(words: Sequence[str]) -> str:
     return f"[{', '.join(map(quote, words))}]"
 
 
-def _head(name: str) -> list[str]:
-    return [
-        "# Draft by posefield init: complete what is marked TODO, then train it.",
-        "schema = 1",
-        f"name = {quote(recipe_name(name))}",
-        f"description = {quote(f'Motions of {name}')}",
-        "# TODO licence of the motions with its attribution; motion files state none.",
-        'licence = ""',
-        "",
-    ]
-
-
 def source_lines(report: ProbeReport) -> list[str]:
     """Return the section [source], with the evidence of unit and up axis as comments.
 
@@ -123,37 +135,6 @@ def source_lines(report: ProbeReport) -> list[str]:
     return [*lines, ""]
 
 
-def _clips(table: ClipTable | None) -> list[str]:
-    if table is None:
-        return [
-            "[clips]",
-            f"table = {quote(TABLE)}",
-            'file = "file"',
-            'first_frame = "first_frame"  # from 0',
-            'last_frame = "last_frame"    # inclusive',
-            "# A column with the performer's name, so that they can be told apart:",
-            '# performer = "performer"',
-            "# A column with the recording of each clip; clips of one are left out together:",
-            '# recording = "recording"',
-            "# Columns with the frame of an event, counted from 0 as in the file, in their order:",
-            '# landmarks = ["contact_frame"]',
-            "",
-        ]
-    performer = _first_of(table, PERFORMER_COLUMNS)
-    lines = ["[clips]", f"table = {quote(Path(table.name).name)}"]
-    lines.append(f"file = {quote(_first_of(table, FILE_COLUMNS))}")
-    if performer:
-        lines.append(f"performer = {quote(performer)}")
-    if recording := _first_of(table, RECORDING_COLUMNS):
-        lines.append(
-            f"recording = {quote(recording)}  # clips of one recording are left out together"
-        )
-    marks = frame_columns(table)
-    lines.append("# Columns that may hold the frame of an event; those that do become landmarks:")
-    lines.append(f"# landmarks = {names(marks or ['contact_frame'])}")
-    return [*lines, ""]
-
-
 def frame_columns(table: ClipTable) -> list[str]:
     """Return the columns of whole numbers whose names speak of a frame."""
     return [
@@ -172,32 +153,6 @@ def number_columns(table: ClipTable) -> list[str]:
         if all(re.fullmatch(r"[+-]?[0-9.]+([eE][+-]?[0-9]+)?", cell) for cell in cells):
             columns += [name] if len(set(cells)) > 1 else []
     return columns
-
-
-def _controls(report: ProbeReport, table: ClipTable | None) -> list[str]:
-    hand = report.roles.get("rightHand") or report.roles.get("leftFoot") or report.joints[-1]
-    lines = [
-        "# TODO at least one control: what a clip is an example of. Either measured of the motion:",
-        "# [[controls]]",
-        f"# name = {quote(control_name(hand) + '_height')}",
-        f'# auto = {{ quantity = "height", joint = {quote(hand)}, at = "end" }}',
-        f"# description = {quote(f'Height of {hand} at the end')}",
-        "# or a column of the table, in its unit:",
-    ]
-    marks = [] if table is None else frame_columns(table)
-    columns = [] if table is None else [n for n in number_columns(table) if n not in marks]
-    if columns:
-        text = f"Columns of numbers: {', '.join(columns)}."
-        lines += textwrap.wrap(text, 96, initial_indent="# ", subsequent_indent="# ")
-    lines += [
-        "# [[controls]]",
-        '# name = "speed"',
-        '# column = "COLUMN"',
-        '# unit = "m/s"',
-        '# description = "Mean speed"',
-        "",
-    ]
-    return lines
 
 
 def control_name(text: str) -> str:
@@ -222,20 +177,6 @@ def motion_lines(report: ProbeReport, cyclic: bool = False) -> list[str]:
             for sentence in facing.evidence
         ],
         *(['facing = "hips"'] if abs(facing.value or 0.0) > LARGEST_ANGLE else []),
-        "",
-    ]
-
-
-def _event(report: ProbeReport, table: ClipTable | None) -> list[str]:
-    marks = [] if table is None else frame_columns(table)
-    at = marks[0] if marks else "end"
-    joint = report.roles.get("rightHand", report.joints[-1])
-    return [
-        '# The joint that the motion is for, and the moment: "start", "end", "highest", "lowest",',
-        '# "farthest" from the root, or a column of clips.landmarks',
-        "# [event]",
-        f"# joint = {quote(joint)}",
-        f"# at = {quote(at)}",
         "",
     ]
 

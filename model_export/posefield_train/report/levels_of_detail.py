@@ -6,7 +6,6 @@ the model file.
 
 import math
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -40,19 +39,12 @@ class LevelCosts:
     levels: tuple[Level, ...]
     seconds: tuple[float, ...]
 
-    @property
-    def distances(self) -> tuple[float, ...]:
-        """Return the distance, m, beyond which each level's worst pose is off by under a pixel.
-
-        Never less than that of a finer level.
-        """
-        distances = [CAMERA.pixels * level.pose for level in self.levels]
-        return tuple(np.maximum.accumulate(distances).tolist())
-
     def section(self) -> Section:
         """Return the use, size, time and error of each level."""
         chosen = list(map(_facts, self.levels, self.seconds))
-        for level, distance in zip(chosen, self.distances, strict=True):
+        # Beyond this distance the worst pose is off by under a pixel, as that of each finer level.
+        distances = np.maximum.accumulate([CAMERA.pixels * level.pose for level in self.levels])
+        for level, distance in zip(chosen, distances.tolist(), strict=True):
             level["one_pixel_from_m"] = distance
         facts = {
             "poses_a_call": level_selection.ROWS_PER_CALL,
@@ -86,24 +78,7 @@ class LevelCosts:
                 ("below a pixel from (m)", "one_pixel_from_m", "{:.0f}".format),
             ),
         )
-        paragraphs = (_EXPLANATION, *self._uses())
-        return Section("levels", "Levels of detail", paragraphs, tables, (), facts)
-
-    def _uses(self) -> tuple[str, ...]:
-        pairs = zip_longest(self.distances, self.distances[1:])
-        return tuple(self._use(number, *pair) for number, pair in enumerate(pairs))
-
-    def _use(self, number: int, start: float, end: float | None) -> str:
-        until = "" if end is None else f" to {end:.0f} m"
-        if not number:
-            near = f", and for characters up{until}" if until else ""
-            return f"Level 0 is for export and measurement{near}."
-        share = self.seconds[number] / self.seconds[0]
-        return (
-            f"Level {number} is for characters from {start:.0f} m{until or ' onwards'}: its worst "
-            f"pose is off by less than a pixel there, in {100 * share:.0f} % of the time of the "
-            "finest level."
-        )
+        return Section("levels", "Levels of detail", (_EXPLANATION,), tables, (), facts)
 
 
 def _three_digits(metres: float) -> str:

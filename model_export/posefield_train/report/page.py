@@ -14,7 +14,6 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib import style
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
 # Readable on white, and distinguishable with red-green colour blindness.
@@ -85,12 +84,6 @@ def draw_chart(height: float, paint: Callable[[Figure], None], alt: str, caption
 def short_label(text: str) -> str:
     """Return a user-given name as the label of a chart, with "…" for what exceeds LABEL."""
     return text if len(text) <= LABEL else f"{text[: LABEL - 1]}…"
-
-
-def plain_logarithm(axis: Axis) -> None:
-    """Label a logarithmic axis with plain numbers; the default labels are formulas."""
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter("")
 
 
 _NUMBER = re.compile(r"[-+]?[\d.,]+( ?%| cm)?")

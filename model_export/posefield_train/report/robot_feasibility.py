@@ -15,8 +15,6 @@ from scipy.stats import qmc
 
 from posefield.model import Clip, Model
 from posefield.model_file.model_card import Control
-from posefield.robots.robot import velocities
-from posefield.robots.robot_motion import RobotMotion
 from posefield_train.report import significant_digits
 from posefield_train.report.page import (
     BLUE,
@@ -103,7 +101,7 @@ class Feasibility:
 
     def _charts(self) -> Section:
         controls = self.model.synthesizer.session.card.controls
-        quantities = [each for each in QUANTITIES if _largest(self.rows, each.key) is not None]
+        quantities = [row for row in QUANTITIES if _largest(self.rows, row.key) is not None]
         paragraphs = (
             "Each point is a command over the captured ranges: blue within the bound, which is a "
             "line, orange beyond it, grey where commands have no captured motions near.",
@@ -173,12 +171,14 @@ def _row(clip: Clip, command: dict[str, float], dynamics: Dynamics) -> dict[str,
     shares = loads.shares
     heaviest = robot.hinges[int(shares.max(axis=0).argmax())]
     standing = np.isfinite(loads.zero_moment)
+    sliding = diagnosis.slides[np.isfinite(diagnosis.slides)]
     figures = {
         "limit_rad": max(excess.values(), default=0.0),
         "torque_share": float(shares.max()),
         "zero_moment_m": _high(loads.zero_moment[standing]),
         "lacking_share": _high(loads.lacking[standing]),
-        "skate_m_s": _skate(motion, dynamics, diagnosis.contacts),
+        # A mean would tell how feet touch down, which no frame separates from standing.
+        "skate_m_s": float(np.median(sliding)) if len(sliding) else None,
         "penetration_m": max(0.0, -float(diagnosis.heights.min(initial=0.0))),
         "seam_rad": float(np.abs(motion.angles[-1] - motion.angles[0]).max())
         if motion.loops
@@ -201,18 +201,6 @@ def _row(clip: Clip, command: dict[str, float], dynamics: Dynamics) -> dict[str,
 def _high(values: np.ndarray[Any, Any]) -> float | None:
     """Return the 95th percentile of values of frames that stand; None if none does."""
     return max(float(np.percentile(values, 95.0)), 0.0) if len(values) else None
-
-
-def _skate(motion: RobotMotion, dynamics: Dynamics, contacts: np.ndarray[Any, Any]) -> float | None:
-    """Return the median speed over the floor of feet while they stand, m/s.
-
-    A mean would tell how they touch down and lift off, which no frame separates from standing.
-    """
-    soles = dynamics.robot.foot_points(*motion.body_poses(dynamics.robot))
-    moves = (velocities(points, motion.rate)[..., :2] for points in soles)
-    # Of the points of a sole the slowest one tells whether it stands.
-    speeds = np.stack([np.linalg.norm(move, axis=-1).min(axis=1) for move in moves], axis=1)
-    return float(np.median(speeds[contacts])) if contacts.any() else None
 
 
 def _largest(rows: Sequence[dict[str, Any]], key: str) -> float | None:

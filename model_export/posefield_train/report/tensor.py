@@ -18,7 +18,6 @@ from posefield_train.report.page import (
     centimetres,
     draw_chart,
     percent,
-    plain_logarithm,
     product,
     short_label,
 )
@@ -26,13 +25,10 @@ from posefield_train.tensor import hosvd
 
 # Error limits, m, for which the smallest size is listed.
 BUDGETS = (0.0025, 0.005, 0.01, 0.02, 0.03, 0.05)
-STEPS = 240
 NAMED_CLIPS = 3
 # Share of the largest possible change of speed from which a clip counts as at the limit; the
 # increments that the limit applies to are smoothed.
 NEAR_LIMIT = 0.85
-# First and last share of a clip, where a large change of speed suggests another cut.
-END_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -51,16 +47,6 @@ class Truncation:
         fits = self.errors <= max(allowed, float(self.errors.min()))
         best = int(np.argmin(np.where(fits, self.stored, np.inf)))
         return tuple(int(i) + 1 for i in np.unravel_index(best, self.errors.shape))
-
-    def front(self) -> tuple[Floats, Floats]:
-        """Return the Pareto front: errors, m, and the fewest numbers stored that reach them."""
-        order = np.lexsort((self.errors.ravel(), self.stored.ravel()))
-        sizes, best = self.stored.ravel()[order], self.errors.ravel()[order]
-        best = np.minimum.accumulate(best)
-        top = np.searchsorted(-best, -best[0] / 1000.0)
-        marks = np.geomspace(sizes[0], sizes[min(top, len(sizes) - 1)], STEPS)
-        at = np.searchsorted(sizes, marks, side="right") - 1
-        return best[at], marks
 
     def facts(self, ranks: tuple[int, ...]) -> dict[str, Any]:
         """Return the error and size of some ranks."""
@@ -86,7 +72,7 @@ def measure_truncation(trained: TrainedModel) -> Truncation:
 
 
 def truncation_section(trained: TrainedModel) -> Section:
-    """Return the Pareto front of error and size, and the errors around the chosen size."""
+    """Return the smallest sizes for some errors, and the errors around the chosen size."""
     truncation = measure_truncation(trained)
     chosen = truncation.facts(truncation.chosen)
     smallest = [{"budget_m": b, **truncation.facts(truncation.smallest(b))} for b in BUDGETS]
@@ -110,14 +96,11 @@ def truncation_section(trained: TrainedModel) -> Section:
         ("compression", "compression_all_in", _ratio),
         ("of the core alone", "compression_core_only", _ratio),
     )
-    left_out_error = 100 * float(np.sqrt(trained.left_out_errors.mean()))
     chart = draw_chart(
         3.7,
-        partial(_paint_sizes, truncation, (numbers, error), left_out_error),
-        f"Truncation error against numbers stored, and against ranks; chosen: {error:.2f} cm "
-        f"at {numbers} numbers.",
-        "Left: the smallest error for each size, over all combinations of ranks. Right: error "
-        "against two of the ranks, the third as chosen. The orange dot is the chosen size.",
+        partial(_paint_sizes, truncation),
+        f"Truncation error against ranks; chosen: {error:.2f} cm at {numbers} numbers.",
+        "Error against two of the ranks, the third as chosen. The orange dot is the chosen size.",
     )
     facts = {"tensor_numbers": truncation.errors.size, "chosen": chosen, "smallest": smallest}
     return Section("sizes", "Error against size", paragraphs, (table,), (chart,), facts)
@@ -127,34 +110,23 @@ def _ratio(value: float) -> str:
     return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"
 
 
-def _paint_sizes(
-    truncation: Truncation, chosen: tuple[int, float], left_out_error: float, figure: Figure
-) -> None:
-    """Draw the front with the chosen size, and the error over two ranks. Errors are in cm."""
-    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    errors, marks = truncation.front()
-    left.loglog(marks, 100 * errors, color=page.BLUE, label="smallest error at this size")
-    left.plot(*chosen, "o", color=page.ORANGE, label="chosen", zorder=3)
-    label = f"error of a left-out clip: {left_out_error:.1f} cm"
-    left.axhline(left_out_error, color=page.FAINT, linestyle="--", label=label)
-    left.set(xlabel="numbers stored", ylabel="error (cm)", title="size")
-    plain_logarithm(left.xaxis)
-    plain_logarithm(left.yaxis)
-    left.legend(loc="lower left")
+def _paint_sizes(truncation: Truncation, figure: Figure) -> None:
+    """Draw the error, cm, over two ranks, and the chosen ones."""
+    axes = figure.subplots()
     r1, r2, r3 = truncation.chosen
     errors = 100 * truncation.errors[:, r2 - 1, :].T
     extent = (0.5, errors.shape[1] + 0.5, 0.5, errors.shape[0] + 0.5)
-    image = right.imshow(errors, origin="lower", aspect="auto", extent=extent, cmap="Blues")
+    image = axes.imshow(errors, origin="lower", aspect="auto", extent=extent, cmap="Blues")
     ranks = np.arange(1, errors.shape[1] + 1), np.arange(1, errors.shape[0] + 1)
     levels = [level for level in (0.5, 1, 2, 5, 10) if errors.min() < level < errors.max()]
     if levels:
-        lines = right.contour(*ranks, errors, levels, colors=page.INK, linewidths=0.7)
-        right.clabel(lines, fmt="%g cm", fontsize=8)
-    right.plot(r1, r3, "o", color=page.ORANGE, clip_on=False)
-    right.grid(visible=False)
+        lines = axes.contour(*ranks, errors, levels, colors=page.INK, linewidths=0.7)
+        axes.clabel(lines, fmt="%g cm", fontsize=8)
+    axes.plot(r1, r3, "o", color=page.ORANGE, clip_on=False)
+    axes.grid(visible=False)
     title = f"ranks, with {r2} of frames"
-    right.set(xlabel="rank of degrees of freedom", ylabel="rank of samples", title=title)
-    figure.colorbar(image, ax=right, label="error (cm)")
+    axes.set(xlabel="rank of degrees of freedom", ylabel="rank of samples", title=title)
+    figure.colorbar(image, ax=axes, label="error (cm)")
 
 
 @dataclass(frozen=True)
@@ -218,11 +190,9 @@ def warp_section(trained: TrainedModel) -> Section:
     chart = draw_chart(
         3.5,
         partial(_paint_maps, warps.maps[order], clips),
-        f"Time maps of {len(clips)} clips, and the largest change of speed of each; "
-        f"largest: {worst[0]['clip']}.",
-        "Left: canonical time against the time of each clip; on the dashed diagonal the speed "
-        "is unchanged. Right: largest change of speed of each clip, sorted. Orange: the clips "
-        "in the table.",
+        f"Time maps of {len(clips)} clips; largest change of speed: {worst[0]['clip']}.",
+        "Canonical time against the time of each clip; on the dashed diagonal the speed is "
+        "unchanged. Orange: the clips in the table.",
     )
     paragraphs = (summary, _limit_text(warps), *_shift_text(trained))
     facts = {"clips": clips}
@@ -250,27 +220,19 @@ def _limit_text(warps: TimeWarps) -> str:
     )
     if not count:
         return f"{rule}. No clip is near this limit."
-    near_ends = int(np.sum(warps.at_limit & (np.abs(warps.change_times - 0.5) > 0.5 - END_SHARE)))
     return (
-        f"{rule}. {count} of {len(warps.maps)} clips are at this limit, {near_ends} of them in the "
-        "first or last tenth. There it usually means that the clip was cut at another phase "
-        "than the others, and elsewhere that it pauses where the others do not."
+        f"{rule}. {count} of {len(warps.maps)} clips are at this limit. Near an end a clip is then "
+        "usually cut at another phase than the others, and elsewhere it pauses where they do not."
     )
 
 
 def _paint_maps(maps: Floats, clips: list[dict[str, Any]], figure: Figure) -> None:
-    """Draw the maps of clips, the largest change of speed first, and the changes."""
-    left, right = figure.subplots(1, 2)
+    """Draw the maps of clips, the largest change of speed first."""
+    axes = figure.subplots()
     for row in maps[NAMED_CLIPS:]:
-        left.plot(FIT_TIMES, row, color=page.FAINT, linewidth=0.8)
-    left.plot([0, 1], [0, 1], color=page.INK, linewidth=0.8, linestyle="--")
+        axes.plot(FIT_TIMES, row, color=page.FAINT, linewidth=0.8)
+    axes.plot([0, 1], [0, 1], color=page.INK, linewidth=0.8, linestyle="--")
     for row, clip, style in zip(maps, clips, ("-", "--", ":"), strict=False):
-        label = short_label(clip["clip"])
-        left.plot(FIT_TIMES, row, style, color=page.ORANGE, label=label)
-    left.legend(loc="lower right", fontsize=7.5)
-    left.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")
-    bars = np.arange(len(clips))
-    colours = [page.ORANGE if i < NAMED_CLIPS else page.BLUE for i in bars]
-    right.bar(bars, [clip["largest_stretch"] for clip in clips], width=0.72, color=colours)
-    right.set(ylabel="largest change of speed (factor)", title="clips", ylim=(1.0, None))
-    right.set_xticks([])
+        axes.plot(FIT_TIMES, row, style, color=page.ORANGE, label=short_label(clip["clip"]))
+    axes.legend(loc="lower right", fontsize=7.5)
+    axes.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")

@@ -1,8 +1,10 @@
 """Report of a trained model as two files: an HTML page, and JSON with the same figures."""
 
+import csv
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
@@ -13,53 +15,8 @@ from posefield_train.report.page import Page, Section, Table, product
 REPORT_VERSION = 2
 """Version of the JSON: increased when a name or a unit changes."""
 
-TERMS_SECTION = Section(
-    "terms",
-    "Terms",
-    (),
-    (
-        Table(
-            "Terms on this page",
-            ("term", "meaning"),
-            (
-                ("control", "A number that selects a motion, for example a walking speed."),
-                (
-                    "half-range",
-                    "Half the captured range of a control. Distances between controls are counted "
-                    "in half-ranges, so that controls of different units can be compared.",
-                ),
-                (
-                    "left-out clip",
-                    "A clip that is predicted from all other clips and then compared with its "
-                    "capture. Its error estimates the error for motions that were not captured.",
-                ),
-                ("RMS", "Root mean square, an average that counts large values more."),
-                ("sigma", "The standard deviation that the model predicts for its own error."),
-                (
-                    "kriging",
-                    "Interpolation between clips by their distance in the controls; also known as "
-                    "Gaussian process regression.",
-                ),
-                (
-                    "canonical time",
-                    "Time after alignment: at the same canonical time all clips are in the same "
-                    "phase of the motion.",
-                ),
-                (
-                    "truncation, ranks",
-                    "The model stores the motions as sums of a few basis directions of joint "
-                    "rotations, of time and of clips. The ranks are their numbers; truncation "
-                    "drops the others.",
-                ),
-                (
-                    "effector at its event",
-                    "The joint that matters most at the moment that matters most, for example the "
-                    "hand when it touches the target. The recipe names both.",
-                ),
-            ),
-        ),
-    ),
-)
+TERMS = Path(__file__).with_name("templates") / "terms.csv"
+"""Terms of the page and their meanings."""
 
 
 TrainingStep = tuple[str, float]
@@ -95,9 +52,10 @@ def render(
         provenance_section(exported, steps),
     )
     key_values = key_figures(exported, sum(seconds for _, seconds in steps))
-    page = Page(
-        "training report", card.name, card.description, key_values, [*sections, TERMS_SECTION]
-    )
+    with TERMS.open(encoding="utf-8", newline="") as file:
+        rows = tuple(tuple(row) for row in csv.reader(file))
+    terms = Section("terms", "Terms", (), (Table("Terms on this page", ("term", "meaning"), rows),))
+    page = Page("training report", card.name, card.description, key_values, [*sections, terms])
     facts = {section.name: significant_digits.round_all(section.facts) for section in sections}
     text = json.dumps(
         {"report": REPORT_VERSION, **facts},

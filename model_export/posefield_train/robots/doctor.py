@@ -11,6 +11,7 @@ from posefield.common.units import Booleans, Floats
 from posefield.motion.contact_detection import ContactThresholds, detect_contacts
 from posefield.robots.robot import Robot, velocities
 from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
+from posefield_train.robots.cycle_search import Cycle
 
 SUNK, FLOATING, SKATING, SLIDE = 0.002, 0.02, 0.05, 0.1
 """Depth of a sole below the floor, m, height of the lowest sole above it, m, and mean speed of a
@@ -80,7 +81,9 @@ class Diagnosis:
     """A motion's facts and faults.
 
     speeds, accelerations: largest of each hinge, rad/s and rad/s². contacts (F, K): which of the
-    robot's feet stand; empty without a robot. heights (F, K): of their lowest points, m.
+    robot's feet stand; empty without a robot. heights (F, K): of their lowest points, m. slides
+    (F, K): speeds over SLIDE seconds of feet that stand so long, m/s; nan elsewhere. cycle: of a
+    motion that repeats.
     """
 
     motion: RobotMotion
@@ -89,6 +92,8 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     contacts: Annotated[Booleans, "frames feet"]
     heights: Annotated[Floats, "frames feet"]
+    slides: Annotated[Floats, "frames feet"]
+    cycle: Cycle | None = None
 
     def facts(self) -> dict[str, Any]:
         """Return what the command prints, as plain values."""
@@ -102,6 +107,7 @@ class Diagnosis:
             "seconds": round(motion.duration, 6),
             "joints": list(motion.hinges) or motion.angles.shape[1],
             "loops": motion.loops,
+            "cycle": asdict(self.cycle) if self.cycle else None,
             "evidence": dict(motion.evidence),
             "largest_speed": {
                 "joint": joint_name(motion, fastest),
@@ -124,13 +130,14 @@ def diagnose(motion: RobotMotion, robot: Robot | None) -> Diagnosis:
     changes = np.abs(np.diff(steps, axis=0)) if len(steps) > 1 else np.zeros((1, len(speeds)))
     findings = [*_jumps(motion, changes), *_seam(motion, steps)]
     contacts, heights = np.empty((len(motion), 0), bool), np.empty((len(motion), 0))
+    slides = heights
     if robot:
         findings = [*_beyond_limits(motion, robot), *findings]
         if robot.feet:
-            contacts, heights, of_feet = _feet(motion, robot)
-            findings += of_feet
+            contacts, heights, slides = _feet(motion, robot)
+            findings += _faults_of_feet(robot, contacts, heights, slides)
     accelerations = changes.max(axis=0) * motion.rate**2
-    return Diagnosis(motion, speeds, accelerations, tuple(findings), contacts, heights)
+    return Diagnosis(motion, speeds, accelerations, tuple(findings), contacts, heights, slides)
 
 
 def _beyond_limits(motion: RobotMotion, robot: Robot) -> list[Finding]:
@@ -180,18 +187,18 @@ def _seam(motion: RobotMotion, steps: Annotated[Floats, "frames hinges"]) -> lis
     return [Finding("seam", name, len(motion) - 1, degrees, "degrees")]
 
 
-def _feet(motion: RobotMotion, robot: Robot) -> tuple[Booleans, Floats, list[Finding]]:
-    """Return contacts and heights (F, K) of the feet, and their faults.
+def _feet(motion: RobotMotion, robot: Robot) -> tuple[Booleans, Floats, Floats]:
+    """Return contacts, heights, m, and speeds of standing feet, m/s, each (F, K).
 
-    A foot stands where it is low and slow. A standing foot slides by the slowest of its points, so
-    that one that rolls does not.
+    A foot stands where it is low and slow. It slides by the slowest of its points, so that one that
+    rolls does not.
     """
     soles = robot.foot_points(*motion.body_poses(robot))
     heights = np.stack([points[..., 2].min(axis=1) for points in soles], axis=1)
-    findings = []
-    contacts = np.zeros(heights.shape, bool)
+    contacts, slides = np.zeros(heights.shape, bool), np.full(heights.shape, np.nan)
+    # Between frames that lie apart: in one step, noise of a tenth of a degree looks like sliding.
+    frames = max(2, round(SLIDE * motion.rate))
     for foot, points in enumerate(soles):
-        name = robot.bodies[robot.feet[foot].body]
         middle = points.mean(axis=1)
         path = np.stack([middle[:, 0], heights[:, foot], middle[:, 1]], axis=-1)
         # A foot that is lifted little and slowly swings below the usual thresholds.
@@ -200,35 +207,33 @@ def _feet(motion: RobotMotion, robot: Robot) -> tuple[Booleans, Floats, list[Fin
         height = CONTACTS.height * grown / CONTACTS.grown_height
         thresholds = replace(CONTACTS, height=height, grown_height=grown)
         contacts[:, foot] = detect_contacts(path, motion.rate, cyclic=False, thresholds=thresholds)
-        findings += _of_foot(motion, name, points, heights[:, foot], contacts[:, foot])
-    lowest = heights.min(axis=1)
-    standing = contacts.any(axis=1)
-    above = np.where(standing, lowest, 0.0)
-    if above.max() > FLOATING:
-        frame = int(np.argmax(above))
-        name = robot.bodies[robot.feet[int(np.argmin(heights[frame]))].body]
-        count = int((above > FLOATING).sum())
-        findings.append(Finding("floating", name, frame, 100 * float(above[frame]), "cm", count))
-    return contacts, heights, findings
+        for frame in range(len(points) - frames):
+            if contacts[frame : frame + frames + 1, foot].all():
+                step = points[frame + frames, :, :2] - points[frame, :, :2]
+                speed = np.linalg.norm(step, axis=-1).min() * motion.rate / frames
+                slides[frame + frames // 2, foot] = speed
+    return contacts, heights, slides
 
 
-def _of_foot(
-    motion: RobotMotion, name: str, points: Floats, heights: Floats, contacts: Booleans
+def _faults_of_feet(
+    robot: Robot, contacts: Booleans, heights: Floats, slides: Floats
 ) -> list[Finding]:
     findings = []
-    if heights.min() < -SUNK:
-        frame, count = int(np.argmin(heights)), int((heights < -SUNK).sum())
-        findings.append(Finding("sunk", name, frame, -100 * float(heights.min()), "cm", count))
-    # Between frames that lie apart: in one step, noise of a tenth of a degree looks like sliding.
-    frames = max(2, round(SLIDE * motion.rate))
-    stands = np.convolve(contacts, np.ones(frames + 1), "valid") > frames + 0.5
-    if len(points) > frames and stands.any():
-        steps = np.linalg.norm(points[frames:, :, :2] - points[:-frames, :, :2], axis=-1)
-        speeds = np.where(stands, steps.min(axis=1) * motion.rate / frames, 0.0)
-        mean = float(speeds.sum() / stands.sum())
-        if mean > SKATING:
-            frame, count = int(np.argmax(speeds)) + frames // 2, int(contacts.sum())
-            findings.append(Finding("skating", name, frame, 100 * mean, "cm/s", count))
+    names = [robot.bodies[foot.body] for foot in robot.feet]
+    for name, low, stands, slide in zip(names, heights.T, contacts.T, slides.T, strict=True):
+        if low.min() < -SUNK:
+            frame, count = int(np.argmin(low)), int((low < -SUNK).sum())
+            findings.append(Finding("sunk", name, frame, -100 * float(low.min()), "cm", count))
+        sliding = slide[np.isfinite(slide)]
+        if len(sliding) and sliding.mean() > SKATING:
+            frame, count = int(np.nanargmax(slide)), int(stands.sum())
+            speed = 100 * float(sliding.mean())
+            findings.append(Finding("skating", name, frame, speed, "cm/s", count))
+    above = np.where(contacts.any(axis=1), heights.min(axis=1), 0.0)
+    if above.max() > FLOATING:
+        frame, count = int(np.argmax(above)), int((above > FLOATING).sum())
+        name = names[int(np.argmin(heights[frame]))]
+        findings.append(Finding("floating", name, frame, 100 * float(above[frame]), "cm", count))
     return findings
 
 

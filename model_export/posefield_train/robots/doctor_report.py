@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from posefield.robots.robot import UNLIMITED, Robot
+from posefield_train.robots.cycle_search import Cycle
 from posefield_train.robots.doctor import Diagnosis
 
 if TYPE_CHECKING:
@@ -22,7 +23,8 @@ def text(diagnoses: Sequence[Diagnosis]) -> str:
     faulty = sum(bool(diagnosis.findings) for diagnosis in diagnoses)
     kinds = Counter(kind for each in diagnoses for kind in {f.kind for f in each.findings})
     counts = ", ".join(f"{kind} {count}" for kind, count in sorted(kinds.items()))
-    total = f"{len(diagnoses)} motions, {faulty} with faults{counts and ': '}{counts}"
+    motions = "motion" if len(diagnoses) == 1 else "motions"
+    total = f"{len(diagnoses)} {motions}, {faulty} with faults{counts and ': '}{counts}"
     return "\n".join([*("\n".join(_lines(diagnosis)) for diagnosis in diagnoses), total])
 
 
@@ -37,9 +39,18 @@ def _lines(diagnosis: Diagnosis) -> list[str]:
         *(f"  {name}: {told}" for name, told in motion.evidence.items()),
         f"  fastest: {fastest['joint']}, {fastest['rad_s']:.1f} rad/s; largest acceleration "
         f"{facts['largest_acceleration_rad_s2']:.0f} rad/s²",
+        *([f"  cycle: {_cycle_text(diagnosis.cycle)}"] if diagnosis.cycle else []),
         *(f"  {finding.kind}: {finding.text}" for finding in diagnosis.findings),
         *([] if diagnosis.findings else ["  no faults"]),
     ]
+
+
+def _cycle_text(cycle: Cycle) -> str:
+    cycles = "one" if cycle.count == 1 else "two, which close better than one"
+    return (
+        f"{cycle.seconds:.3f} s; frames {cycle.first} to {cycle.last} hold {cycles}, open by "
+        f"{np.degrees(cycle.gap):.2f} degrees"
+    )
 
 
 def picture(diagnoses: Sequence[Diagnosis], robot: Robot | None, suffix: str) -> bytes:

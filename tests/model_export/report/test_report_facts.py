@@ -79,19 +79,6 @@ def test_the_chosen_size_has_the_models_error_and_no_smaller_one_has_as_little(t
     assert every.smallest(1.1 * error) != every.chosen
 
 
-def test_nothing_lies_below_the_front(trained, rng):
-    found = tensor.measure_truncation(trained)
-    errors, marks = found.front()
-    assert np.all(np.diff(errors) <= 0.0) and np.all(np.diff(marks) > 0.0)
-    for flat in rng.integers(found.errors.size, size=200):
-        error, stored = found.errors.ravel()[flat], found.stored.ravel()[flat]
-        smaller = errors[marks >= stored]
-        assert not len(smaller) or error >= smaller[0] - 1e-12
-    # Negative control: a front of sizes half as large again would lie above some.
-    chosen = found.facts(found.chosen)
-    assert chosen["rms_m"] < errors[marks >= chosen["numbers_stored"] / 1.5][0]
-
-
 def test_a_control_with_one_value_a_performer_is_named(trained, controls):
     values = np.stack([example.controls for example in trained.examples])
     performers = [example.row.performer for example in trained.examples]
