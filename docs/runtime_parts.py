@@ -8,13 +8,11 @@ from posefield.inference import session
 from posefield.locomotion import stride
 from posefield.motion import contact_detection, hinges
 from posefield.synthesis import clip_draft, standing_feet
-from posefield.validation import question_validation
 
 # Names of TypeScript, and the module and the name of each in Python.
 CONSTANTS: dict[str, tuple[Any, str]] = {
     "BOUND_MARGIN": (session, "MARGIN"),
     "BOUND_SLACK": (session, "SLACK"),
-    "DURATION_FACTOR": (question_validation, "DURATION_FACTOR"),
     "FPS_RANGE": (clip_draft, "FPS_RANGE"),
     "AFTER_END": (stride, "AFTER_END"),
     "WARP_STEPS": (constraint_solver, "WARP_STEPS"),
@@ -46,10 +44,6 @@ CONSTANTS: dict[str, tuple[Any, str]] = {
     "SOFTNESS": (limbs, "SOFTNESS"),
     "STRAIGHT": (limbs, "STRAIGHT"),
     "PRESS": (limbs, "PRESS"),
-    "LEAST_BEND": (limbs, "LEAST_BEND"),
-    "OVERSTRETCHED": (limbs, "OVERSTRETCHED"),
-    "FOLDED": (limbs, "FOLDED"),
-    "LEAST_ACROSS": (limbs, "LEAST_ACROSS"),
     "PELVIS_SPREAD": (body_plans, "SPREAD"),
     "PELVIS_SMOOTHING": (body_plans, "SMOOTHING"),
     "MOST_LOWERED": (body_plans, "MOST"),

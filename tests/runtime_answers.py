@@ -4,9 +4,7 @@ import json
 import time
 from pathlib import Path
 
-import model_files
 import numpy as np
-import onnx
 
 from posefield.inference import session
 from posefield.motion import skeleton
@@ -68,7 +66,6 @@ def clip_fields(card, controls, level):
     yield {"fps": 60.0} if level == 0 else {}
     if controls == {control.name: control.default for control in card.controls}:
         yield {"feet": "as_predicted"}
-        yield {"fps": 24.0, "start": 0.2, "end": 0.4}
         yield {"root": "in_place"}
         if card.cyclic:
             yield {"loop": True}
@@ -98,16 +95,9 @@ def cpu_seconds(call, count=20):
 
 
 def write(folder):
-    """Return a file of questions and the service's answers for all shipped models and levels.
-
-    One model more has knees without known limits.
-    """
+    """Return a file of questions and the service's answers for all shipped models and levels."""
     cases = []
-    free = onnx.load(SHIPPED / "hdm05_kick.onnx")
-    (hinges,) = (entry for entry in free.metadata_props if entry.key == "posefield.hinges")
-    free.metadata_props.remove(hinges)
-    (folder / "free_knees.onnx").write_bytes(model_files.written(free))
-    for path in (folder / "free_knees.onnx", *sorted(SHIPPED.glob("*.onnx"))):
+    for path in sorted(SHIPPED.glob("*.onnx")):
         model = Synthesizer(path.stem, session.load(path))
         cards = [(model.session.card, level) for level in range(len(model.session.card.levels))]
         asked = [(level, *one) for card, level in cards for one in questions(card, level)]

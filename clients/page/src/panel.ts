@@ -43,7 +43,7 @@ export class Panel {
       Object.assign(this.state, values);
       then();
     };
-    if (isWalk(model))
+    if (model.walks)
       this.#choice("View", ["clip", "walk"], "clip", (view) => {
         // Arrow keys then steer, and choose no other view.
         (document.activeElement as HTMLElement).blur();
@@ -71,12 +71,12 @@ export class Panel {
     this.#choice("Level of detail", levels, "0", (level) => choose({ level: Number(level) }));
     const set = (feet: string) =>
       choose({ feet: feet === "stand" ? undefined : "as_predicted" }, change);
-    if (card.contacts.length) this.#choice("Feet", ["stand", "as predicted"], "stand", set, "clip");
+    if (model.stands) this.#choice("Feet", ["stand", "as predicted"], "stand", set, "clip");
     const bodies = ["mannequin", "stick"] as const;
     this.#choice("Body", bodies, bodies[0], (body) =>
       put({ body: body as PageState["body"] }, show),
     );
-    if (isWalk(model))
+    if (model.walks)
       this.#slider("Walkers", [1, 200, 1], 1, (count) => put({ count }, show), STICKS, "walk");
     const download = textButton("Download GLB", listeners.download);
     download.title = "The clip with its skin; the command posefield clip writes VRMA, USD and BVH";
@@ -117,10 +117,4 @@ export class Panel {
     input.addEventListener("pointerup", () => input.blur());
     this.#form.append(el("label", { "data-only": only }, text, output, input));
   }
-}
-
-/** True for a cycle with a speed, which walkers need. */
-export function isWalk({ card }: Model): boolean {
-  const speeds = card.controls.filter(({ measure }) => measure?.quantity === "speed");
-  return card.cyclic && card.root === "travelling" && speeds.length > 0 && card.contacts.length > 0;
 }

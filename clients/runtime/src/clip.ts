@@ -1,6 +1,5 @@
 /** Clips: frames at a rate, feet that stand, and loops that close. */
 
-import type { ModelCard } from "./card.ts";
 import * as limits from "./constants.ts";
 import { InvalidField } from "./errors.ts";
 import { type FeetPlan, placeFeet, planFeet } from "./feet.ts";
@@ -25,13 +24,10 @@ import {
 export interface ClipOptions extends Options {
   /** Frames a second; 30 by default. */
   readonly fps?: number;
-  /** Time of the first frame, and the latest of the last one, s. */
-  readonly start?: number;
-  readonly end?: number;
   /** One whole cycle, whose last frame equals its first but for the travel. */
   readonly loop?: boolean;
   readonly root?: "travelling" | "in_place";
-  /** By default feet stand, where the model travels and knows their contacts. */
+  /** By default feet stand where they can: `model.stands`. */
   readonly feet?: "stand" | "as_predicted" | undefined;
 }
 
@@ -56,15 +52,15 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
   const rate = range("fps", options.fps ?? 30, ...limits.FPS_RANGE, "frames a second");
   if (options.loop && !card.cyclic)
     throw new InvalidField("loop", "true, but this model's last pose does not lead into its first");
-  const stands = wantsStandingFeet(card, options);
+  const stands = wantsStandingFeet(model, options);
   const names = [
     ...(["rotations", "root_position", "bone_offsets", "duration", "sigma", "travel"] as const),
     ...(stands ? (["contacts"] as const) : []),
     ...(card.curves.length ? (["curves"] as const) : []),
   ];
   // The same part of the graph as below: to open another one takes longer than to run it.
-  const whole = model.checkDuration((await session.run(point, [0], ...names)).duration[0]!);
-  const { times, duration } = await frameTimes(model, point, whole, rate, options);
+  const whole = (await session.run(point, [0], ...names)).duration[0]!;
+  const { times, duration } = await frameTimes(model, point, whole, rate, !!options.loop);
   const inPlace = options.root === "in_place" && card.root === "travelling";
   const cyclic = card.cyclic;
   const steps = clamp(roundEven(whole * limits.PLAN_RATE), limits.FEWEST_STEPS, limits.MOST_STEPS);
@@ -82,7 +78,7 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
   if (stands) {
     const bones = outputs.bone_offsets;
     const grid = gridOf(stride, count, (count - Number(!cyclic)) / whole, cyclic);
-    const legs = findLegs(card, bones);
+    const legs = findLegs(card);
     const tips = legs.map(({ tip }) => tip);
     const { parents } = card.skeleton;
     const planPoses = {
@@ -130,11 +126,10 @@ export async function clip(model: Model, controls: Controls, options: ClipOption
   };
 }
 
-function wantsStandingFeet(card: ModelCard, { feet }: ClipOptions): boolean {
-  const able = card.root === "travelling" && card.feet.length > 0 && card.contacts.length > 0;
-  if (feet === "stand" && !able)
-    throw new InvalidField("feet", "'stand', but this model knows no contacts of feet that travel");
-  return feet === undefined ? able : feet === "stand";
+function wantsStandingFeet({ stands }: Model, { feet }: ClipOptions): boolean {
+  if (feet === "stand" && !stands)
+    throw new InvalidField("feet", "'stand', but this model knows no legs that travel");
+  return feet === undefined ? stands : feet === "stand";
 }
 
 function gridOf(
@@ -166,30 +161,24 @@ async function frameTimes(
   point: Point,
   whole: number,
   rate: number,
-  { start, end, loop }: ClipOptions,
+  loop: boolean,
 ): Promise<{ times: number[]; duration: number }> {
   const { card } = model;
   if (loop) {
-    if (start || end !== undefined)
-      throw new InvalidField("loop", "true with start or end, expected none: a loop is a cycle");
     const steps = Math.max(1, roundEven(whole * rate));
     const times = Array.from({ length: steps }, (_, step) => (step * whole) / steps);
     return { times, duration: whole };
   }
-  const first = range("start", start ?? 0, 0, whole, "s");
   const moments: number[] = [];
   if (!card.cyclic && card.event) {
     const { share } = card.event;
     if (share > 0 && share < 1)
       moments.push(await timeOfFrame(model, point, whole, share * (card.frames - 1)));
-    if ((whole - first) * rate > 0.5) moments.push(whole);
+    if (whole * rate > 0.5) moments.push(whole);
   }
-  const knots = playback(rate, first, whole, moments);
-  const [lastKnot] = knots.at(-1)!;
-  const duration = moments.length ? first + lastKnot / rate : whole;
-  let last = end === undefined ? whole : range("end", end, first, Math.max(whole, duration), "s");
-  if (last * (1 + 2 ** -23) >= Math.min(whole, duration)) last = duration;
-  const count = Math.floor((last - first) * rate + limits.FRAME_ROUNDING) + 1;
+  const knots = playback(rate, whole, moments);
+  const duration = moments.length ? knots.at(-1)![0] / rate : whole;
+  const count = Math.floor(duration * rate + limits.FRAME_ROUNDING) + 1;
   const times = Array.from({ length: count }, (_, frame) => {
     const found = knots.findIndex(([knot]) => knot >= frame);
     const after = clamp(found < 0 ? knots.length : found, 1, knots.length - 1);
@@ -197,7 +186,7 @@ async function frameTimes(
     const share = clamp((frame - before) / (knot - before), 0, 1);
     const gentle = share * share * (3 - 2 * share);
     const later = frame === knot ? next : shift + gentle * (next - shift);
-    return Math.min(first + frame / rate + later, whole);
+    return Math.min(frame / rate + later, whole);
   });
   return { times, duration };
 }
@@ -205,19 +194,17 @@ async function frameTimes(
 /** Frames from the start at which moments are played, and by how much later these are, s. */
 function playback(
   rate: number,
-  start: number,
   duration: number,
   moments: readonly number[],
 ): (readonly [number, number])[] {
-  const [begin, end] = [-start * rate, (duration - start) * rate];
   const shifts = new Map<number, number>();
   for (const moment of moments.toReversed()) {
-    const frame = roundEven((moment - start) * rate);
-    if (frame >= begin - limits.FRAME_ROUNDING) shifts.set(frame, moment - start - frame / rate);
+    const frame = roundEven(moment * rate);
+    shifts.set(frame, moment - frame / rate);
   }
-  if (![...shifts.keys()].some((knot) => Math.abs(knot - begin) < limits.FRAME_ROUNDING))
-    shifts.set(begin, 0);
+  if (!shifts.has(0)) shifts.set(0, 0);
   // The end plays at its own time, unless it is a moment or one before it has the last frame.
+  const end = duration * rate;
   const latest = Math.max(...shifts.keys());
   if (shifts.size === 1 || (!moments.includes(duration) && latest < end - limits.FRAME_ROUNDING))
     shifts.set(end, 0);

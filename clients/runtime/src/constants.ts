@@ -2,7 +2,6 @@
 
 export const BOUND_MARGIN = 0.25;
 export const BOUND_SLACK = 1e-6;
-export const DURATION_FACTOR = 10;
 export const FPS_RANGE = [1, 1000] as const;
 export const AFTER_END = 1000000000;
 export const WARP_STEPS = 2048;
@@ -34,10 +33,6 @@ export const REACH = 0.995;
 export const SOFTNESS = 0.005;
 export const STRAIGHT = 0.9998;
 export const PRESS = 0.005;
-export const LEAST_BEND = 0.01;
-export const OVERSTRETCHED = 0.1;
-export const FOLDED = 0.2;
-export const LEAST_ACROSS = 0.3;
 export const PELVIS_SPREAD = 0.06;
 export const PELVIS_SMOOTHING = 0.03;
 export const MOST_LOWERED = 0.02;

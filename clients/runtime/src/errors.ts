@@ -3,8 +3,7 @@
  *
  *     RuntimeFault
  *     ├── ModelError       a file that is no model of this version, or does not run
- *     ├── InvalidField     a field of a question that is missing, unknown or out of range
- *     └── OutsideSamples   controls so far outside the samples that no motion is plausible
+ *     └── InvalidField     a field of a question that is missing, unknown or out of range
  */
 
 export class RuntimeFault extends Error {
@@ -27,8 +26,4 @@ export class InvalidField extends RuntimeFault {
     this.field = field;
     this.detail = detail;
   }
-}
-
-export class OutsideSamples extends RuntimeFault {
-  override readonly name = "OutsideSamples";
 }

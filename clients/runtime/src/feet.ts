@@ -21,7 +21,7 @@ import {
   toeBend,
   trimmed,
 } from "./stances.ts";
-import { firmReach, legChord, meanBend, solve } from "./two-bone.ts";
+import { firmReach, legChord, solve } from "./two-bone.ts";
 import {
   add,
   type Complex,
@@ -208,7 +208,6 @@ export function placeFeet(
 ): void {
   const { grid } = plan;
   const joints = rotations.length / (4 * seconds.length);
-  const bends = plan.feet.map(({ limb }) => meanBend(poses, limb));
   for (const [frame, time] of seconds.entries()) {
     const at = time * grid.rate;
     const lowered = framesAround(grid, at).reduce(
@@ -216,18 +215,12 @@ export function placeFeet(
       0,
     );
     const shift: Vector = [0, -lowered, 0];
-    for (const [index, foot] of plan.feet.entries()) {
+    for (const foot of plan.feet) {
       const path = add(poses.position(foot.limb.tip, frame), changeAt(grid, foot, at));
       const ball = anchored(grid, foot, at, path);
       const lowest = foot.toeHeight - ball[1];
-      const place = (joint: number) => 4 * (frame * joints + joint);
-      const bend = bends[index]!;
-      const turns = placeLeg(poses, foot.limb, frame, shift, ball, {
-        lowest,
-        bend,
-        spin: [1, 0, 0, 0],
-      });
-      for (const [joint, turn] of turns) rotations.set(turn, place(joint));
+      const turns = placeLeg(poses, foot.limb, frame, shift, ball, lowest);
+      for (const [joint, turn] of turns) rotations.set(turn, 4 * (frame * joints + joint));
     }
     roots[3 * frame + 1]! -= lowered;
   }
@@ -236,8 +229,8 @@ export function placeFeet(
 /**
  * Local rotations of the joints of a leg, by joint, whose ball comes to a place.
  *
- * shift: of the root, m. lowest: of the end of the toes above the ball, m. bend: of `meanBend`.
- * spin: turn of the foot before it is placed.
+ * shift: of the root, m. lowest: of the end of the toes above the ball, m. spin: turn of the foot
+ * before it is placed.
  */
 export function placeLeg(
   poses: LimbPoses,
@@ -245,7 +238,8 @@ export function placeLeg(
   frame: number,
   shift: Vector,
   ball: Vector,
-  { lowest, bend, spin }: { lowest: number; bend: Vector; spin: Quaternion },
+  lowest: number,
+  spin: Quaternion = [1, 0, 0, 0],
 ): Map<number, Quaternion> {
   let arm = rotate(spin, poses.between(leg.lower, leg.tip, frame));
   const offset = subtract(add(poses.position(leg.upper, frame), shift), ball);
@@ -259,7 +253,7 @@ export function placeLeg(
   }
   const chain = scale(add(offset, arm), -1);
   const end = scale(chain, chord / Math.max(norm(chain), 1e-9));
-  const [thigh, shin] = solve(poses, leg, frame, end, bend);
+  const [thigh, shin] = solve(poses, leg, frame, end);
   const ankle = multiply(foot, poses.orientation(leg.lower, frame));
   const placed = new Map([
     [leg.upper, multiply(conjugate(poses.parentOrientation(leg.upper, frame)), thigh)],

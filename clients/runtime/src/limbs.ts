@@ -1,4 +1,4 @@
-/** Legs of two bones, found in a skeleton, and the positions of their joints in poses. */
+/** Legs with known knees, found in a skeleton, and the positions of their joints in poses. */
 
 import type { ModelCard } from "./card.ts";
 import { HingeLimits } from "./two-bone.ts";
@@ -12,8 +12,8 @@ export interface Limb {
   readonly middle: number;
   readonly lower: number;
   readonly tip: number;
-  /** Limits of the middle joint; null where they are unknown. */
-  readonly hinge: HingeLimits | null;
+  /** Limits of the middle joint. */
+  readonly hinge: HingeLimits;
   /** From the tip to the end of the toes, m; null where that is unknown. */
   readonly toe: Vector | null;
 }
@@ -105,15 +105,14 @@ export function quaternionAt(numbers: ArrayLike<number>, index: number): Quatern
 }
 
 /**
- * Legs of the feet whose contacts the model knows; a foot without two bones above it, or whose leg
- * moves another one, has none.
+ * Legs of the feet whose contacts and knees the model knows; one that moves another leg is none.
  */
-export function findLegs(card: ModelCard, bones: ArrayLike<number>): Limb[] {
+export function findLegs(card: ModelCard): Limb[] {
   const legs: Limb[] = [];
   const used = new Set<number>();
   for (const [contact, { joint }] of card.contacts.entries()) {
     if (!card.feet.includes(joint)) continue;
-    const leg = findLimb(card, bones, contact);
+    const leg = findLimb(card, contact);
     const joints = leg ? [leg.upper, leg.middle, leg.lower] : [];
     if (leg && !joints.some((one) => used.has(one))) legs.push(leg);
     for (const one of joints) used.add(one);
@@ -121,30 +120,20 @@ export function findLegs(card: ModelCard, bones: ArrayLike<number>): Limb[] {
   return legs;
 }
 
-/** The limb that ends at the joint of a contact; null if the chain above it has no two bones. */
-function findLimb(card: ModelCard, bones: ArrayLike<number>, contact: number): Limb | null {
-  const tip = card.contacts[contact]!.joint;
-  const { parents, tip_joints, tip_offsets } = card.skeleton;
-  const joints = chain(parents, tip).toReversed();
-  let best: Limb | null = null;
-  let highest = 0;
+/** The limb that ends at the joint of a contact; null without a known knee above it. */
+function findLimb({ contacts, hinges, skeleton }: ModelCard, contact: number): Limb | null {
+  const tip = contacts[contact]!.joint;
+  const joints = chain(skeleton.parents, tip).toReversed();
   // The ankle is the tip's parent, or the tip itself. The joint above the hip exists in both.
   for (const first of [1, 0]) {
-    if (joints.length <= first + 3) continue;
     const [lower, middle, upper] = joints.slice(first) as [number, number, number];
-    const lengths = [middle, lower].map((joint) => norm(vectorAt(bones, joint)));
-    const known = card.hinges.find(({ joint }) => joint === middle);
-    // The shorter bone over the longer one; a known knee comes first.
-    const longest = Math.max(...lengths);
-    const score = (longest > 0 ? Math.min(...lengths) / longest : 0) + (known ? 1 : 0);
-    if (score <= highest) continue;
-    highest = score;
-    const end = tip_joints.lastIndexOf(tip);
-    const toe = first === 1 && end >= 0 ? tip_offsets[end]! : null;
-    const hinge = known ? new HingeLimits(known) : null;
-    best = { contact, upper, middle, lower, tip, hinge, toe };
+    const known = hinges.find(({ joint }) => joint === middle);
+    if (!known || joints.length <= first + 3) continue;
+    const end = skeleton.tip_joints.lastIndexOf(tip);
+    const toe = first === 1 && end >= 0 ? skeleton.tip_offsets[end]! : null;
+    return { contact, upper, middle, lower, tip, hinge: new HingeLimits(known), toe };
   }
-  return best;
+  return null;
 }
 
 /** Joints from the root to a joint. */

@@ -3,9 +3,10 @@
 import type { ModelCard } from "./card.ts";
 import { readCard } from "./card.ts";
 import { type Clip, type ClipOptions, clip } from "./clip.ts";
-import { DURATION_FACTOR } from "./constants.ts";
-import { InvalidField, ModelError, OutsideSamples } from "./errors.ts";
+import { InvalidField, ModelError } from "./errors.ts";
+import { findLegs } from "./limbs.ts";
 import { type Onnxruntime, type Point, Session } from "./session.ts";
+import { clamp } from "./vectors.ts";
 import { Walkers } from "./walker.ts";
 
 /** Values of all controls, such as `model.defaults` with some changed. */
@@ -14,8 +15,8 @@ export type Controls = Readonly<Record<string, number>>;
 export interface Options {
   /** Name of the performer; an unseen one by default. */
   readonly performer?: string | undefined;
-  /** Name, or weights of names, by label set; sets that are not given are left open. */
-  readonly labels?: Readonly<Record<string, string | Readonly<Record<string, number>>>>;
+  /** Name by label set; sets that are not given are left open. */
+  readonly labels?: Readonly<Record<string, string>>;
   /** Level of detail; 0 is the finest. */
   readonly level?: number;
 }
@@ -46,7 +47,6 @@ export interface Poses {
 
 const POSE_OUTPUTS = ["rotations", "root_position", "bone_offsets", "duration", "sigma"] as const;
 const MOST_POSES = 10_000;
-const WEIGHT_ROUNDING = 1e-6;
 /** Share by which a duration from another machine may differ. */
 const TIME_SLACK = 1e-5;
 
@@ -84,6 +84,17 @@ export class Model {
     return Object.fromEntries(this.card.controls.map((control) => [control.name, control.default]));
   }
 
+  /** True where feet can stand: the model travels, and knows contacts of feet and their knees. */
+  get stands(): boolean {
+    return this.card.root === "travelling" && findLegs(this.card).length > 0;
+  }
+
+  /** True for a cycle with a measured speed, which walkers need. */
+  get walks(): boolean {
+    const { controls, cyclic } = this.card;
+    return this.stands && cyclic && controls.some(({ measure }) => measure?.quantity === "speed");
+  }
+
   /** Poses at a time or at several, s from the start of the clip. */
   async pose(
     controls: Controls,
@@ -97,11 +108,11 @@ export class Model {
     for (const [index, value] of times.entries()) finite(`times/${index}`, value);
     const { skeleton, curves } = this.card;
     const names = curves.length ? ([...POSE_OUTPUTS, "curves"] as const) : POSE_OUTPUTS;
-    const longest = this.durations[1];
-    // Times beyond the longest clip overflow single precision; they are refused below.
-    const within = times.map((value) => Math.min(Math.max(value, 0), longest));
+    // Times far beyond the longest clip overflow single precision; they are refused below.
+    const longest = 10 * this.card.durations[1]!;
+    const within = times.map((value) => clamp(value, 0, longest));
     const outputs = await this.session.run(point, within, ...names);
-    const duration = this.checkDuration(outputs.duration[0]!);
+    const duration = outputs.duration[0]!;
     for (const [index, value] of times.entries())
       range(`times/${index}`, value, 0, duration * (1 + TIME_SLACK), "s");
     return {
@@ -117,7 +128,7 @@ export class Model {
     };
   }
 
-  /** A clip; its feet stand, where the model travels and knows their contacts. */
+  /** A clip; its feet stand where they can. */
   clip(controls: Controls, options: ClipOptions = {}): Promise<Clip> {
     return clip(this, controls, options);
   }
@@ -125,19 +136,6 @@ export class Model {
   /** Walkers that are steered, of a walk. */
   walkers(count: number, options: Options = {}): Promise<Walkers> {
     return Walkers.of(this, count, options);
-  }
-
-  /** Shortest and longest plausible duration, s. */
-  get durations(): readonly [number, number] {
-    const [low, high] = this.card.durations;
-    return [low / DURATION_FACTOR, high * DURATION_FACTOR];
-  }
-
-  /** The duration; OutsideSamples if no captured clip is near it. */
-  checkDuration(duration: number): number {
-    const [low, high] = this.durations;
-    if (duration >= low && duration <= high) return duration;
-    throw new OutsideSamples(`the clip would last ${duration} s, expected ${low} to ${high} s`);
   }
 
   /** The inputs of the graph for a question; InvalidField for one that cannot be answered. */
@@ -182,27 +180,10 @@ function labelWeights({ labels }: ModelCard, { performer, labels: sets = {} }: O
   if (performer !== undefined && sets["performer"] !== undefined)
     throw new InvalidField("performer", `${performer} and labels/performer, expected one`);
   const values = performer === undefined ? sets : { ...sets, performer };
-  const known = labels.map(({ name }) => name);
-  for (const name of Object.keys(values))
-    if (!known.includes(name))
-      throw new InvalidField(`labels/${name}`, `unknown, expected ${known.join(", ") || "none"}`);
-  return labels.flatMap(({ name, names }) => setWeights(`labels/${name}`, names, values[name]));
-}
-
-function setWeights(
-  field: string,
-  names: readonly string[],
-  value: string | Readonly<Record<string, number>> | undefined,
-): number[] {
-  if (value === undefined) return names.map(() => 0);
-  const weights = typeof value === "string" ? { [value]: 1 } : value;
-  for (const [name, weight] of Object.entries(weights)) {
-    if (!names.includes(name))
-      throw new InvalidField(field, `${name}, expected one of ${names.join(", ")}`);
-    range(`${field}/${name}`, weight, 0, 1 + WEIGHT_ROUNDING, "");
+  for (const [set, value] of Object.entries(values)) {
+    const names = labels.find(({ name }) => name === set)?.names ?? [];
+    if (!names.includes(value))
+      throw new InvalidField(`labels/${set}`, `${value}, expected ${names.join(", ") || "none"}`);
   }
-  const total = Object.values(weights).reduce((sum, weight) => sum + weight, 0);
-  if (total <= 0 || total > 1 + WEIGHT_ROUNDING)
-    throw new InvalidField(field, `weights with a sum of ${total}, expected above 0, at most 1`);
-  return names.map((name) => weights[name] ?? 0);
+  return labels.flatMap((set) => set.names.map((name) => Number(values[set.name] === name)));
 }

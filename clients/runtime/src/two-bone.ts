@@ -19,13 +19,11 @@ import {
   subtract,
   unit,
   type Vector,
-  ZERO,
 } from "./vectors.ts";
 
 /** Smallest and largest distance of a limb's ends, m, within the range of its hinge. */
 export function distances(poses: LimbPoses, limb: Limb): [number, number] {
   const [above, below] = [poses.length(limb.middle), poses.length(limb.lower)];
-  if (!limb.hinge) return [Math.abs(above - below), above + below];
   const [squares, products] = [above ** 2 + below ** 2, 2 * above * below];
   const bends = [limb.hinge.high[0] + limits.HINGE_FREE, limb.hinge.low[0] - limits.HINGE_FREE];
   const [shortest, longest] = bends.map((bend) =>
@@ -63,111 +61,26 @@ export function legChord(poses: LimbPoses, leg: Limb, frame: number, distance: n
   return Math.max(chord, 1.001 * shortest + 1e-6);
 }
 
-/** The mean bend of a limb over poses, about an axis of its upper bone. */
-export function meanBend(poses: LimbPoses, limb: Limb): Vector {
-  let sum = ZERO;
-  for (let frame = 0; frame < poses.frames; frame++) {
-    const chord = unit(poses.between(limb.upper, limb.lower, frame), 1e-9);
-    const normal = cross(poses.between(limb.upper, limb.middle, frame), chord);
-    sum = add(sum, rotate(conjugate(poses.orientation(limb.upper, frame)), normal));
-  }
-  return scale(sum, 1 / poses.frames);
-}
-
 /**
  * Orientations of both bones with which the end of a limb comes where it is wanted.
  *
- * end: from the limb's upper joint, m. mean: of `meanBend`, for a limb without hinge.
+ * The middle joint bends to the distance, and the limb turns by the smallest rotation. end: from
+ * the limb's upper joint, m.
  */
 export function solve(
   poses: LimbPoses,
-  limb: Limb,
-  frame: number,
-  end: Vector,
-  mean: Vector,
-): [Quaternion, Quaternion] {
-  if (limb.hinge) return hinged(poses, limb, limb.hinge, frame, end);
-  return free(poses, limb, frame, end, mean);
-}
-
-/** The middle joint bends to the distance, and the limb turns by the smallest rotation. */
-function hinged(
-  poses: LimbPoses,
-  limb: Limb,
-  hinge: HingeLimits,
+  { upper, middle, lower, hinge }: Limb,
   frame: number,
   end: Vector,
 ): [Quaternion, Quaternion] {
-  const upper = poses.orientation(limb.upper, frame);
-  const inner = poses.orientation(limb.middle, frame);
-  const above = rotate(conjugate(upper), poses.between(limb.upper, limb.middle, frame));
-  const below = rotate(conjugate(inner), poses.between(limb.middle, limb.lower, frame));
-  const bent = hinge.bend(multiply(conjugate(upper), inner), above, below, dot(end, end));
-  const towards = rotate(upper, add(above, rotate(bent, below)));
-  const thigh = multiply(shortestTurn(towards, end), upper);
+  const outer = poses.orientation(upper, frame);
+  const inner = poses.orientation(middle, frame);
+  const above = rotate(conjugate(outer), poses.between(upper, middle, frame));
+  const below = rotate(conjugate(inner), poses.between(middle, lower, frame));
+  const bent = hinge.bend(multiply(conjugate(outer), inner), above, below, dot(end, end));
+  const towards = rotate(outer, add(above, rotate(bent, below)));
+  const thigh = multiply(shortestTurn(towards, end), outer);
   return [thigh, multiply(thigh, bent)];
-}
-
-/** Both bones turn by the shortest rotations, in the plane in which the limb bent before. */
-function free(
-  poses: LimbPoses,
-  limb: Limb,
-  frame: number,
-  end: Vector,
-  mean: Vector,
-): [Quaternion, Quaternion] {
-  const [above, below] = [poses.length(limb.middle), poses.length(limb.lower)];
-  const distance = norm(end);
-  const towards = scale(end, 1 / distance);
-  const side = bendDirection(poses, limb, frame, towards, mean);
-  const along = (above ** 2 + distance ** 2 - below ** 2) / (2 * distance);
-  const across = Math.sqrt(Math.max(above ** 2 - along ** 2, 0));
-  const knee = add(scale(towards, along), scale(side, across));
-  const upper = poses.between(limb.upper, limb.middle, frame);
-  const lower = poses.between(limb.middle, limb.lower, frame);
-  return [
-    multiply(shortestTurn(upper, knee), poses.orientation(limb.upper, frame)),
-    multiply(shortestTurn(lower, subtract(end, knee)), poses.orientation(limb.middle, frame)),
-  ];
-}
-
-/** The unit vector, orthogonal to the limb, towards which its middle bends. */
-function bendDirection(
-  poses: LimbPoses,
-  limb: Limb,
-  frame: number,
-  towards: Vector,
-  mean: Vector,
-): Vector {
-  const chord = poses.between(limb.upper, limb.lower, frame);
-  const old = unit(chord, 1e-9);
-  const bone = poses.between(limb.upper, limb.middle, frame);
-  const bend = across(bone, old);
-  const length = poses.length(limb.middle);
-  const axis = rotate(poses.orientation(limb.upper, frame), unit(mean, 1e-9));
-  const meanSide = cross(old, axis);
-  let bent = norm(bend);
-  if (limb.tip !== limb.lower) {
-    // A knee that is a little overstretched would bend backwards where its leg is shortened.
-    const little = clamp(2 - bent / (limits.OVERSTRETCHED * length), 0, 1);
-    bent += little * (dot(bend, meanSide) - bent);
-  }
-  const mixed = add(bend, scale(meanSide, Math.max(limits.LEAST_BEND * length - bent, 0)));
-  let side = rotate(shortestTurn(old, towards), mixed);
-  // The middle of a folded limb moves as the limb does.
-  const size = norm(bone);
-  const sideways = scale(across(bone, towards), 1 / size);
-  const much = norm(sideways);
-  const folded = clamp(2 - norm(chord) / (2 * limits.FOLDED * size), 0, 1);
-  const share = folded * clamp(much / limits.LEAST_ACROSS, 0, 1);
-  const middle = scale(sideways, norm(side) / Math.max(much, 1e-9));
-  side = add(side, scale(subtract(middle, side), share));
-  return unit(across(side, towards));
-}
-
-/** The part of a vector that is orthogonal to a unit vector. */
-function across(vector: Vector, axis: Vector): Vector {
-  return subtract(vector, scale(axis, dot(vector, axis)));
 }
 
 type Angles = [number, number, number];

@@ -7,7 +7,6 @@ import { findLegs, type Limb, LimbPoses, quaternionAt } from "./limbs.ts";
 import { finite, type Model, type Options, type Poses, range } from "./model.ts";
 import type { Point } from "./session.ts";
 import { cycleOf, relativeRoot, type Stride } from "./strides.ts";
-import { meanBend } from "./two-bone.ts";
 import {
   add,
   type Complex,
@@ -110,7 +109,7 @@ export class Walkers {
     const { names, parents } = model.card.skeleton;
     this.#model = model;
     this.#gait = gait;
-    this.#legs = findLegs(model.card, gait.bones);
+    this.#legs = findLegs(model.card);
     this.poses = {
       names,
       parents,
@@ -174,12 +173,12 @@ export class Walkers {
     this.#walkers[index]!.steering = { speed: within, turn: finite("turn", turned) };
   }
 
-  /** Steer a walker to a point, x and z in m, where it stops unless `passes`. */
-  steerTo(index: number, [x, z]: readonly [number, number], speed: number, passes = false): number {
+  /** Steer a walker to a point, x and z in m, where it stops; the distance left, m. */
+  steerTo(index: number, [x, z]: readonly [number, number], speed: number): number {
     const { place, heading } = this.#walkers[index]!;
     const distance = Math.hypot(x - place[1], z - place[0]);
     const angle = wrapped(Math.atan2(x - place[1], z - place[0]) - heading);
-    const near = passes ? 1 : clamp(distance - 0.2, 0, 1);
+    const near = clamp(distance - 0.2, 0, 1);
     const ahead = Math.max(Math.cos(angle), 0.2) * near;
     this.steer(index, { speed: speed * ahead, turn: near > 0 ? clamp(3 * angle, -2.5, 2.5) : 0 });
     return distance;
@@ -272,11 +271,9 @@ export class Walkers {
     for (const { limb, contact, foot, yaw } of balls) {
       const drop = limb.toe ? rotate(poses.orientation(limb.tip, 0), limb.toe)[1] : 0;
       const twist = foot.standing ? wrapped(foot.yaw - yaw) : fade(foot) * foot.twist;
-      const turns = placeLeg(poses, limb, 0, [0, -walker.lowered, 0], foot.ball, {
-        lowest: contact.height + Math.min(drop, 0) - foot.ball[1],
-        bend: meanBend(poses, limb),
-        spin: turn(UP, twist),
-      });
+      const lowest = contact.height + Math.min(drop, 0) - foot.ball[1];
+      const shift: Vector = [0, -walker.lowered, 0];
+      const turns = placeLeg(poses, limb, 0, shift, foot.ball, lowest, turn(UP, twist));
       for (const [joint, local] of turns)
         rotations.set(local, 4 * (parents.length * index + joint));
     }
@@ -382,8 +379,8 @@ async function gaitOf(model: Model, options: Options): Promise<Gait> {
   const [pace, bend] = ["speed", "turn"].map((quantity) =>
     card.controls.findIndex(({ measure }) => measure?.quantity === quantity),
   ) as [number, number];
-  if (!card.cyclic || card.root !== "travelling" || pace < 0 || !card.contacts.length)
-    throw new InvalidField("model", `${card.name} is no walk with a speed and contacts of feet`);
+  if (!model.walks)
+    throw new InvalidField("model", `${card.name} is no walk with a measured speed and known legs`);
   const { minimum, maximum } = card.controls[pace]!;
   const side = card.controls[bend] ?? { minimum: 0, maximum: 0 };
   const turns = [side.minimum, side.maximum] as const;
@@ -419,7 +416,7 @@ async function gaitOf(model: Model, options: Options): Promise<Gait> {
     blend(rotations, local, index / (index + 1));
     root = add(root, scale(relative.root, 1 / PHASES));
   }
-  const liftOffs = findLegs(card, cycle.bone_offsets).map(({ contact }) => {
+  const liftOffs = findLegs(card).map(({ contact }) => {
     const likely = (index: number) =>
       cycle.contacts[(index % PHASES) * card.contacts.length + contact]! > limits.STANDING;
     return (

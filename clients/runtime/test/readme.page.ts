@@ -1,6 +1,7 @@
 /** The page of the README, packed as it stands, in a browser: the figure walks by keys. */
 
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import { cpSync, createReadStream, mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import type { AddressInfo } from "node:net";
@@ -11,6 +12,7 @@ import { build } from "vite";
 
 import { browser } from "../../viewer/test/harness.ts";
 
+const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "posefield";
 const PACKAGE = fileURLToPath(new URL("../", import.meta.url));
 const FOLDER = `${PACKAGE}.tmp/readme-page/`;
 const MODEL = fileURLToPath(
@@ -28,8 +30,11 @@ test("the page of the README shows a figure that keys move", async () => {
   const script = /^```js browser\n(.*?)^```$/ms.exec(text)![1]!;
   mkdirSync(`${FOLDER}public`, { recursive: true });
   cpSync(MODEL, `${FOLDER}public/cmu_walk.onnx`);
+  const [, words] = /^posefield (clip .+?) +#/m.exec(text)!;
+  execFileSync(COMMAND, words!.split(" "), { cwd: FOLDER, stdio: "ignore" });
   writeFileSync(`${FOLDER}index.html`, `<link rel="icon" href="data:,">${html}`);
-  writeFileSync(`${FOLDER}main.js`, `${script}\nglobalThis.walkers = walkers;\n`);
+  const shown = "Object.assign(globalThis, { walkers, bones });";
+  writeFileSync(`${FOLDER}main.js`, `${script}\n${shown}\n`);
   await build({ root: FOLDER, configFile: false, logLevel: "error" });
   const asked: string[] = [];
   const server = createServer((request, response) => {
@@ -52,6 +57,9 @@ test("the page of the README shows a figure that keys move", async () => {
     const stands = await place();
     await page.keyboard.down("ArrowUp");
     await page.waitForFunction("walkers.state(0).z > 1");
+    await page.waitForFunction(
+      "bones[5].matrixWorld.elements[14] > 1 && !bones.includes(undefined)",
+    );
     assert.equal(stands, 0);
     assert.deepEqual(faults, []);
     assert.equal(asked.filter((path) => path.endsWith(".wasm")).length, 1);
