@@ -88,9 +88,11 @@ def test_a_run_that_was_killed_resumes_with_the_same_bytes(whole, tmp_path):
         running.kill()
     begun = contents(tmp_path / "people")
     assert "manifest.json" not in begun
+    assert list((tmp_path / "people").glob(".writing.*"))
     made = (tmp_path / "people" / NAMES[0]).stat().st_mtime_ns
     run(tracks, output, "--workers", "2")
     assert contents(tmp_path / "people") == contents(folder)
+    assert not list((tmp_path / "people").glob(".writing.*"))
     assert (tmp_path / "people" / NAMES[0]).stat().st_mtime_ns == made
     # A damaged part is made again.
     (tmp_path / "people" / NAMES[1]).write_bytes(b"")

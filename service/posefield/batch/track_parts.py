@@ -15,7 +15,6 @@ from functools import lru_cache
 from importlib.metadata import version
 from os.path import getsize
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -136,22 +135,19 @@ class _Spools:
 def write(
     job: PartsJob,
     runner: Runner = run_here,
-    begin: Callable[[int], None] = lambda count: None,
-    advance: Callable[[int], None] = lambda count: None,
+    progress: Callable[[int], Callable[[int], None]] = lambda total: lambda count: None,
 ) -> dict[str, Any]:
     """Write the parts of a crowd and a manifest, and return it as plain values.
 
-    begin, advance: called with the number of parts, and of parts that are finished. Raises
+    progress: takes the number of parts; what it returns, that of parts finished since. Raises
     FileError and InvalidField as `track.group` and `crowd_formats.write` do; WorkerDied.
     """
-    job.folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=job.folder, prefix=".spool.") as name:
-        spools = _Spools(job, Path(name))
+    with atomic_files.temporary_folder(job.folder / "rows") as folder:
+        spools = _Spools(job, folder)
         for block in track_files.row_blocks(job.tracks, job.reading):
             spools.add(block)
         shards = spools.shards()
-        begin(len(shards))
-        records = []
+        advance, records = progress(len(shards)), []
         tasks = ((job, shard) for shard in shards)
         for record in runner(write_part, tasks, lambda: False):
             records.append(record)

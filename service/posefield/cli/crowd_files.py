@@ -110,12 +110,9 @@ def write_parts(job: PartsJob, workers: int | None, scheduler: str | None) -> di
     local = nullcontext(process_pool.runner(workers or 1, resumes))
     chosen = local if scheduler is None else process_pool.cluster_runner(scheduler)
     with chosen as runner, ExitStack() as bars:
-        bar: list[ProgressBar] = []
-
-        def begin(count: int) -> None:
-            bar.append(bars.enter_context(ProgressBar("parts", count)))
-
-        return track_parts.write(job, runner, begin, lambda count: bar[0].advance(count))
+        return track_parts.write(
+            job, runner, lambda count: bars.enter_context(ProgressBar("parts", count)).advance
+        )
 
 
 def parts_text(manifest: dict[str, Any], folder: Path) -> str:

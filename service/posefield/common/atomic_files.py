@@ -1,13 +1,25 @@
-"""Atomic writing of files and folders: either complete or absent."""
+"""Atomic writing of files and folders: either complete or absent.
 
-import tempfile
+They are made in hidden folders beside their places. A folder is locked while its process lives, so
+the next one that writes the same file removes the folders of those that were killed.
+"""
+
+import fcntl
+import hashlib
+import os
+import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from posefield.common.errors import FileError
 
 CHUNK_BYTES = 1 << 20
+Moves = list[tuple[Path, Path]]
+"""New files and folders, and their places."""
+_together: ContextVar[tuple[ExitStack, Moves] | None] = ContextVar("together", default=None)
 
 
 def read_chunks(path: Path) -> Iterator[bytes]:
@@ -40,9 +52,11 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises FileError if it cannot be written.
     """
-    with temporary_folder(path) as folder:
-        yield folder / path.name
-        _move_into_place(folder / path.name, path)
+    with _moves() as (rooms, moves), _file_errors(path):
+        file = _make_room(path, rooms) / path.name
+        yield file
+        file.chmod(0o644)
+        moves.append((file, path))
 
 
 @contextmanager
@@ -52,46 +66,94 @@ def replacing_pair(path: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
     The folder is replaced first, so that the file never refers to missing ones. After an error the
     previous file and folder are kept or restored. Raises FileError if they cannot be written.
     """
-    with temporary_folder(path) as room:
-        new, old = room / "new", room / "old"
+    with _moves() as (rooms, moves), _file_errors(path):
+        file = _make_room(path, rooms) / path.name
+        new = file.with_name("new")
         new.mkdir()
-        yield room / path.name, new
-        _replace_folder(new, folder, old)
+        yield file, new
+        file.chmod(0o644)
+        moves += [(new, folder), (file, path)]
+
+
+@contextmanager
+def together() -> Iterator[None]:
+    """Replace all files that are written in this block at its end, or none after an error."""
+    with _moves() as both:
+        token = _together.set(both)
         try:
-            _move_into_place(room / path.name, path)
-        except BaseException:
-            _restore(folder, old)
-            raise
+            yield
+        finally:
+            _together.reset(token)
+
+
+@contextmanager
+def _moves() -> Iterator[tuple[ExitStack, Moves]]:
+    """Yield the temporary folders and the moves of a block, which are done at its end."""
+    if (outer := _together.get()) is not None:
+        yield outer
+        return
+    with ExitStack() as rooms:
+        moves = Moves()
+        yield rooms, moves
+        _replace(moves)
 
 
 @contextmanager
 def temporary_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder beside the path, on the same disk; FileError if it cannot be."""
+    with ExitStack() as rooms, _file_errors(path):
+        yield _make_room(path, rooms)
+
+
+@contextmanager
+def _file_errors(path: Path) -> Iterator[None]:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing.") as name:
-            yield Path(name)
+        yield
     except OSError as fault:
         raise FileError(path, f"cannot be written: {fault.strerror}") from fault
 
 
-def _move_into_place(temporary: Path, path: Path) -> None:
-    temporary.chmod(0o644)
-    temporary.replace(path)
+def _make_room(path: Path, rooms: ExitStack) -> Path:
+    """Return a new locked folder beside the path; those of killed processes are removed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    prefix = f".writing.{hashlib.sha256(os.fsencode(path.name)).hexdigest()[:12]}."
+    for folder in path.parent.glob(f"{prefix}*"):
+        with ExitStack() as lock:
+            if _lock(folder, lock):
+                shutil.rmtree(folder, ignore_errors=True)
+    room = Path(rooms.enter_context(TemporaryDirectory(dir=path.parent, prefix=prefix)))
+    _lock(room, rooms)
+    return room
 
 
-def _replace_folder(new: Path, folder: Path, old: Path) -> None:
-    if folder.exists():
-        folder.rename(old)
+def _lock(folder: Path, locks: ExitStack) -> bool:
+    """Lock a folder until the end of `locks`; return whether it could be."""
     try:
-        new.rename(folder)
+        descriptor = os.open(folder, os.O_RDONLY)
+        locks.callback(os.close, descriptor)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # Locked by another process, gone, or on a disk without locks.
+        return False
+    return True
+
+
+def _replace(moves: Moves) -> None:
+    """Move files and folders over earlier ones: all, or none after an error."""
+    done = list[tuple[Path, Path, Path]]()
+    try:
+        for new, path in moves:
+            old = new.with_name(f"{new.name}.old")
+            with _file_errors(path):
+                # The last file replaces the earlier one at once, so that it is never missing.
+                last = new.is_file() and len(done) + 1 == len(moves)
+                if not last and path.exists() and path.is_dir() == new.is_dir():
+                    path.rename(old)
+                done.append((new, path, old))
+                new.replace(path)
     except BaseException:
-        _restore(folder, old)
+        for new, path, old in reversed(done):
+            if not new.exists():
+                path.replace(new)
+            if old.exists():
+                old.rename(path)
         raise
-
-
-def _restore(folder: Path, old: Path) -> None:
-    if folder.exists():
-        folder.rename(old.with_name("failed"))
-    if old.exists():
-        old.rename(folder)

@@ -80,7 +80,7 @@ def write(crowd: CrowdClip, path: Path, question: WalkQuestion, roles: Roles) ->
 
 
 def write_files(crowd: CrowdClip, paths: list[Path], question: WalkQuestion, roles: Roles) -> None:
-    """Write a crowd to several files, each as `write` does, of motions that are computed once.
+    """Write a crowd to several files as `write` does, all or none, of motions computed once.
 
     A temporary file has the motions meanwhile, half a kilobyte a pose, without facts of feet.
     """
@@ -93,8 +93,9 @@ def write_files(crowd: CrowdClip, paths: list[Path], question: WalkQuestion, rol
             for name in names:
                 np.save(file, getattr(batch, name), allow_pickle=False)
         size = file.tell()
-        for path in paths:
-            file.seek(0)
-            left = iter(lambda: file.tell() < size, False)
-            batches = (Motions(**{name: np.load(file) for name in names}) for _ in left)
-            write(replace(crowd, batches=batches), path, question, roles)
+        with atomic_files.together():
+            for path in paths:
+                file.seek(0)
+                left = iter(lambda: file.tell() < size, False)
+                batches = (Motions(**{name: np.load(file) for name in names}) for _ in left)
+                write(replace(crowd, batches=batches), path, question, roles)

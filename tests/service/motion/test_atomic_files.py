@@ -2,6 +2,9 @@
 
 import os
 import resource
+import signal
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -33,15 +36,6 @@ def test_disk_that_fills_up_leaves_the_old_file_and_nothing_else(tmp_path):
     assert str(refusal.value) == f"{target}: cannot be written: File too large"
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
-
-
-def test_place_that_cannot_be_taken_leaves_nothing_behind(tmp_path):
-    taken = tmp_path / "model.onnx"
-    (taken / "inside").mkdir(parents=True)
-    with pytest.raises(FileError) as refusal:
-        atomic_files.write(b"x", taken)
-    assert str(refusal.value) == f"{taken}: cannot be written: Is a directory"
-    assert list(tmp_path.iterdir()) == [taken]
 
 
 def test_reader_never_sees_a_part(tmp_path):
@@ -107,3 +101,48 @@ def test_a_file_and_its_folder_stay_where_one_cannot_be_replaced(tmp_path):
         fill(taken, folder, "new")
     assert seen(tmp_path) == {"crowd_clips/old": "old"}
     assert sorted(tmp_path.iterdir()) == [taken, folder]
+
+
+def test_files_written_together_are_replaced_all_or_none(tmp_path):
+    files = [tmp_path / name for name in ("a.osi", "b.npz", "c.usd")]
+    for path in files[:2]:
+        path.write_text("old")
+    files[2].mkdir()
+
+    def write():
+        with atomic_files.together():
+            for path in files:
+                atomic_files.write(b"new", path)
+                assert not path.is_file() or path.read_text() == "old"
+
+    with pytest.raises(FileError) as refusal:
+        write()
+    assert str(refusal.value) == f"{files[2]}: cannot be written: Is a directory"
+    assert seen(tmp_path) == {"a.osi": "old", "b.npz": "old"}
+    assert sorted(tmp_path.iterdir()) == files
+    files[2].rmdir()
+    write()
+    assert seen(tmp_path) == dict.fromkeys(("a.osi", "b.npz", "c.usd"), "new")
+
+
+KILLED = """
+import os, pathlib, signal, sys
+from posefield.common import atomic_files
+with atomic_files.replacing(pathlib.Path(sys.argv[1])) as file:
+    file.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_process_left_is_removed_and_nothing_else(tmp_path):
+    target, other = tmp_path / "crowd.osi", tmp_path / "other.osi"
+    for path in (target, other):
+        killed = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+        assert killed.returncode == -signal.SIGKILL
+    with atomic_files.replacing(target) as file:
+        file.write_text("slow")
+        atomic_files.write(b"quick", target)
+        assert target.read_text() == "quick"
+    assert target.read_text() == "slow"
+    left = [path.name for folder in tmp_path.glob(".writing.*") for path in folder.iterdir()]
+    assert left == ["other.osi"]
