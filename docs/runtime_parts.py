@@ -4,15 +4,12 @@ from typing import Any
 
 from posefield.constraints import constraint_solver
 from posefield.feet import ball_path, body_plans, limbs, smooth_change, stance_rows
-from posefield.inference import session
 from posefield.locomotion import stride
 from posefield.motion import contact_detection, hinges
 from posefield.synthesis import clip_draft, standing_feet
 
 # Names of TypeScript, and the module and the name of each in Python.
 CONSTANTS: dict[str, tuple[Any, str]] = {
-    "BOUND_MARGIN": (session, "MARGIN"),
-    "BOUND_SLACK": (session, "SLACK"),
     "FPS_RANGE": (clip_draft, "FPS_RANGE"),
     "AFTER_END": (stride, "AFTER_END"),
     "WARP_STEPS": (constraint_solver, "WARP_STEPS"),

@@ -17,8 +17,8 @@ SHARES = (0.0, 0.35, 1.0)
 
 
 def questions(card, level):
-    """Yield controls and a performer: the defaults, a corner, a named performer, and outside."""
-    shares = ({}, 0.9, 0.2, 1.2) if level == 0 else (0.4,)
+    """Yield controls and a performer: the defaults, a corner, and two named performers."""
+    shares = ({}, 0.9, 0.2, 0.7) if level == 0 else (0.4,)
     for index, share in enumerate(shares):
         controls = {
             c.name: c.minimum + share * (c.maximum - c.minimum) if share else c.default

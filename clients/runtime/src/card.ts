@@ -1,69 +1,32 @@
 /** The model card in a file's metadata: what the run time needs of it. */
 
+import type { ModelCard as ServiceCard } from "@posefield/client/types";
 import { ModelError } from "./errors.ts";
 import { metadata } from "./onnx-file.ts";
-
-export type Triple = readonly [number, number, number];
-
-export interface Control {
-  readonly name: string;
-  readonly unit: string;
-  readonly description: string;
-  readonly minimum: number;
-  readonly maximum: number;
-  readonly default: number;
-  /** Quantity of the motion by which the control is measured. */
-  readonly measure?: { readonly quantity: string };
-}
-
-export interface LabelSet {
-  readonly name: string;
-  readonly names: readonly string[];
-}
-
-export interface FootContact {
-  readonly joint: number;
-  readonly height: number;
-  readonly swing: number;
-  readonly longest_swing: number;
-  readonly clearance: number;
-}
+import type { Quaternion, Vector } from "./vectors.ts";
 
 export interface Hinge {
   readonly joint: number;
-  readonly reference: readonly [number, number, number, number];
-  readonly axis: Triple;
-  readonly bone: Triple;
-  readonly low: Triple;
-  readonly high: Triple;
+  readonly reference: Quaternion;
+  readonly axis: Vector;
+  readonly bone: Vector;
+  readonly low: Vector;
+  readonly high: Vector;
 }
 
-/** Metres, seconds, radians, Y up. */
-export interface ModelCard {
-  readonly name: string;
-  readonly description: string;
-  readonly controls: readonly Control[];
-  readonly skeleton: {
-    readonly names: readonly string[];
-    readonly parents: readonly number[];
-    readonly offsets: readonly Triple[];
-    readonly tip_joints: readonly number[];
-    readonly tip_offsets: readonly Triple[];
-  };
-  readonly cyclic: boolean;
-  readonly root: "travelling" | "in_place";
-  readonly frames: number;
-  readonly levels: readonly { readonly joints: readonly number[]; readonly pose: number }[];
+type Texts = "name" | "description" | "roles" | "root";
+type Lists = "controls" | "levels" | "labels" | "examples" | "feet" | "curves" | "contacts";
+type Shared = Required<
+  Pick<ServiceCard, Texts | Lists | "skeleton" | "cyclic" | "frames" | "event">
+>;
+
+/** As the service's, with limits of knees and elbows: metres, seconds, radians, Y up. */
+export interface ModelCard extends Readonly<Shared> {
   readonly durations: readonly [number, number];
-  readonly labels: readonly LabelSet[];
-  readonly examples: readonly (readonly number[])[];
-  readonly feet: readonly number[];
-  readonly roles: Readonly<Record<string, string>>;
-  readonly event: { readonly joint: number; readonly share: number } | null;
-  readonly curves: readonly { readonly name: string }[];
-  readonly contacts: readonly FootContact[];
   readonly hinges: readonly Hinge[];
 }
+
+export type FootContact = ModelCard["contacts"][number];
 
 /** Version of the metadata that this run time reads. */
 const FORMAT = 5;

@@ -1,7 +1,5 @@
 // Generated from the service by docs/generate.py.
 
-export const BOUND_MARGIN = 0.25;
-export const BOUND_SLACK = 1e-6;
 export const FPS_RANGE = [1, 1000] as const;
 export const AFTER_END = 1000000000;
 export const WARP_STEPS = 2048;

@@ -1,6 +1,6 @@
 /** Poses, clips and walkers of a posefield model, computed here by onnxruntime-web. */
 
-export type { Control, FootContact, LabelSet, ModelCard } from "./card.ts";
+export type { ModelCard } from "./card.ts";
 export type { Clip, ClipOptions, Stance } from "./clip.ts";
 export { InvalidField, ModelError, RuntimeFault } from "./errors.ts";
 export { type Controls, type LoadOptions, load, Model, type Options, type Poses } from "./model.ts";

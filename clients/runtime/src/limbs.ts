@@ -130,7 +130,7 @@ function findLimb({ contacts, hinges, skeleton }: ModelCard, contact: number): L
     const known = hinges.find(({ joint }) => joint === middle);
     if (!known || joints.length <= first + 3) continue;
     const end = skeleton.tip_joints.lastIndexOf(tip);
-    const toe = first === 1 && end >= 0 ? skeleton.tip_offsets[end]! : null;
+    const toe = first === 1 && end >= 0 ? vectorAt(skeleton.tip_offsets[end]!, 0) : null;
     return { contact, upper, middle, lower, tip, hinge: new HingeLimits(known), toe };
   }
   return null;

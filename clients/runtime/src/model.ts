@@ -46,6 +46,8 @@ export interface Poses {
 }
 
 const POSE_OUTPUTS = ["rotations", "root_position", "bone_offsets", "duration", "sigma"] as const;
+/** Options of poses, walkers and clips. */
+const OPTIONS = ["performer", "labels", "level", "fps", "loop", "root", "feet"];
 const MOST_POSES = 10_000;
 /** Share by which a duration from another machine may differ. */
 const TIME_SLACK = 1e-5;
@@ -141,19 +143,26 @@ export class Model {
   /** The inputs of the graph for a question; InvalidField for one that cannot be answered. */
   point(controls: Controls, options: Options = {}): Point {
     const { card } = this;
-    const known = card.controls.map(({ name }) => name);
-    const unknown = Object.keys(controls).find((name) => !known.includes(name));
-    if (unknown !== undefined)
-      throw new InvalidField(`controls/${unknown}`, `unknown, expected ${known.join(", ")}`);
-    const row = card.controls.map(({ name, minimum, maximum, unit }) => {
-      const room = 100 * (maximum - minimum);
-      return range(`controls/${name}`, controls[name], minimum - room, maximum + room, unit);
-    });
+    const names = card.controls.map(({ name }) => `controls/${name}`);
+    refuseUnknown(
+      Object.keys(controls).map((name) => `controls/${name}`),
+      names,
+    );
+    refuseUnknown(Object.keys(options), OPTIONS);
+    const row = card.controls.map(({ name, minimum, maximum, unit }) =>
+      range(`controls/${name}`, controls[name], minimum, maximum, unit),
+    );
     const level = options.level ?? 0;
     if (!Number.isInteger(level) || level < 0 || level >= card.levels.length)
       throw new InvalidField("level", `${level}, expected 0 to ${card.levels.length - 1}`);
     return { controls: [row], labels: labelWeights(card, options), level };
   }
+}
+
+function refuseUnknown(fields: readonly string[], known: readonly string[]): void {
+  const unknown = fields.find((field) => !known.includes(field));
+  if (unknown !== undefined)
+    throw new InvalidField(unknown, `unknown, expected ${known.join(", ")}`);
 }
 
 /** A finite number; InvalidField for any other value. */

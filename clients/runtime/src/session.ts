@@ -1,8 +1,7 @@
-/** Runs of parts of a model's graph in onnxruntime, bounded outside the sampled ranges. */
+/** Runs of parts of a model's graph in onnxruntime. */
 
 import type { InferenceSession, Tensor, TensorConstructor } from "onnxruntime-web";
 import type { ModelCard } from "./card.ts";
-import { BOUND_MARGIN, BOUND_SLACK } from "./constants.ts";
 import { ModelError } from "./errors.ts";
 import { selectOutputs } from "./onnx-file.ts";
 
@@ -45,69 +44,18 @@ export class Session {
     this.#providers = providers;
   }
 
-  /**
-   * Outputs of the graph by name, for points (B) and times (B × S), s.
-   *
-   * Outside the sampled ranges controls and durations are bounded as in the service; sigma is that
-   * of the controls as asked.
-   */
+  /** Outputs of the graph by name, for points (B) within the sampled ranges and times (B × S), s. */
   async run<Name extends string>(
-    point: Point,
-    times: Float32Array | readonly number[],
-    ...values: readonly Name[]
-  ): Promise<Record<Name, Float32Array>> {
-    const outside = point.controls.map((row) => this.#isOutside(row));
-    if (!outside.includes(true)) return this.#run(point, times, values);
-    const limited = { ...point, controls: point.controls.map((row) => this.#clip(row, true)) };
-    const nearest = { ...point, controls: point.controls.map((row) => this.#clip(row, false)) };
-    const { duration: raw } = await this.#run(limited, [], ["duration"]);
-    const { duration: inside } = await this.#run(nearest, [], ["duration"]);
-    const [shortest, longest] = this.card.durations;
-    const low = shortest * (1 - BOUND_MARGIN);
-    const high = longest * (1 + BOUND_MARGIN);
-    const bounded = raw.map((seconds, row) =>
-      outside[row]
-        ? Math.min(Math.max(seconds, Math.min(low, inside[row]!)), Math.max(high, inside[row]!))
-        : seconds,
-    );
-    const steps = times.length / point.controls.length;
-    // The graph places a time by the duration that it computes itself.
-    const stretched = Array.from(times, (time, index) => {
-      const row = Math.floor(index / steps);
-      return (time * raw[row]!) / bounded[row]!;
-    });
-    const outputs = await this.#run(limited, stretched, values);
-    const known: Partial<Record<string, Float32Array>> = outputs;
-    if (known["duration"]) known["duration"] = bounded;
-    if (known["sigma"]) known["sigma"] = (await this.#run(point, [], ["sigma"])).sigma;
-    return outputs;
-  }
-
-  #isOutside(row: readonly number[]): boolean {
-    return this.card.controls.some(({ minimum, maximum }, index) => {
-      const slack = BOUND_SLACK * (maximum - minimum);
-      return row[index]! < minimum - slack || row[index]! > maximum + slack;
-    });
-  }
-
-  #clip(row: readonly number[], margin: boolean): number[] {
-    return this.card.controls.map(({ minimum, maximum }, index) => {
-      const room = margin ? BOUND_MARGIN * (maximum - minimum) : 0;
-      return Math.min(Math.max(row[index]!, minimum - room), maximum + room);
-    });
-  }
-
-  async #run<Name extends string>(
     { controls, labels, level }: Point,
     times: Float32Array | readonly number[],
-    values: readonly Name[],
+    ...values: readonly Name[]
   ): Promise<Record<Name, Float32Array>> {
     const session = await this.#part(values, level);
     const rows = controls.length;
     const feeds: Record<string, Tensor> = {
       controls: this.#tensor(controls.flat(), [rows, this.card.controls.length]),
+      time: this.#tensor(times, [rows, times.length / rows]),
     };
-    if (times.length) feeds["time"] = this.#tensor(times, [rows, times.length / rows]);
     if (labels.length) feeds["labels"] = this.#tensor(labels, [1, labels.length]);
     const inputs = Object.entries(feeds).filter(([name]) => session.inputNames.includes(name));
     const outputs = await session.run(Object.fromEntries(inputs));
