@@ -257,6 +257,9 @@ def test_a_pickle_runs_nothing(tmp_path, monkeypatch):
     with pytest.raises(MotionFileError, match="mkdir, expected NumPy arrays"):
         robot_formats.read(path, Conventions())
     assert not (tmp_path / "made-by-a-pickle").exists()
+    path.write_bytes(b"no pickle")
+    with pytest.raises(MotionFileError, match="is no pickle that can be read"):
+        robot_formats.read(path, Conventions())
 
 
 BAD_ROBOTS = {
@@ -267,6 +270,7 @@ BAD_ROBOTS = {
         '<body name="box"><freejoint/><geom size="0.1"/></body></worldbody>',
     ),
     "bodies that float: none": (BIPED, "<mujoco/>"),
+    "does not begin with '<' as XML does": (BIPED, "solid robot"),
     "Error opening file 'gone.xml'": ("<worldbody>", '<include file="gone.xml"/><worldbody>'),
     "Error opening file .*gone.stl": (
         "<worldbody>",
@@ -597,6 +601,11 @@ def test_feasibility_tells_the_commands_that_break_a_limit(limited, family, robo
     assert [row["limit_rad"] for row in figures["commands"]] == [0.0, 0.0, 0.0]
     assert max(row["seam_rad"] for row in figures["commands"]) < 1e-9
     assert page.read_text().count("<img") == len(robot_feasibility.QUANTITIES)
+    words[3] = family / "other.xml"
+    words[3].write_text(BIPED.replace("neck_yaw", "neck_pan"))
+    assert "expected its 9; unlike: neck_pan, neck_yaw" in " ".join(command(*words)[2].split())
+    errors = command("train", family / "0.json", "-o", family / "none.onnx")[2]
+    assert "found a .json file, expected a recipe, .toml" in " ".join(errors.split())
 
 
 HOPPER = """<mujoco><compiler angle="radian"/><worldbody><body name="trunk" pos="0 0 0.54">
@@ -733,7 +742,6 @@ ODD_NUMBER = np.outer(np.arange(41) == 5, np.arange(9) == 2)
 # Format, change of the file's fields, and the words of the refusal.
 BAD_FIELDS = {
     "no rate": ("mjlab.npz", without("fps"), "states no frame rate: say --rate"),
-    "no rates": ("isaaclab.npz", lambda fields: fields | {"fps": []}, "states no frame rate"),
     "layout": ("awd.json", without("Frame_size"), "Frame_size hold no object each"),
     "one frame": (
         "gmr.pkl",
@@ -751,6 +759,11 @@ BAD_FIELDS = {
         "gmr.pkl",
         lambda fields: fields | {"root_rot": fields["root_rot"] * (1.0 + 0.1 * ODD_NUMBER[:, 2:3])},
         "quaternion of frame 5 has norm 1.1",
+    ),
+    "two rates": (
+        "awd.json",
+        lambda fields: fields | {"FrameDuration": 0.01},
+        "states 40 FPS and a FrameDuration of 0.01 s: say --rate",
     ),
     "other robot": (
         "gmr.pkl",
@@ -818,10 +831,9 @@ def test_files_that_cannot_be_read_and_other_robots_are_told_beside_the_others(
     broken = tmp_path / "broken.csv"
     broken.write_text("1,2,three\n")
     code, out, errors = command("doctor", sound, other, broken)
-    assert code == 1
+    assert code == 1 and "1 motion, 0 with faults" in out
     assert "found 7 joints, expected the 9 of" in " ".join(errors.split())
     assert "line 1: found '1,2,three', expected numbers" in " ".join(errors.split())
-    assert "1 motion, 0 with faults" in out
     bent_knee = save(tmp_path, changed(standing(robot), "left_knee", bent), robot, "awd.json")
     assert "limit 1" in command("doctor", bent_knee, "--robot", file)[1].splitlines()[-1]
 

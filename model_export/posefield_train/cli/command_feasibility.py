@@ -9,7 +9,6 @@ import posefield
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.console.options import Json, ModelPath
-from posefield.robots import robot_clip
 from posefield_train.cli import output_files
 
 EXAMPLES = ["feasibility gaits.onnx --robot robot.xml -o gaits.html"]
@@ -37,12 +36,13 @@ def feasibility(
 
     output_files.expect_html(output)
     opened = posefield.load(model)
-    body = robot_clip.require(opened.synthesizer.session.card.robot, "feasibility")
-    dynamics = Dynamics(robot)
+    body, dynamics = opened.synthesizer.session.card.robot, Dynamics(robot)
+    if body is None:
+        raise InvalidField("MODEL", f"{model} is of no robot, expected a recipe with [robot]")
     if dynamics.robot.hinges != body.hinges:
-        raise InvalidField(
-            "--robot", f"{robot.name} has other joints than the model: {len(body.hinges)} expected"
-        )
+        names = sorted({*body.hinges} ^ {*dynamics.robot.hinges}) or ["the order of all"]
+        fault = f"{robot.name} has other joints than the model, expected its {len(body.hinges)}"
+        raise InvalidField("--robot", f"{fault}; unlike: {', '.join(names)}")
     result = robot_feasibility.measure(opened, dynamics, per_control)
     atomic_files.write(result.html(), output)
     atomic_files.write(result.json(), output.with_suffix(".json"))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posefield.common.units import Booleans, Floats
 from posefield.motion.contact_detection import ContactThresholds, detect_contacts
-from posefield.robots.robot import Robot, velocities
+from posefield.robots.robot import HingeAngles, Robot, velocities
 from posefield.robots.robot_motion import LIMIT_TOLERANCE, RobotMotion
 from posefield_train.robots.cycle_search import Cycle
 
@@ -127,12 +127,15 @@ def diagnose(motion: RobotMotion, robot: Robot | None) -> Diagnosis:
     """Return the facts and faults of a motion whose hinges are those of the robot, if given."""
     steps = np.diff(motion.angles, axis=0)
     speeds = np.abs(steps).max(axis=0) * motion.rate
-    changes = np.abs(np.diff(steps, axis=0)) if len(steps) > 1 else np.zeros((1, len(speeds)))
+    changes = np.zeros_like(motion.angles)
+    changes[1:-1] = np.abs(np.diff(steps, axis=0))
     findings = [*_jumps(motion, changes), *_seam(motion, steps)]
     contacts, heights = np.empty((len(motion), 0), bool), np.empty((len(motion), 0))
     slides = heights
     if robot:
-        findings = [*_beyond_limits(motion, robot), *findings]
+        excess = motion.beyond_limits(robot)
+        limits = _of_hinges(motion, "limit", excess, excess > LIMIT_TOLERANCE)
+        findings = [*limits, *findings]
         if robot.feet:
             contacts, heights, slides = _feet(motion, robot)
             findings += _faults_of_feet(robot, contacts, heights, slides)
@@ -140,37 +143,25 @@ def diagnose(motion: RobotMotion, robot: Robot | None) -> Diagnosis:
     return Diagnosis(motion, speeds, accelerations, tuple(findings), contacts, heights, slides)
 
 
-def _beyond_limits(motion: RobotMotion, robot: Robot) -> list[Finding]:
-    excess = motion.beyond_limits(robot)
-    return [
-        Finding(
-            "limit",
-            robot.hinges[hinge],
-            int(np.argmax(excess[:, hinge])),
-            float(np.degrees(excess[:, hinge].max())),
-            "degrees",
-            int((excess[:, hinge] > LIMIT_TOLERANCE).sum()),
-        )
-        for hinge in range(len(robot.hinges))
-        if excess[:, hinge].max() > LIMIT_TOLERANCE
-    ]
+def _jumps(motion: RobotMotion, changes: HingeAngles) -> list[Finding]:
+    usual = np.percentile(changes[1:-1], 90.0, axis=0) if len(changes) > 22 else 0.0
+    return _of_hinges(motion, "jump", changes, (changes > JUMP) & (changes > JUMP_RATIO * usual))
 
 
-def _jumps(motion: RobotMotion, changes: Annotated[Floats, "frames hinges"]) -> list[Finding]:
-    usual = (
-        np.percentile(changes, 90.0, axis=0) if len(changes) > 20 else np.zeros(changes.shape[1])
-    )
-    jumping = (changes > JUMP) & (changes > JUMP_RATIO * usual)
+def _of_hinges(
+    motion: RobotMotion, kind: str, sizes: HingeAngles, faulty: Annotated[Booleans, "frames hinges"]
+) -> list[Finding]:
+    """Return the largest size, rad, of each hinge that is faulty in a frame."""
     return [
         Finding(
-            "jump",
+            kind,
             joint_name(motion, hinge),
-            int(np.argmax(changes[:, hinge])) + 1,
-            float(np.degrees(changes[:, hinge].max())),
+            int(np.argmax(sizes[:, hinge])),
+            float(np.degrees(sizes[:, hinge].max())),
             "degrees",
-            int(jumping[:, hinge].sum()),
+            int(faulty[:, hinge].sum()),
         )
-        for hinge in np.flatnonzero(jumping.any(axis=0)).tolist()
+        for hinge in np.flatnonzero(faulty.any(axis=0)).tolist()
     ]
 
 

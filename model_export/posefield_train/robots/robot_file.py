@@ -63,8 +63,12 @@ def model_of(path: Path) -> "mujoco.MjModel":
         raise MotionFileError(
             str(path), "robots are read by MuJoCo: pip install 'posefield[robots]'"
         ) from None
+    expected = "expected an MJCF or URDF file"
     if not path.is_file():
-        raise MotionFileError(str(path), "no such file, expected an MJCF or URDF file")
+        fault = "is a folder" if path.is_dir() else "no such file"
+        raise MotionFileError(str(path), f"{fault}, {expected}")
+    if not path.read_bytes().lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+        raise MotionFileError(str(path), f"does not begin with '<' as XML does: {expected}")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         # The links of a URDF file stay, and its base floats.

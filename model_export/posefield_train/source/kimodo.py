@@ -139,7 +139,9 @@ def _numbers(fields: dict[str, np.ndarray], name: str, rank: int, source: str) -
     if values is None or values.ndim != rank or values.shape[-1] != 3 or not len(values):
         shape = "none" if values is None else str(values.shape)
         raise MotionFileError(
-            source, f"found {shape} as field {name!r}, expected {rank} axes, the last of 3 (Kimodo)"
+            source,
+            f"found {shape} as field {name!r}, expected {rank} axes, the last of 3 (Kimodo); "
+            "reference motions of robots are read by posefield doctor",
         )
     numbers = np.asarray(values, dtype=np.float64)
     if not np.isfinite(numbers).all():

@@ -306,6 +306,9 @@ TOO_DEEP = "tables or arrays nested too deep, expected at most five levels"
 
 def read(path: Path) -> Recipe:
     """Return the recipe of a TOML file; RecipeError names the invalid key."""
+    if path.suffix not in ("", ".toml"):
+        fault = f"found a {path.suffix} file, expected a recipe, .toml: posefield init drafts one"
+        raise RecipeError(path, fault)
     content = data_folder.read(path, MAX_BYTES, "a recipe")
     try:
         text = content.decode("utf-8-sig")

@@ -225,8 +225,12 @@ def _loops(file: File) -> bool:
 
 
 def _frame_rate(file: File) -> tuple[float, str]:
-    duration = _number(file, "FrameDuration")
-    return file.rate(_number(file, "FPS") or (1.0 / duration if duration else None), "")
+    rate, duration = _number(file, "FPS"), _number(file, "FrameDuration")
+    # Both are rounded.
+    agree = rate is None or duration is None or abs(rate * duration - 1.0) < 0.05
+    if not (agree or file.conventions.rate):
+        raise file.error(f"states {rate:g} FPS and a FrameDuration of {duration:g} s: say --rate")
+    return file.rate(rate or (1.0 / duration if duration else None), "")
 
 
 def from_awd(file: File) -> RobotMotion:

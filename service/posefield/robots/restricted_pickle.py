@@ -28,7 +28,7 @@ class _Stream:
 
 def _plain(dtype: "np.dtype[Any]") -> "np.dtype[Any]":
     if dtype.hasobject:
-        raise pickle.UnpicklingError("an array of Python objects")
+        raise PermissionError("an array of Python objects")
     return dtype
 
 
@@ -38,15 +38,12 @@ def _empty_array(*_: Any) -> Array:
 
 
 def _array_of_bytes(content: Any, dtype: Any, shape: tuple[int, ...], order: str) -> Array:
-    return np.frombuffer(content, _plain(np.dtype(dtype))).reshape(shape, order=_order(order))
+    rows = np.frombuffer(content, _plain(np.dtype(dtype)))
+    return rows.reshape(shape, order="F" if order == "F" else "C")
 
 
 def _scalar(dtype: "np.dtype[Any]", content: bytes = b"") -> Any:
     return np.frombuffer(content, _plain(dtype))[0].item()
-
-
-def _order(order: str) -> Any:
-    return "F" if order == "F" else "C"
 
 
 class _JoblibArray:
@@ -89,7 +86,7 @@ class _Unpickler(pickle.Unpickler):
         try:
             return self.known[module, name]
         except KeyError:
-            raise pickle.UnpicklingError(f"{module}.{name}") from None
+            raise PermissionError(f"{module}.{name}") from None
 
 
 def load(content: bytes, source: str) -> Any:
@@ -99,7 +96,7 @@ def load(content: bytes, source: str) -> Any:
     """
     try:
         value = _Unpickler(_Stream(content)).load()
-    except pickle.UnpicklingError as fault:
+    except PermissionError as fault:
         raise MotionFileError(
             source,
             f"holds {fault}, expected NumPy arrays, numbers, text and plain containers: nothing "
