@@ -1,17 +1,7 @@
 /** All levels of detail side by side at the same moment, with the error of each as seen from here. */
 
 import type { ClipQuestion, ModelCard, Motion } from "@posefield/client";
-import {
-  BufferAttribute,
-  BufferGeometry,
-  Color,
-  Group,
-  LineBasicMaterial,
-  LineSegments,
-  MeshStandardMaterial,
-  type PerspectiveCamera,
-  Vector3,
-} from "three";
+import { Color, Group, MeshStandardMaterial, type PerspectiveCamera, Vector3 } from "three";
 
 import { farEnough, type Ladder, type Lens, ladder, lens, withLevel } from "./detail.ts";
 import { el } from "./dom.ts";
@@ -51,7 +41,7 @@ class Levels {
     const { card, scene, signal, store } = session;
     this.#ladder = ladder(card);
     this.#figures = card.levels.map((_, level) => new LevelFigure(session, level));
-    for (const { body, bones } of this.#figures) this.#group.add(body, bones);
+    for (const { body } of this.#figures) this.#group.add(body);
     this.#group.visible = false;
     this.#host.append(...this.#figures.map(({ note }) => note));
     scene.root.add(this.#group);
@@ -120,8 +110,7 @@ class Levels {
     const aside = spacing(camera, orbit.target, this.#figures.length);
     const middle = (this.#figures.length - 1) / 2;
     for (const [level, figure] of this.#figures.entries()) {
-      const shift = aside.clone().multiplyScalar(level - middle);
-      figure.place(time, shift, this.#figures[0]!.joints);
+      figure.place(time, aside.clone().multiplyScalar(level - middle));
     }
     this.#since += seconds;
     if (this.#since > READING || !playing) {
@@ -135,11 +124,10 @@ class Levels {
   }
 }
 
-/** One level's character, with the finest level's bones as lines over it, and its note. */
+/** One level's character, and its note. */
 class LevelFigure {
   readonly body: SkinnedBody;
   readonly joints: Joints;
-  readonly bones: LineSegments<BufferGeometry, LineBasicMaterial>;
   readonly note: HTMLElement;
   motion: Motion | null = null;
   readonly #level: number;
@@ -152,28 +140,15 @@ class LevelFigure {
     this.body = new SkinnedBody(card, character, [this.#material]);
     // The light's shadows reach as far as one body.
     for (const skin of this.body.children) skin.castShadow = false;
-    const joints = card.skeleton.parents.length;
     this.joints = new Joints(card.skeleton.parents);
-    this.bones = new LineSegments(
-      new BufferGeometry().setAttribute(
-        "position",
-        new BufferAttribute(new Float32Array(6 * joints), 3),
-      ),
-      new LineBasicMaterial({ depthTest: false, transparent: true, opacity: 0.9 }),
-    );
-    this.bones.frustumCulled = false;
-    this.bones.renderOrder = 1;
-    this.bones.visible = level > 0;
     this.note = note(level, card, this.#now, this.#from);
   }
 
   tint(): void {
     this.#material.color = new Color(theme.levelColour(this.#level));
-    this.bones.material.color.set(theme.colour("--ink"));
   }
 
-  /** finest: joints of level 0. */
-  place(time: number, shift: Vector3, finest: Joints): void {
+  place(time: number, shift: Vector3): void {
     const { boneOffsets, frames, parents, rate, rootPosition, rotations } = this.motion!;
     const frame = Math.min(frames - 1, Math.max(0, Math.round(time * rate)));
     this.joints.place(this.motion!, frame);
@@ -184,16 +159,9 @@ class LevelFigure {
       offsets: boneOffsets,
     });
     this.body.position.copy(shift);
-    if (!this.bones.visible) return;
-    this.bones.position.copy(shift);
-    const ends = this.bones.geometry.getAttribute("position") as BufferAttribute;
-    parents.forEach((parent, joint) => {
-      finest.position(Math.max(0, parent), ONE).toArray(ends.array, 6 * joint);
-      finest.position(joint, ONE).toArray(ends.array, 6 * joint + 3);
-    });
-    ends.needsUpdate = true;
   }
 
+  /** finest: joints of level 0. */
   describe(camera: PerspectiveCamera, seen: Lens, ladder: Ladder, finest: Joints): void {
     const { most, rms } = apart(camera, seen.height, finest, this.joints, this.body.position);
     const now = `${pixels(rms)} px, worst ${pixels(most)}`;
@@ -204,8 +172,6 @@ class LevelFigure {
   dispose(): void {
     this.body.dispose();
     this.#material.dispose();
-    this.bones.geometry.dispose();
-    this.bones.material.dispose();
   }
 }
 
