@@ -34,7 +34,7 @@ from scipy.optimize import minimize
 import posefield
 import posefield_train
 from posefield.motion import cycle_velocities, quat
-from posefield.reference.motion_plan import Arrays, Evaluator, ReferenceModel
+from posefield.reference.motion_plan import Evaluator, ReferenceModel
 from posefield.robots import robot_clip
 from posefield.robots.robot import Robot
 from posefield.robots.robot_motion import RobotMotion
@@ -294,8 +294,7 @@ def of_all(gaits: Gaits, folder: Path) -> dict[str, float]:
     path = folder / "model.onnx"
     posefield_train.export(training.train_examples(gaits.family, list(gaits.examples)), path)
     model = posefield.load(path)
-    arrays = Arrays(np, np.asarray, lambda a: a.astype(int), lambda rows, at: rows[at])
-    evaluator = Evaluator(ReferenceModel(path), arrays, arrays)
+    evaluator = Evaluator(ReferenceModel(path))
     captured, draws = gaits.commands, np.random.default_rng(5)
     corners = captured[draws.integers(0, len(captured), (BETWEEN, 4))]
     between = np.einsum("ek,ekd->ed", draws.dirichlet(np.ones(4), BETWEEN), corners)

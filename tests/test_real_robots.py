@@ -15,7 +15,7 @@ from serving import POSEFIELD
 import posefield
 from posefield.common.errors import InvalidField, ModelError, MotionFileError
 from posefield.motion import quat
-from posefield.reference.motion_plan import Arrays, Evaluator, Plan, ReferenceModel
+from posefield.reference.motion_plan import Evaluator, Plan, ReferenceModel
 from posefield.registry import model_registry
 from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
@@ -172,14 +172,9 @@ def mixed_commands(card, count):
     return np.vstack([mixed, commands[:2], 1.4 * commands.max(axis=0)])
 
 
-def numpy_evaluator(path):
-    arrays = Arrays(np, np.asarray, lambda a: a.astype(int), lambda rows, indices: rows[indices])
-    return Evaluator(ReferenceModel(path), arrays, arrays)
-
-
 def test_soles_are_on_the_floor_all_over_the_captured_commands(model):
     """Turns on the spot among them are predicted with soles 4.5 mm below it."""
-    evaluator, given = numpy_evaluator(model), ReferenceModel(model)
+    evaluator, given = Evaluator(ReferenceModel(model)), ReferenceModel(model)
     axes = np.linspace(given.bounds.low, given.bounds.high, 5).T
     plan = evaluator.plan(np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3))
     for phase in np.arange(120) / 120:
@@ -191,7 +186,7 @@ def test_soles_are_on_the_floor_all_over_the_captured_commands(model):
 @KINDS
 def test_the_evaluator_of_training_loops_gives_the_answers_of_the_service(kind, request):
     model = request.getfixturevalue(kind)
-    opened, evaluator = posefield.load(model), numpy_evaluator(model)
+    opened, evaluator = posefield.load(model), Evaluator(ReferenceModel(model))
     card = opened.synthesizer.session.card
     commands, names = mixed_commands(card, 6), [control.name for control in card.controls]
     plan = evaluator.plan(commands)
@@ -261,7 +256,7 @@ np.savez(sys.argv[3], slopes=slopes, **answer._asdict())
 
 
 def test_jax_agrees_with_numpy_and_passes_gradients(model, tmp_path):
-    evaluator, (commands, phase) = numpy_evaluator(model), single_precision_inputs(model)
+    evaluator, (commands, phase) = Evaluator(ReferenceModel(model)), single_precision_inputs(model)
     plan = evaluator.plan(commands)
     expected = evaluator.sample(plan, phase)
     np.savez(tmp_path / "inputs.npz", commands=commands, phase=phase)
@@ -285,11 +280,14 @@ def test_torch_agrees_with_numpy_and_passes_gradients(model):
     torch = pytest.importorskip("torch")
     from posefield.reference import torch as in_torch
 
-    evaluator, (commands, phase) = numpy_evaluator(model), single_precision_inputs(model)
+    evaluator, (commands, phase) = Evaluator(ReferenceModel(model)), single_precision_inputs(model)
     torch_motion = in_torch.ReferenceMotion(model)
     moving = torch.tensor(commands, dtype=torch.float32)
     answer = torch_motion.sample(moving, torch.tensor(phase))
-    assert_agree(answer, evaluator.sample(evaluator.plan(commands), phase))
+    expected = evaluator.sample(evaluator.plan(commands), phase)
+    assert_agree(answer, expected)
+    poses = torch_motion.body_poses(answer), evaluator.body_poses(expected)
+    np.testing.assert_allclose(*poses, atol=1e-5)
     # Commands that change are planned again, and only they.
     changed = moving.flip(0)
     changed[0] = moving[0]

@@ -22,7 +22,7 @@ from posefield.inference import session
 from posefield.model_file import card_check, checked_file
 from posefield.motion import cycle_velocities, quat
 from posefield.motion.clip import Clip
-from posefield.reference.motion_plan import Arrays, Evaluator, ReferenceModel
+from posefield.reference.motion_plan import Evaluator, ReferenceModel
 from posefield.registry import model_registry
 from posefield.robots import robot_clip, robot_formats
 from posefield.robots.file_conventions import Conventions
@@ -478,10 +478,13 @@ def measured(robot, tmp_path_factory):
 
 def test_commands_that_are_measured_are_met_exactly(measured, robot):
     model = posefield.load(measured)
-    arrays = Arrays(np, np.asarray, lambda a: a.astype(int), lambda rows, indices: rows[indices])
-    evaluator = Evaluator(ReferenceModel(measured), arrays, arrays)
+    evaluator = Evaluator(ReferenceModel(measured))
     commands = np.array([[0.31, 0.2], [0.55, -0.33], [0.7, 0.0]])
     plan = evaluator.plan(commands)
+    goal = evaluator.sample(plan, np.array([0.2, -0.4, 1.7]))
+    positions, turns = robot.body_poses(*goal[2:4], goal.joint_positions)
+    expected = np.concatenate([quat.to_matrix(turns), positions[..., None]], axis=-1)
+    np.testing.assert_allclose(evaluator.body_poses(goal), expected, atol=1e-6)
     ways = plan.travels[:, [1, 0, 2]]
     planned = cycle_velocities.of_travels(np, ways, plan.durations)
     np.testing.assert_allclose(planned[:, 1:], commands, atol=1e-12)

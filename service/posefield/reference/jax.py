@@ -22,7 +22,6 @@ class ReferenceMotion(Evaluator):
     dtype: of the arrays, on JAX's default device; double precision needs `jax_enable_x64`. labels:
     name by label set, such as a style. Raises ModelError for a file that is no robot's gaits.
 
-    Attributes: controls, hinges and feet are names in the order of commands, joints and contacts.
     Both methods are pure and compiled; inside `jax.jit` they become part of it.
     """
 
@@ -30,7 +29,6 @@ class ReferenceMotion(Evaluator):
         self, path: str | Path, *, dtype: Any = jnp.float32, labels: Mapping[str, Any] | None = None
     ) -> None:
         model = ReferenceModel(path, labels)
-        self.controls, self.hinges, self.feet = model.controls, model.hinges, model.feet
         arrays = Arrays(
             jnp,
             partial(jnp.asarray, dtype=dtype),

@@ -24,7 +24,7 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion import cycle_velocities, quat
 from posefield.motion.cycle_velocities import QUANTITIES
 from posefield.reference import array_rotations as rotations
-from posefield.robots import robot_clip
+from posefield.robots import robot_clip, standing_soles
 from posefield.robots.standing_soles import Array, StandingSoles
 from posefield.validation import question_validation
 
@@ -43,6 +43,9 @@ class Arrays(NamedTuple):
     constant: Callable[[Floats], Array]
     whole: Callable[[Array], Array]
     take: Callable[[Array, Array], Array]
+
+
+NUMPY = Arrays(np, np.asarray, lambda a: a.astype(int), lambda rows, indices: rows[indices])
 
 
 class Plan(NamedTuple):
@@ -227,19 +230,25 @@ class Evaluator:
     """Evaluation of a model by one module of arrays.
 
     fine: arrays in which plans are made. fast: those in which feet are solved, and samples made.
+
+    Attributes: controls, hinges, feet and bodies are names in the order of commands, joints,
+    contacts and poses of bodies.
     """
 
-    def __init__(self, model: ReferenceModel, fine: Arrays, fast: Arrays) -> None:
+    def __init__(self, model: ReferenceModel, fine: Arrays = NUMPY, fast: Arrays = NUMPY) -> None:
         self._model, self._xp = model, fine.xp
+        self.controls, self.hinges, self.feet = model.controls, model.hinges, model.feet
+        self.bodies = model.robot.bodies
         constants = model.constants()
         self._splits = [int(end) for end in constants.pop("splits")]
         self._fine = {name: fine.constant(values) for name, values in constants.items()}
         self._fast = {
             name: fast.constant(constants[name])
-            for name in ("warp_breaks", "base", "joint_sigma", "products", "ranges")
+            for name in ("warp_breaks", "base", "joint_sigma", "products", "matrices", "ranges")
         }
+        links = (standing_soles.links(model.robot, [body]) for body in range(1, len(self.bodies)))
+        self._links = [(hinges, *map(fast.constant, arrays)) for hinges, *arrays in links]
         self._whole, self._take, self._steps = fast.whole, fast.take, model.card.frames - 1
-        self._hinges, self._feet = len(model.hinges), len(model.feet)
         self._single = fast.constant
         soles = model.card.soles
         self._soles = StandingSoles(fast.xp, fast.constant, model.robot, soles, self._steps)
@@ -324,7 +333,7 @@ class Evaluator:
         moves = xp.stack([path[:, 1:] - path[:, :-1], spins], 2)
         moves = central(xp, moves, travel[:, 2:]).reshape(*path.shape[:2], 6)
         turned = central(xp, angles[:, 1:] - angles[:, :-1], None)
-        contacts = w["contacts"] + 0.0 * numbers[..., : self._feet]
+        contacts = w["contacts"] + 0.0 * numbers[..., : len(self.feet)]
         return xp.concatenate([numbers[..., :6], angles, turned, moves, contacts], -1)
 
     def sample(self, plan: Plan, phase: Array) -> Reference:
@@ -343,7 +352,7 @@ class Evaluator:
         share = (frame - first)[:, None]
         before, after = (self._take(flat, index) for index in (at, at + 1))
         row = before + share * (after - before)
-        h = self._hinges
+        h = len(self.hinges)
         numbers, changes = row[:, : 6 + h], row[:, 6 + h : 12 + 2 * h] * pace[:, None]
         done = (frame / steps)[:, None]
         path, turns = placed(xp, w, numbers[:, None], plan.travels, done)
@@ -362,6 +371,24 @@ class Evaluator:
             plan.supported + 0.0,
             plan.travels + 0.0,
         )
+
+    def body_poses(self, reference: Reference) -> Array:
+        """Return matrices (E, B, 3, 4) of all bodies: rotations, and positions, m, behind them.
+
+        They lead from the frame of each body to that of the reference's base.
+        """
+        xp, turns = self._xp, reference.base_rotations
+        turned = rotations.bilinear(turns, turns, self._fast["matrices"]).reshape(-1, 3, 3)
+        poses = [xp.concatenate([turned, reference.base_positions[..., None]], -1)]
+        angles = reference.joint_positions[..., None]
+        shares = xp.concatenate([angles * 0.0 + 1.0, xp.sin(angles), 1.0 - xp.cos(angles)], -1)
+        parents = self._model.robot.parents[1:]
+        for parent, (hinges, links, fixed) in zip(parents, self._links, strict=True):
+            pose = poses[parent]
+            for hinge, link in zip(hinges, links, strict=True):
+                pose = pose @ (shares[:, hinge] @ link.T).reshape(-1, 4, 4)
+            poses.append(pose @ fixed)
+        return xp.stack(poses, 1)
 
 
 def placed(

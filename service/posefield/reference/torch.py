@@ -23,8 +23,6 @@ class ReferenceMotion(Evaluator):
     device, dtype: of the tensors that are taken and returned. Cycles are predicted in double
     precision, or in `dtype` on a device that lacks it; feet are solved in `dtype`. labels: name by
     label set, such as a style. Raises ModelError for a file that is no robot's gaits.
-
-    Attributes: controls, hinges and feet are names in the order of commands, joints and contacts.
     """
 
     def __init__(
@@ -38,7 +36,6 @@ class ReferenceMotion(Evaluator):
         device = torch.device(device)
         double = dtype if device.type == "mps" else torch.float64
         model = ReferenceModel(path, labels)
-        self.controls, self.hinges, self.feet = model.controls, model.hinges, model.feet
         self._double, self._dtype = double, dtype
         self._planned = torch.empty(0, len(model.controls), dtype=dtype, device=device)
         self._plan: Plan | None = None

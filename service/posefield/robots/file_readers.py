@@ -33,9 +33,8 @@ def from_tracking(file: File) -> RobotMotion:
     bodies = file.array("body_pos_w", len(angles), None, 3)
     turns = file.array("body_quat_w", len(angles), bodies.shape[1], 4)[:, 0]
     ordered, order = tell_order(file, angles, bodies, turns)
-    name = "beyondmimic.npz" if order.startswith("breadth") else "mjlab.npz"
-    if file.conventions.order:
-        name = "beyondmimic.npz" if file.conventions.order == "breadth" else "mjlab.npz"
+    breadth = (file.conventions.order or order).startswith("breadth")
+    name = "beyondmimic.npz" if breadth else "mjlab.npz"
     return file.motion(name, (bodies[:, 0], turns, ordered), _rate(file), order, WXYZ)
 
 
@@ -101,8 +100,7 @@ def from_loco_joints(file: File) -> RobotMotion:
 def from_qpos(file: File) -> RobotMotion:
     """Return the motion of MuJoCo's coordinates."""
     columns = file.array("qpos", None, None)
-    hinges: tuple[str, ...] = ()
-    joints = UNNAMED
+    hinges, joints = tuple[str, ...](), UNNAMED
     if "joint_names" in file.content:
         # The first joint of a trajectory is the free one of the base.
         hinges, joints = file.names("joint_names")[1:], NAMED
@@ -143,11 +141,8 @@ def from_kimodo(file: File) -> RobotMotion:
         raise file.error(
             "holds rotations of the robot G1, no angles: expected the robot too (--robot g1.xml)"
         )
-    turns = quat.from_matrix(
-        file.array("global_rot_mats", len(positions), joints, 3, 3)[..., [2, 0, 1], :][
-            ..., [2, 0, 1]
-        ]
-    )
+    matrices = file.array("global_rot_mats", len(positions), joints, 3, 3)
+    turns = quat.from_matrix(matrices[..., [2, 0, 1], :][..., [2, 0, 1]])
     angles, off_axis = [], []
     for hinge, name in enumerate(robot.hinges):
         body = robot.hinge_bodies[hinge]
@@ -165,12 +160,10 @@ def from_kimodo(file: File) -> RobotMotion:
             )
     rate = file.rate(None, " (Kimodo's files have 30)")
     left_out = np.degrees(max(off_axis))
-    joints_from = f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out"
+    evidence = f"turns about the hinges; up to {left_out:.1f} degrees (mean) are left out"
     unwrapped = np.unwrap(np.stack(angles, axis=-1), axis=0)
     poses = positions[:, 0, [2, 0, 1]], turns[:, 0], unwrapped
-    return file.motion(
-        "kimodo.npz", poses, rate, joints_from, "none: matrices", hinges=robot.hinges
-    )
+    return file.motion("kimodo.npz", poses, rate, evidence, "none: matrices", hinges=robot.hinges)
 
 
 def _kimodo_joint(file: File, robot: Robot, body: int) -> int:
@@ -201,12 +194,10 @@ def from_mimickit(file: File) -> RobotMotion:
         raise file.error(
             f"found {frames.shape[1]} numbers a frame, expected 6 of the base and more"
         )
-    poses, loops = (
-        (frames[:, :3], quat.exp(frames[:, 3:6]), frames[:, 6:]),
-        file.content["loop_mode"],
-    )
+    poses = frames[:, :3], quat.exp(frames[:, 3:6]), frames[:, 6:]
+    loops = bool(file.content["loop_mode"])
     quaternions = "none: rotation vectors"
-    return file.motion("mimickit.pkl", poses, _rate(file), UNNAMED, quaternions, loops=bool(loops))
+    return file.motion("mimickit.pkl", poses, _rate(file), UNNAMED, quaternions, loops=loops)
 
 
 def from_asap(file: File) -> RobotMotion:

@@ -3,6 +3,7 @@
 import io
 import json
 import pickle
+from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, Any
 
@@ -51,62 +52,57 @@ def _npz(**fields: Any) -> bytes:
     return buffer.getvalue()
 
 
-def _body_fields(motion: RobotMotion, robot: Robot) -> dict[str, Floats]:
-    """Return poses and velocities of all bodies, depth first."""
+BODY_FIELDS = ("body_pos_w", "body_quat_w", "body_lin_vel_w", "body_ang_vel_w")
+
+
+def _body_fields(
+    motion: RobotMotion, robot: Robot, names: Sequence[str] = BODY_FIELDS, order: Order = "depth"
+) -> dict[str, Floats]:
+    """Return positions, rotations and velocities of all bodies in an order, by names of fields."""
     positions, rotations = motion.body_poses(robot)
-    return {
-        "positions": positions,
-        "rotations": rotations,
-        "linear": velocities(positions, motion.rate),
-        "angular": angular_velocities(rotations, motion.rate),
-    }
+    rates = velocities(positions, motion.rate), angular_velocities(rotations, motion.rate)
+    arrays, bodies = (positions, rotations, *rates), robot.body_order(order)
+    return {name: array[:, bodies] for name, array in zip(names, arrays, strict=True)}
 
 
 def write_tracking(motion: RobotMotion, robot: Robot, order: Order) -> bytes:
     """Return poses and velocities of all bodies and unnamed joints, in an order."""
-    hinges, bodies = robot.hinge_order(order), robot.body_order(order)
-    fields = _body_fields(motion, robot)
+    hinges = robot.hinge_order(order)
     return _npz(
         fps=np.array([motion.rate]),
         joint_pos=motion.angles[:, hinges],
         joint_vel=velocities(motion.angles, motion.rate)[:, hinges],
-        body_pos_w=fields["positions"][:, bodies],
-        body_quat_w=fields["rotations"][:, bodies],
-        body_lin_vel_w=fields["linear"][:, bodies],
-        body_ang_vel_w=fields["angular"][:, bodies],
+        **_body_fields(motion, robot, order=order),
     )
 
 
 def write_holosoma(motion: RobotMotion, robot: Robot) -> bytes:
     """Return MuJoCo's coordinates with poses and names of joints and bodies."""
-    fields = _body_fields(motion, robot)
     speeds = velocities(motion.angles, motion.rate)
     return _npz(
         fps=np.array([motion.rate]),
         joint_pos=_qpos(motion),
         joint_vel=np.hstack([_base_velocities(motion), speeds]),
-        body_pos_w=fields["positions"],
-        body_quat_w=fields["rotations"],
-        body_lin_vel_w=fields["linear"],
-        body_ang_vel_w=fields["angular"],
+        **_body_fields(motion, robot),
         joint_names=np.array(robot.hinges),
         body_names=np.array(robot.bodies),
     )
 
 
+ISAACLAB_FIELDS = [
+    f"body_{kind}" for kind in ("positions", "rotations", "linear_velocities", "angular_velocities")
+]
+
+
 def write_isaaclab(motion: RobotMotion, robot: Robot) -> bytes:
     """Return angles of named joints, and poses of named bodies."""
-    fields = _body_fields(motion, robot)
     return _npz(
         fps=np.array(motion.rate),
         dof_names=np.array(robot.hinges),
         body_names=np.array(robot.bodies),
         dof_positions=motion.angles,
         dof_velocities=velocities(motion.angles, motion.rate),
-        body_positions=fields["positions"],
-        body_rotations=fields["rotations"],
-        body_linear_velocities=fields["linear"],
-        body_angular_velocities=fields["angular"],
+        **_body_fields(motion, robot, ISAACLAB_FIELDS),
     )
 
 
@@ -153,9 +149,8 @@ def write_gmr(motion: RobotMotion, robot: Robot) -> bytes:
 def write_mimickit(motion: RobotMotion, _: Robot) -> bytes:
     """Return a pickle of rows with rotation vectors."""
     frames = np.hstack([motion.base_path, quat.log(motion.base_rotations), motion.angles])
-    return _pickle(
-        {"loop_mode": int(bool(motion.loops)), "fps": motion.rate, "frames": frames.tolist()}
-    )
+    loops = int(bool(motion.loops))
+    return _pickle({"loop_mode": loops, "fps": motion.rate, "frames": frames.tolist()})
 
 
 def write_asap(motion: RobotMotion, robot: Robot) -> bytes:

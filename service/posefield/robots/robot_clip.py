@@ -59,16 +59,9 @@ class RobotSkeleton:
         turns = np.round((angles.mean(axis=0) - middles) / (2.0 * np.pi))
         base = clip.rotations[:, 0]
         rotations = np.concatenate([base[:, :1], _to_z_up(base[:, 1:])], axis=-1)
-        return RobotMotion(
-            source,
-            "clip",
-            _to_z_up(clip.root_path),
-            rotations,
-            angles - 2.0 * np.pi * turns,
-            clip.rate,
-            self.robot.hinges,
-            loops,
-        )
+        path, angles = _to_z_up(clip.root_path), angles - 2.0 * np.pi * turns
+        hinges = self.robot.hinges
+        return RobotMotion(source, "clip", path, rotations, angles, clip.rate, hinges, loops)
 
 
 def require(robot: Robot | None, name: str) -> Robot:

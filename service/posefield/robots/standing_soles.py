@@ -107,7 +107,7 @@ class LegGroup:
         steps: int,
         group: list[Leg],
     ) -> None:
-        chains, self._xp = [_links(robot, leg.bodies) for leg in group], xp
+        chains, self._xp = [links(robot, leg.bodies) for leg in group], xp
         self._turning = [chains[0][0].index(hinge) for hinge in group[0].hinges]
         self._links = constant(np.stack([links for _, links, _ in chains]))
         identity, turned = np.eye(len(robot.hinges)), [h for leg in group for h in leg.hinges]
@@ -179,7 +179,7 @@ class LegGroup:
         return system.reshape(-1, system.shape[-1]).T @ self._columns
 
 
-def _links(robot: Robot, bodies: Sequence[int]) -> tuple[list[int], Floats, Floats]:
+def links(robot: Robot, bodies: Sequence[int]) -> tuple[list[int], Floats, Floats]:
     """Return the hinges of a chain, their links (c, 16, 3), and the transform behind the last.
 
     A link is its first matrix, the second times the sine, and the third by one less the cosine.
