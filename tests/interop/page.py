@@ -61,12 +61,12 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
 
 
 def _passed(node: Path, file: Path, told: dict[str, str]) -> bool:
-    """Return whether the tests of a file pass at the first or the second try."""
+    """Return whether the tests of a file pass at one of three tries."""
     # One after the other: they measure. A browser that draws with the processor, beside other work,
-    # may miss a wait of some seconds; what fails twice is a fault, and what fails once is said.
+    # may miss a wait of some seconds; what fails thrice is a fault, and what fails once is said.
     options = ("--test-concurrency=1", "--test-timeout=300000", "--test-reporter=spec")
     command = [node, "--test", *options, file]
-    for _ in range(2):
+    for _ in range(3):
         done = subprocess.run(command, cwd=CLIENTS, env=os.environ | told, text=True)
         if done.returncode == 0:
             return True

@@ -11,7 +11,7 @@ import { after, before, test } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
-import { browser } from "../../viewer/test/harness.ts";
+import { blank, browser } from "../../viewer/test/harness.ts";
 
 const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "posefield";
 const TYPES: Record<string, string> = {
@@ -42,7 +42,7 @@ before(async () => {
   await new Promise<void>((ready) => server.listen(0, "127.0.0.1", ready));
   address = `http://127.0.0.1:${(server.address() as AddressInfo).port}/any/where/`;
   chromium = await browser();
-  page = await chromium.newPage({ viewport: { width: 900, height: 560 } });
+  page = await blank(chromium, { viewport: { width: 900, height: 560 } });
   page.on("pageerror", (fault) => faults.push(String(fault)));
   page.on("console", (line) => {
     if (line.type() === "error") faults.push(line.text());
@@ -171,7 +171,7 @@ test("a model that the page does not have is told in a sentence", async () => {
 });
 
 test("a finger on the disc steers a walker", async () => {
-  const phone = await chromium.newPage({ hasTouch: true, isMobile: true, viewport: PHONE });
+  const phone = await blank(chromium, { hasTouch: true, isMobile: true, viewport: PHONE });
   await phone.goto(address);
   await phone.getByLabel("View").selectOption("walk");
   const disc = (await phone.locator(".disc").boundingBox())!;
@@ -203,7 +203,7 @@ test("a file that is missing, or another one, is told in a sentence", async () =
   ] as const) {
     change();
     // Without the cache of another page.
-    const fresh = await chromium.newPage();
+    const fresh = await blank(chromium);
     await fresh.goto(address);
     await fresh.locator("#told", { hasText: sentence }).waitFor();
     await fresh.close();

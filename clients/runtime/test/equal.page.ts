@@ -10,7 +10,7 @@ import { fileURLToPath } from "node:url";
 import type { Browser, CDPSession, Page } from "playwright-core";
 import { build } from "vite";
 
-import { browser } from "../../viewer/test/harness.ts";
+import { blank, browser } from "../../viewer/test/harness.ts";
 import type { Differences, ModelAnswers } from "./answers.ts";
 
 const FILE = process.env["POSEFIELD_ANSWERS"]!;
@@ -41,7 +41,7 @@ before(async () => {
   });
   await new Promise<void>((ready) => server.listen(0, "127.0.0.1", ready));
   chromium = await browser();
-  page = await chromium.newPage();
+  page = await blank(chromium);
   await page.goto(`http://127.0.0.1:${(server.address() as AddressInfo).port}/`);
   await page.waitForFunction(() => "posefield" in globalThis);
 });

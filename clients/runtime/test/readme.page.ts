@@ -10,7 +10,7 @@ import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { build } from "vite";
 
-import { browser } from "../../viewer/test/harness.ts";
+import { blank, browser } from "../../viewer/test/harness.ts";
 
 const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "posefield";
 const PACKAGE = fileURLToPath(new URL("../", import.meta.url));
@@ -48,7 +48,7 @@ test("the page of the README shows a figure that keys move", async () => {
   await new Promise<void>((ready) => server.listen(0, "127.0.0.1", ready));
   const chromium = await browser();
   try {
-    const page = await chromium.newPage();
+    const page = await blank(chromium);
     const faults: string[] = [];
     page.on("pageerror", (fault) => faults.push(String(fault)));
     const place = () => page.evaluate("walkers.state(0).z") as Promise<number>;

@@ -240,8 +240,10 @@ class Quality {
       clearTimeout(this.#timer);
       this.#timer = setTimeout(() => this.#rest(), REST);
     }
-    // Tells tests that nothing has moved since.
-    this.#renderer.domElement.toggleAttribute("data-rest", this.#resting);
+    // Tells tests that nothing has moved since that drawing.
+    const { domElement, info } = this.#renderer;
+    if (this.#resting) domElement.dataset["rest"] = String(info.render.frame);
+    else delete domElement.dataset["rest"];
     this.#use(this.#resting ? Math.max(this.#screen, this.#finest) : this.#moving);
     this.#resting = false;
   }

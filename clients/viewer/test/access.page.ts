@@ -6,7 +6,7 @@ import { after, before, test } from "node:test";
 import type { Browser, Page } from "playwright-core";
 
 import { broken } from "./axe.ts";
-import { browser, SERVICE } from "./harness.ts";
+import { blank, browser, SERVICE } from "./harness.ts";
 import { settled, slider, until } from "./look.ts";
 
 const REACH =
@@ -20,7 +20,7 @@ before(async () => {
 after(() => chromium.close());
 
 async function shown(scheme: "light" | "dark", size: keyof typeof SIZES): Promise<Page> {
-  const page = await chromium.newPage({
+  const page = await blank(chromium, {
     viewport: SIZES[size],
     colorScheme: scheme,
     hasTouch: size === "tablet",
@@ -102,7 +102,7 @@ test("targets are of 32 pixels, and of 44 for fingers; the section on top is the
     [32, 1440, false],
     [44, 390, true],
   ] as const) {
-    const page = await chromium.newPage({ viewport: { width, height: 844 }, hasTouch });
+    const page = await blank(chromium, { viewport: { width, height: 844 }, hasTouch });
     for (const view of ["one", "crowd", "performance"]) {
       await page.goto(`${SERVICE}/#cmu_walk?~playing=no&~view=${view}`);
       await page.locator("#stage[data-clip]").waitFor();
@@ -133,7 +133,7 @@ test("targets are of 32 pixels, and of 44 for fingers; the section on top is the
 });
 
 test("who wants stillness gets it, and may play all the same", async () => {
-  const page = await chromium.newPage({ reducedMotion: "reduce" });
+  const page = await blank(chromium, { reducedMotion: "reduce" });
   await page.goto(`${SERVICE}/#reaching`);
   await settled(page);
   const play = page.getByRole("button", { name: "Play (space)" });
@@ -143,7 +143,7 @@ test("who wants stillness gets it, and may play all the same", async () => {
 });
 
 test("light and dark are as the system has them until one says otherwise", async () => {
-  const page = await chromium.newPage({ colorScheme: "dark" });
+  const page = await blank(chromium, { colorScheme: "dark" });
   await page.goto(`${SERVICE}/#reaching`);
   const paper = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
   const dark = await paper();

@@ -5,7 +5,7 @@ import { after, before, test } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
-import { browser, SERVICE } from "./harness.ts";
+import { blank, browser, SERVICE } from "./harness.ts";
 
 let chromium: Browser;
 before(async () => {
@@ -15,7 +15,7 @@ after(() => chromium.close());
 
 /** Open the page; `faults` gathers errors, broken policies and requests to other origins. */
 async function shown(path = "/docs"): Promise<{ page: Page; faults: string[] }> {
-  const page = await chromium.newPage({ viewport: { width: 1280, height: 900 } });
+  const page = await blank(chromium, { viewport: { width: 1280, height: 900 } });
   const faults: string[] = [];
   page.on("pageerror", (fault) => faults.push(String(fault)));
   page.on("console", (line) => {

@@ -7,7 +7,7 @@ import { after, before, test } from "node:test";
 import type { Browser, Page } from "playwright-core";
 
 import { broken } from "./axe.ts";
-import { browser, opened, SERVICE } from "./harness.ts";
+import { blank, browser, opened, SERVICE } from "./harness.ts";
 import { picture, until } from "./look.ts";
 
 const EMPTY = "/#cmu_walk?~playing=no&~view=performance";
@@ -196,7 +196,7 @@ for (const [colorScheme, width, height] of [
   ["dark", 390, 844],
 ] as const)
   test(`axe finds nothing serious, ${colorScheme}, ${width} px, and nothing is too wide`, async () => {
-    const page = await chromium.newPage({
+    const page = await blank(chromium, {
       viewport: { width, height },
       colorScheme,
       bypassCSP: true,

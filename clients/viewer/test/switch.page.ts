@@ -6,7 +6,7 @@ import { after, before, test } from "node:test";
 import { Client } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
-import { browser, opened, SERVICE } from "./harness.ts";
+import { blank, browser, opened, SERVICE } from "./harness.ts";
 import { picture, settled, until } from "./look.ts";
 
 const client = new Client(SERVICE);
@@ -18,7 +18,7 @@ before(async () => {
 after(() => chromium.close());
 
 test("the graphics card is given back what a model took", async () => {
-  const page = await chromium.newPage({ viewport: { width: 640, height: 480 } });
+  const page = await blank(chromium, { viewport: { width: 640, height: 480 } });
   // Each geometry has buffers; those that are not disposed stay alive.
   await page.addInitScript(`
     globalThis.alive = 0;
