@@ -21,6 +21,8 @@ SPEED = tuple(f"speed/{name}" for name in SPEED_FILES)
 JUDGED = (
     "performed",
     "tracks",
+    "track_costs",
+    "track_parts",
     "joins",
     "joint_angles",
     "target_frames",

@@ -191,13 +191,11 @@ def test_a_person_who_rides_is_away_and_comes_back_the_same_person(tmp_path, wal
         ("a", [0.0, 1.0, 2.0, 3.0]),
         ("a~2", [8.0, 9.0, 10.0, 11.0]),
     ]
+    found += (replace(found[1], person="b"),)
     crowd = track_crowd.find_people(walk, walk.gait, WalkQuestion(fps=10.0), found)
-    first, second = crowd.people
+    first, second, other = crowd.people
     assert (first.scale, first.number, first.take) == (second.scale, second.number, second.take)
-    other = track_crowd.find_people(
-        walk, walk.gait, WalkQuestion(fps=10.0), [replace(found[1], person="b")]
-    )
-    assert other.people[0].scale != first.scale
+    assert other.scale != first.scale
 
 
 def test_time_without_samples_is_told_and_splits_a_track_where_asked(tmp_path, walk):
@@ -205,13 +203,9 @@ def test_time_without_samples_is_told_and_splits_a_track_where_asked(tmp_path, w
     text = HEAD + "".join(f"{t:.1f},3,{t:.2f},0\n" for t in times) + "9.0,3,50,0\n9.1,3,50.1,0\n"
     jump = write(tmp_path, "jump.csv", text)
     file = write(tmp_path, "a.csv", text.partition("9.0,")[0])
-    crowd = track_crowd.find_people(
-        walk, walk.gait, WalkQuestion(fps=10.0), track_files.read_tracks(file).tracks
-    )
-    (told,) = crowd.limits
-    assert (
-        told.text == "person '3' at 2.90 s: no sample for 3.1 s, and goes straight to the next one"
-    )
+    tracks = track_files.read_tracks(file).tracks
+    (told,) = track_crowd.find_people(walk, walk.gait, WalkQuestion(fps=10.0), tracks).limits
+    assert "'3' at 2.90 s: no sample for 3.1 s, and goes straight to the next one" in told.text
     legs = track_files.read_tracks(jump, TrackReading(split=2.0)).tracks
     assert [(leg.person, len(leg)) for leg in legs] == [("3", 30), ("3~2", 30), ("3~3", 2)]
     with pytest.raises(FileError, match="jumps"):
@@ -354,6 +348,14 @@ def test_slow_and_fast_samples_are_followed(walk, rate):
     assert crowd.people[0].path.errors.max() < 1e-6
 
 
+def test_people_who_stop_are_made_at_one_frame_a_second(walk):
+    place = np.clip(0.1 * np.arange(200) - 5.0, 0.0, 5.0)
+    order, (track, _) = WalkQuestion(fps=1.0), path_of(np.column_stack([place, 0.0 * place]))
+    crowd = [replace(track, person=person) for person in "abcdefgh"]
+    ((_, plan, _),) = track_crowd.find_people(walk, walk.gait, order, crowd).batches()
+    assert (np.count_nonzero(np.diff(plan.phases), axis=1) < 10).all()
+
+
 def test_people_are_hidden_outside_of_their_tracks(walk, tmp_path):
     late = Track("late", np.array([1.0, 2.0]), np.array([5.0j, 6.0j]))
     whole = Track("whole", np.array([0.0, 3.0]), np.array([0.0j, 3.0j]))
@@ -406,7 +408,6 @@ def test_a_corner_at_constant_speed_is_cut_by_a_hand_s_breadth_and_the_time_is_k
 
 
 def test_who_creeps_steps_and_who_trembles_does_not_tramp(walk):
-    """At 2 cm/s feet follow; noise of 3 cm moves feet seldom; a still person's never."""
     still = np.zeros((200, 2))
     noise = np.random.default_rng(0).normal(0.0, 0.03, still.shape)
     east = still + np.linspace(0.0, 0.4, 200)[:, None] * (1.0, 0.0)

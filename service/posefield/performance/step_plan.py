@@ -279,7 +279,7 @@ def _phases(
             cycles = LEAST_SETTLED + float(waits.min())
             count = int(cycles / SETTLING * rate)
             if end - begin > count:
-                share = np.minimum(np.arange(1, end - begin + 1) / count, 1.0)
+                share = np.minimum(np.arange(1, end - begin + 1) / max(count, 1), 1.0)
                 phases[begin:end] = phase + cycles * share * (1.5 - 0.5 * share**2)
                 moving[begin : begin + count] = True
             else:

@@ -105,8 +105,7 @@ def test_a_file_and_its_folder_stay_where_one_cannot_be_replaced(tmp_path):
 
 def test_files_written_together_are_replaced_all_or_none(tmp_path):
     files = [tmp_path / name for name in ("a.osi", "b.npz", "c.usd")]
-    for path in files[:2]:
-        path.write_text("old")
+    files[0].write_text("old")
     files[2].mkdir()
 
     def write():
@@ -118,8 +117,8 @@ def test_files_written_together_are_replaced_all_or_none(tmp_path):
     with pytest.raises(FileError) as refusal:
         write()
     assert str(refusal.value) == f"{files[2]}: cannot be written: Is a directory"
-    assert seen(tmp_path) == {"a.osi": "old", "b.npz": "old"}
-    assert sorted(tmp_path.iterdir()) == files
+    assert seen(tmp_path) == {"a.osi": "old"}
+    assert sorted(tmp_path.iterdir()) == files[::2]
     files[2].rmdir()
     write()
     assert seen(tmp_path) == dict.fromkeys(("a.osi", "b.npz", "c.usd"), "new")
