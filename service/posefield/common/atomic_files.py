@@ -4,7 +4,6 @@ They are made in hidden folders beside their places. A folder is locked while it
 the next one that writes the same file removes the folders of those that were killed.
 """
 
-import fcntl
 import hashlib
 import os
 import shutil
@@ -129,10 +128,12 @@ def _make_room(path: Path, rooms: ExitStack) -> Path:
 def _lock(folder: Path, locks: ExitStack) -> bool:
     """Lock a folder until the end of `locks`; return whether it could be."""
     try:
+        import fcntl  # Not on Windows, where the folders of killed processes stay.
+
         descriptor = os.open(folder, os.O_RDONLY)
         locks.callback(os.close, descriptor)
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # Locked by another process, gone, or on a disk without locks.
+    except (ImportError, OSError):  # Locked by another process, gone, or on a disk without locks.
         return False
     return True
 
