@@ -51,7 +51,7 @@ def write_crowd(
     feet = _FootSkateMeter(opened, question.fps)
     watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
     crowd_formats.write_files(watched, outputs, question, model.session.card.roles)
-    followed = [] if tracks is None else ["people", "begin", "scales", "path_error_cm"]
+    followed = ["people", "performers", "begin", "scales", "path_error_cm"] if tracks else []
     skipped = {} if tracks is None else {"skipped": {**tracks.skipped, **crowd.facts["skipped"]}}
     return {
         "file": str(outputs[0]),

@@ -200,7 +200,7 @@ def find_problem(track: Track) -> TrackProblem | None:
         return TrackProblem(
             at + 1,
             f"jumps {ways[at]:.2f} m in {steps[at]:g} s at {track.times[at + 1]:g} s, expected at "
-            f"most {FASTEST:g} m/s",
+            f"most {FASTEST:g} m/s of x and y in m",
         )
     return None
 
