@@ -1,12 +1,10 @@
 """Clips, poses and crowds as plain arrays: JSON and tables, crowds with a row per character."""
 
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posefield.common import atomic_files
 from posefield.common.units import Floats
 from posefield.encode import character
 from posefield.encode import table as tables
@@ -158,8 +156,7 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
     """Write a crowd to an .npz file.
 
     rotations: (N, F, J, 4). root_position: (N, F, 3), m. bone_offsets: (N, J, 3), m. rate: frames a
-    second. joints: names. With curves also their values, curves: (N, F, C), and curve_names. Raises
-    FileError if the file cannot be written.
+    second. joints: names. With curves also their values, curves: (N, F, C), and curve_names.
     """
     batches = list(crowd.batches)
     rotations, roots, bones, *curves = (
@@ -172,9 +169,8 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
     arrays: dict[str, Any] = {}
     if curves:
         arrays = {"curves": curves[0], "curve_names": np.array(crowd.curves)}
-    content = BytesIO()
     np.savez(
-        content,
+        path,
         rotations=rotations,
         root_position=world_roots.astype(np.float32),
         bone_offsets=bones,
@@ -182,7 +178,6 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
         joints=np.array(crowd.skeleton.names),
         **arrays,
     )
-    atomic_files.write(content.getvalue(), path)
 
 
 _MOTION_ARRAYS = ("rotations", "root_position", "bone_offsets")
