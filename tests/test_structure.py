@@ -17,9 +17,9 @@ BUDGETS = {
     "model_export/posefield_train": 27_800,
     "clients/python": 2_160,
     "clients/blender": 1_280,
-    "clients/viewer/src": 7_890,
+    "clients/viewer/src": 7_870,
     "clients/typescript/src": 1_350,
-    "clients/runtime/src": 2_803,
+    "clients/runtime/src": 2_600,
     "clients/page/src": 600,
 }
 """Most lines of each part, without generated ones: who needs more takes lines away elsewhere."""

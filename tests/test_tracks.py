@@ -308,6 +308,7 @@ def test_people_that_overlap_are_told(walk):
     tracks = route_tracks.tracks_of_routes(walk.gait, meet, 5.0)
     facts = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=2), tracks).facts
     seconds = [pytest.approx(2.7, abs=0.15)]
+    assert facts["feet_stand"] and "take" not in facts
     assert facts["overlaps"] == {"pairs": 1, "first": ["0"], "second": ["1"], "seconds": seconds}
     (warning,) = [line for line in facts["warnings"] if "nearer" in line]
     assert "nearer than 0.5 m: 1, the first at 2." in warning and warning.endswith("s (0 and 1)")

@@ -213,7 +213,7 @@ def report_text(facts: dict[str, Any]) -> str:
             f"lowered {facts['lowered_cm']:.1f} cm at most"
         )
     if facts["take"]:
-        lines.append(_take_text(facts["take"], facts["motions"]))
+        lines.append(_take_text(facts["take"]))
     if facts["outside_share"]:
         lines.append(
             f"{100 * facts['outside_share']:.1f} % of the poses have some control outside what was "
@@ -229,9 +229,9 @@ def report_text(facts: dict[str, Any]) -> str:
     return "\n".join([*lines, *track_crowd.shorten(facts["warnings"])])
 
 
-def _take_text(take: dict[str, Any], motions: int) -> str:
+def _take_text(take: dict[str, Any]) -> str:
     which = f"take {take['seed']}" if take["seed"] else "no take"
     if take["seed"] == "index":
-        which = f"takes 1 to {motions}, one for each motion"
+        which = "a take for each motion"
     detail = ", with details sampled" if take["detail"] else ""
     return f"{which}, variety {take['variety']:g}{detail}"

@@ -216,16 +216,18 @@ def build_crowd(model: Synthesizer, gait: Gait, question: WalkQuestion) -> Crowd
     standing = wants_standing_feet(gait.session.card, question)
     make = with_takes(standing_motions if standing else walking_crowd.motions, model, takes)
     crowd = walking_crowd.build_crowd(model, gait, question, make)
-    facts: dict[str, Any] = {"feet_stand": standing}
-    if takes is not None:
-        facts["take"] = {
-            "seed": takes.take,
-            "variety": takes.variety,
-            "detail": takes.detail,
-        }
+    facts = {**crowd.facts, **facts_of(model.session.card, question)}
     if question.detail and not model.session.card.making.detail:
         facts["warnings"] = [*crowd.facts.get("warnings", ()), NO_DETAIL]
-    return replace(crowd, facts={**crowd.facts, **facts})
+    return replace(crowd, facts=facts)
+
+
+def facts_of(card: ModelCard, question: WalkQuestion) -> dict[str, Any]:
+    """Return whether the feet of a question's crowd stand, and its takes if there are any."""
+    facts: dict[str, Any] = {"feet_stand": wants_standing_feet(card, question)}
+    if (takes := of_question(card, question)) is not None:
+        facts["take"] = {"seed": takes.take, "variety": takes.variety, "detail": takes.detail}
+    return facts
 
 
 def with_takes(

@@ -265,6 +265,7 @@ def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
     return {
         "model": f"{card.name}@{crowd.gait.session.digest}",
         **crowd.gait.labels.facts(combinations),
+        **walking_feet.facts_of(card, crowd.question),
         "people": [person.track.person for person in crowd.people],
         "begin": crowd.begin,
         "scales": [round(person.scale, 4) for person in crowd.people],
