@@ -19,7 +19,7 @@ export interface Listeners {
   readonly download: () => void;
 }
 
-const STICKS = "More than 12 are drawn as sticks";
+const WALKERS = "Walkers, drawn as sticks above 12";
 
 export class Panel {
   readonly state: PageState;
@@ -77,7 +77,7 @@ export class Panel {
       put({ body: body as PageState["body"] }, show),
     );
     if (model.walks)
-      this.#slider("Walkers", [1, 200, 1], 1, (count) => put({ count }, show), STICKS, "walk");
+      this.#slider(WALKERS, [1, 200, 1], 1, (count) => put({ count }, show), "", "walk");
     const download = textButton("Download GLB", listeners.download);
     download.title = "The clip with its skin; the command posefield clip writes VRMA, USD and BVH";
     download.dataset["only"] = "clip";
