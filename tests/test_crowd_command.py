@@ -107,6 +107,7 @@ def test_routes_are_followed(walk_path, tmp_path):
         (("-o", "c.npz", "--paths", "none.json"), FileError, "none.json: cannot be read"),
         (("-o", "c.npz", "--paths", __file__), FileError, "test_crowd_command.py: not JSON"),
         (("-o", "c.npz", "-o", "d.osi", *PARTS), InvalidField, "c and d, expected one name"),
+        (("-o", "c.npz", "--motions", 2, *PARTS), InvalidField, "motions: 2, expected none"),
         (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),
     ],
 )

@@ -167,6 +167,8 @@ def crowd(
     process_pool.limit_threads()
     if len(set(output)) < len(output):
         raise InvalidField("output", "the same file twice, expected each once")
+    if trajectories and question.motions:
+        raise InvalidField("motions", f"{question.motions}, expected none: each person has one")
     reading = TrackReading(heading_unit, y_down, split)
     if people_per_file is not None:
         if trajectories is None or paths or count is not None:
