@@ -82,7 +82,7 @@ def test_cycles_begin_in_one_phase_in_gaits_either_way(robot):
     phases = np.array([cycle.first for cycle in cycles]) + shifts
     np.testing.assert_allclose((phases + CYCLE / 2) % CYCLE, CYCLE / 2, atol=1)
     for cycle in cycles:
-        assert (cycle.last - cycle.first, cycle.count) == (CYCLE, 1)
+        assert (cycle.last - cycle.first, cycle.count, type(cycle.seconds)) == (CYCLE, 1, float)
         assert (cycle.seconds, cycle.gap) == pytest.approx((0.8, 0.0), abs=0.004)
 
 

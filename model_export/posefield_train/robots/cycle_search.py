@@ -96,7 +96,7 @@ def _period(motion: RobotMotion) -> float:
         if near + 2 > len(gaps):
             break
         best = near - 1 + int(np.argmin(gaps[near - 1 : near + 2]))
-    return frames
+    return float(frames)
 
 
 def _differences(angles: HingeAngles, others: HingeAngles) -> Floats:
