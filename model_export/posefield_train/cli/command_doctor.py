@@ -1,7 +1,6 @@
 """Command `posefield doctor`: what is wrong with reference motions of robots, and other formats."""
 
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -162,7 +161,7 @@ def _diagnose(motions: "list[RobotMotion]", body: "Robot | None") -> "list[Diagn
 def _write_table(diagnoses: "list[Diagnosis]", path: Path) -> None:
     from posefield_train.source import clip_table
 
-    rows: list[Sequence[object]] = [("file", "first_frame", "last_frame")]
+    rows: list[tuple[object, ...]] = [("file", "first_frame", "last_frame")]
     for diagnosis in diagnoses:
         file = Path(os.path.relpath(diagnosis.motion.source, path.parent)).as_posix()
         if diagnosis.cycle:

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from posefield.common.errors import RecipeError
 from posefield_train.probe.probe_report import ProbeReport
@@ -45,6 +45,7 @@ def recipe_text(
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
+        undefined=StrictUndefined,
     )
     comment = partial(textwrap.fill, width=96, initial_indent="# ", subsequent_indent="# ")
     environment.filters |= {"quote": quote, "names": names, "comment": comment}

@@ -99,8 +99,8 @@ def _period(motion: RobotMotion) -> float:
     return float(frames)
 
 
-def _differences(angles: HingeAngles, others: HingeAngles) -> Floats:
-    return np.asarray(np.sqrt(np.square(angles - others).mean(axis=1)))
+def _differences(angles: HingeAngles, reference: HingeAngles) -> Floats:
+    return np.asarray(np.sqrt(np.square(angles - reference).mean(axis=1)))
 
 
 def _signals(motion: RobotMotion, robot: Robot | None) -> Annotated[Floats, "frames signals"]:

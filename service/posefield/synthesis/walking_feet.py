@@ -212,12 +212,12 @@ def build_crowd(model: Synthesizer, gait: Gait, question: WalkQuestion) -> Crowd
     Raises InvalidField as `walking_crowd.build_crowd` and `of_question` do, and for feet
     that cannot stand.
     """
-    takes = of_question(model.session.card, question)
-    standing = wants_standing_feet(gait.session.card, question)
-    make = with_takes(standing_motions if standing else walking_crowd.motions, model, takes)
+    card, motions = model.session.card, walking_crowd.motions
+    takes, facts = of_question(card, question), facts_of(card, question)
+    make = with_takes(standing_motions if facts["feet_stand"] else motions, model, takes)
     crowd = walking_crowd.build_crowd(model, gait, question, make)
-    facts = {**crowd.facts, **facts_of(model.session.card, question)}
-    if question.detail and not model.session.card.making.detail:
+    facts = {**crowd.facts, **facts}
+    if question.detail and not card.making.detail:
         facts["warnings"] = [*crowd.facts.get("warnings", ()), NO_DETAIL]
     return replace(crowd, facts=facts)
 
