@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Floats, Indices
+from posefield.common.units import UP, Floats, Frames, Indices
 from posefield.encode import bone_motion
 from posefield.encode.bone_motion import BoneMotion
 from posefield.motion import quat, skeleton
@@ -156,17 +156,21 @@ def bone_paths(joints: Skeleton, roles: Mapping[str, str]) -> list[tuple[int, ..
     return paths
 
 
-def person_numbers(
-    motion: BoneMotion, paths: Sequence[tuple[int, ...]]
-) -> Annotated[Floats, "frames gaps"]:
-    """Return the numbers (F, G) of one person, in the order of the gaps of its part."""
-    frames, rate = len(motion), motion.rate
-    headings = np.unwrap(quat.twist(motion.rotations[:, 0], UP))
+def _write_bones(
+    motion: BoneMotion,
+    paths: Sequence[tuple[int, ...]],
+    headings: Frames,
+    gaps: Annotated[Floats, "frames paths 4 3"],
+) -> None:
+    """Write the numbers of the bones of one person to their gaps.
+
+    One bone after the other, because its arrays stay in the cache of a processor.
+    """
     rotations, arms = np.ascontiguousarray(motion.rotations.transpose(1, 2, 0)), motion.offsets
     back = np.ascontiguousarray(quat.from_axis_angle(UP, -headings).T)
-    turns, offsets = np.empty((len(paths), 4, frames)), np.empty((len(paths), 3, frames))
-    for turn, offset, path in zip(turns, offsets, paths, strict=True):
-        turn[:], offset[:] = rotations[path[0]], arms[path[0]][:, None]
+    for bone, path in enumerate(paths):
+        turn, offset = rotations[path[0]].copy(), np.empty((3, len(motion)))
+        offset[:] = arms[path[0]][:, None]
         if path[0] == 0:
             quat.product_planes(back, rotations[0], turn)
             offset[:] = (motion.roots * UP).T
@@ -175,41 +179,32 @@ def person_numbers(
             quat.rotate_planes(turn, arms[joint][:, None], step)
             offset += step
             quat.product_planes(turn.copy(), rotations[joint], turn)
-    # Ahead, left and up are Z, X and Y of the model.
-    turns, places = (
-        planes[:, order].transpose(2, 0, 1)
-        for planes, order in ((turns, [0, 3, 1, 2]), (offsets, [2, 0, 1]))
-    )
-    box = _box(motion)
-    middle, still = 0.5 * box[2], np.zeros((frames, 3))
-    centre = np.stack([motion.roots[:, 0], -motion.roots[:, 2], still[:, 0] + middle], axis=-1)
-    yaws = np.stack([still[:, 0], still[:, 0], headings - 0.5 * np.pi], axis=-1)
-    velocity = bone_motion.differences(centre, rate)
-    values = np.zeros((frames, BASE + 12 * (len(paths) + 1)))
-    values[:, :BASE] = np.concatenate(
-        [
-            still + box,
-            centre,
-            np.arctan2(np.sin(yaws), np.cos(yaws)),
-            velocity,
-            bone_motion.differences(velocity, rate),
-            bone_motion.differences(yaws, rate),
-            still - box * [0.0, 0.0, 0.5],
-        ],
-        axis=1,
-    )
-    # The root, which comes first, stays where it is in the box.
-    bone_values = values[:, BASE + 12 :].reshape(frames, len(paths), 4, 3)
-    bone_values[:, :, 0], bone_values[:, :, 1] = places, euler_angles(turns)
-    bone_values[:, :, 2] = bone_motion.differences(places, rate)
-    bone_values[:, :, 3] = bone_motion.angular_velocities(turns, rate)
+        # Ahead, left and up are Z, X and Y of the model.
+        turns, places = turn[[0, 3, 1, 2]].T, offset[[2, 0, 1]].T
+        gaps[:, bone, 0], gaps[:, bone, 1] = places, euler_angles(turns)
+        gaps[:, bone, 2] = bone_motion.differences(places, motion.rate)
+        gaps[:, bone, 3] = bone_motion.angular_velocities(turns, motion.rate)
+
+
+def _base_numbers(motion: BoneMotion, headings: Frames) -> Annotated[Floats, "7 frames 3"]:
+    """Return the seven vectors of the box of one person, in the order of their gaps."""
+    box, values = _box(motion), np.zeros((BASE // 3, len(motion), 3))
+    dimension, centre, orientation, velocity, acceleration, rate, root = values
+    dimension[:], root[:] = box, box * [0.0, 0.0, -0.5]
+    centre[:, 0], centre[:, 1] = motion.roots[:, 0], -motion.roots[:, 2]
+    centre[:, 2] = 0.5 * box[2]
+    yaws = headings - 0.5 * np.pi
+    orientation[:, 2] = np.arctan2(np.sin(yaws), np.cos(yaws))
+    velocity[:] = bone_motion.differences(centre, motion.rate)
+    acceleration[:] = bone_motion.differences(velocity, motion.rate)
+    rate[:, 2] = bone_motion.differences(yaws, motion.rate)
     return values
 
 
 def euler_angles(turns: Annotated[Floats, "*rows 4"]) -> Annotated[Floats, "*rows 3"]:
     """Return roll, pitch and yaw (..., 3), rad, of quaternions Rz(yaw) Ry(pitch) Rx(roll)."""
     w, x, y, z = np.moveaxis(turns, -1, 0)
-    angles = np.empty((*turns.shape[:-1], 3))
+    angles = np.empty_like(turns[..., 1:])
     angles[..., 0] = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     angles[..., 1] = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     angles[..., 2] = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
@@ -315,14 +310,16 @@ def person_parts(
     frames, size, gaps = len(motion), len(layout.data), layout.gaps
     records = np.empty((frames, size), np.uint8)
     records[:] = np.frombuffer(layout.data, np.uint8)
-    values = person_numbers(motion, paths)
+    headings = np.unwrap(quat.twist(motion.rotations[:, 0], UP))
     steps = size, gaps[1] - gaps[0]
-    for first in range(0, BASE, 3):
-        vector: Floats = np.ndarray((frames, 3), "<f8", records, gaps[first], steps)
-        vector[:] = values[:, first : first + 3]
+    for gap, values in zip(gaps[:BASE:3], _base_numbers(motion, headings), strict=True):
+        vector: Floats = np.ndarray((frames, 3), "<f8", records, gap, steps)
+        vector[:] = values
     # All bones take equally many bytes, and so do their vectors.
     strides = size, *(gaps[BASE + step] - gaps[BASE] for step in (12, 3, 1))
     shape = frames, len(paths) + 1, 4, 3
     bones: Floats = np.ndarray(shape, "<f8", records, gaps[BASE], strides)
-    bones[:] = values[:, BASE:].reshape(bones.shape)
+    # The root, which comes first, stays where it is in the box.
+    bones[:, 0] = 0.0
+    _write_bones(motion, paths, headings, bones[:, 1:])
     return records
