@@ -24,7 +24,9 @@ def at_height(
     points: Annotated[FloorVectors, "*#batch"], height: Scalars
 ) -> Annotated[Floats, "*batch 3"]:
     """Return points (..., 3), m, at a height above floor points (...)."""
-    return np.stack(np.broadcast_arrays(points.imag, height, points.real), axis=-1)
+    placed = quat.components_first(points.imag, 3)
+    placed[..., 1], placed[..., 2] = height, points.real
+    return placed
 
 
 def unit_vectors(headings: Annotated[Floats, "*batch"]) -> Annotated[FloorVectors, "*batch"]:
@@ -63,8 +65,9 @@ def turn_roots(
     rotations: Annotated[Floats, "*poses joints 4"], headings: Annotated[Floats, "*poses"]
 ) -> Annotated[Floats, "*poses joints 4"]:
     """Return rotations (..., J, 4) with the roots turned by headings (...), rad, about +Y."""
-    root = quat.mul(quat.from_axis_angle(UP, headings), rotations[..., 0, :])
-    return np.concatenate([root[..., None, :], rotations[..., 1:, :]], axis=-2)
+    turned = rotations.astype(float)
+    turned[..., 0, :] = quat.mul(quat.from_axis_angle(UP, headings), turned[..., 0, :])
+    return turned
 
 
 def smooth(

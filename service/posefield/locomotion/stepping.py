@@ -27,6 +27,8 @@ POWER = 3.0
 """Exponent of the sum of the cadences of the way forward, to the side, and of the turn."""
 LEG_SHARE = 0.9
 """Length of a leg over the height of the root."""
+LEAST_SHARE = 1e-9
+"""Share of the standing pose from which on a pose is blended."""
 Numbers = TypeVar("Numbers", Floats, FloorVectors)
 SWING = 0.36
 """Share of the cycle in which a foot swings and takes a new heading."""
@@ -83,8 +85,10 @@ class Stepping:
         combinations: of labels of each pose (K,).
         """
         share, poses = self.shares[pair], self.poses
-        # All get unit length in double precision, also who walks.
-        rotations = quat.nlerp(walked.rotations, poses.rotations[combinations], share)
+        # Shares are averages, whose rounding leaves no zero to who walks.
+        rotations, some = walked.rotations.copy(), np.flatnonzero(share > LEAST_SHARE)
+        standing = poses.rotations[combinations[some]]
+        rotations[some] = quat.nlerp(rotations[some], standing, share[some])
         heights = walked.heights + share * (poses.heights[combinations] - walked.heights)
         points = walked.places + share * (poses.points[combinations] - walked.places)
         lengths = LEG_SHARE * poses.heights[combinations]

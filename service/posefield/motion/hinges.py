@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from posefield.common.bounded_types import Index, Number
-from posefield.common.units import Booleans, Floats, Vectors
+from posefield.common.units import Booleans, Floats
 from posefield.motion import quat
 
 FREE, MOST = np.radians(1.0), np.radians(3.0)
@@ -222,8 +222,8 @@ def one_joint(hinge: Hinge) -> Hinges:
 def _axes(hinge: Hinge) -> Annotated[Floats, "3 3"]:
     """Return the directions of axis, bone and their vector product."""
     # Numbers of a card are rounded.
-    axis, bone = _unit(np.array(hinge.axis)), np.array(hinge.bone)
-    bone = _unit(bone - (bone @ axis) * axis)
+    axis, bone = quat.normalize(np.array(hinge.axis)), np.array(hinge.bone)
+    bone = quat.normalize(bone - (bone @ axis) * axis)
     return np.stack([axis, bone, quat.cross(axis, bone)])
 
 
@@ -240,14 +240,14 @@ def measure(
     """
     # The limb bends about the mean normal of its two bones, which a twist of the bone below turns
     # but does not hide.
-    above, below = _unit(above), _unit(below)
+    above, below = quat.normalize(above), quat.normalize(below)
     before = quat.rotate(quat.conj(rotations), above)
     normals = quat.cross(before, below)
-    bone, axis = _unit(below.mean(axis=0)), normals.mean(axis=0)
+    bone, axis = quat.normalize(below.mean(axis=0)), normals.mean(axis=0)
     axis = axis - (axis @ bone) * bone
     if np.linalg.norm(axis) < LEAST_BEND:
         return None
-    axis = _unit(axis)
+    axis = quat.normalize(axis)
     flexion = np.arctan2(normals @ axis, np.sum(before * below, axis=-1))
     straight = quat.mul(rotations, quat.from_axis_angle(axis, -flexion))
     reference = quat.mean(straight[:, None])[0]
@@ -258,11 +258,6 @@ def measure(
     angles = one_joint(unlimited).angles(rotations[:, None])[:, 0]
     low, high = rounded(angles.min(axis=0)), rounded(angles.max(axis=0))
     return replace(unlimited, joint=joint, low=low, high=high)
-
-
-def _unit(vectors: Vectors) -> Vectors:
-    units: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return units
 
 
 def rounded(numbers: Sequence[float] | Annotated[Floats, "..."]) -> Any:

@@ -24,12 +24,23 @@ def mul(a: Quaternions, b: Quaternions) -> Quaternions:
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
     real = aw * bw - ax * bx - ay * by - az * bz
-    product = np.empty((*real.shape, 4), real.dtype)
-    product[..., 0] = real
+    product = components_first(real, 4)
     product[..., 1] = aw * bx + ax * bw + ay * bz - az * by
     product[..., 2] = aw * by - ax * bz + ay * bw + az * bx
     product[..., 3] = aw * bz + ax * by - ay * bx + az * bw
     return product
+
+
+def components_first(
+    first: Annotated[Floats, "*batch"], count: int
+) -> Annotated[Floats, "*batch {count}"]:
+    """Return an array (..., n) of n components, of which the first one (...) is filled in.
+
+    Each component is contiguous in memory, which halves the time of many quaternions and vectors.
+    """
+    planes = np.empty((count, *first.shape), first.dtype)
+    planes[0] = first
+    return planes.transpose(*range(1, planes.ndim), 0)
 
 
 def conj(q: Quaternions) -> Quaternions:
@@ -37,8 +48,10 @@ def conj(q: Quaternions) -> Quaternions:
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def normalize(q: Quaternions) -> Quaternions:
-    """Return the unit quaternion in the direction of q."""
+def normalize(
+    q: Annotated[Floats, "*batch components"],
+) -> Annotated[Floats, "*batch components"]:
+    """Return the unit quaternion, or vector, in the direction of q."""
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
@@ -56,9 +69,7 @@ def cross(a: Vectors, b: Vectors) -> Vectors:
     """
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    first = ay * bz - az * by
-    product = np.empty((*first.shape, 3), first.dtype)
-    product[..., 0] = first
+    product = components_first(ay * bz - az * by, 3)
     product[..., 1] = az * bx - ax * bz
     product[..., 2] = ax * by - ay * bx
     return product
@@ -68,7 +79,9 @@ def exp(v: Vectors) -> Quaternions:
     """Return the quaternion of a rotation vector (..., 3), rad."""
     half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
     # np.sinc is sin(pi x) / (pi x), and exact at zero.
-    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
+    turn = components_first(np.cos(half[..., 0]), 4)
+    turn[..., 1:] = 0.5 * np.sinc(half / np.pi) * v
+    return turn
 
 
 def log(q: Quaternions) -> Vectors:
@@ -113,8 +126,10 @@ def from_axis_angle(
     axis: Vector, angle: Annotated[Floats, "*batch"]
 ) -> Annotated[Floats, "*batch 4"]:
     """Return the quaternion of a rotation by angle (...), rad, about the unit axis (3,)."""
-    half = 0.5 * np.asarray(angle)[..., None]
-    return np.concatenate([np.cos(half), np.sin(half) * axis], axis=-1)
+    half = 0.5 * np.asarray(angle)
+    turn = components_first(np.cos(half), 4)
+    turn[..., 1:] = np.sin(half)[..., None] * axis
+    return turn
 
 
 def to_matrix(q: Annotated[Floats, "*batch 4"]) -> Annotated[Floats, "*batch 3 3"]:

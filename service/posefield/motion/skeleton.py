@@ -101,14 +101,17 @@ def forward_kinematics(
     each other.
     """
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
-    if math.prod(lead) <= FEW_POSES:
-        return _at_once(parents, lead, rotations, translations)
-    world, turns = np.empty((*lead, len(parents), 3)), np.empty((*lead, len(parents), 4))
-    turning = frozenset(range(len(parents)))
-    for block, own_turns, own_arms in _blocks(lead, rotations, translations):
-        placed, turned = _accumulate(parents, own_turns, own_arms, turning)
-        _rows(world)[block], _rows(turns)[block] = _from_planes(placed), _from_planes(turned)
-    return world, turns
+    poses, joints = math.prod(lead), len(parents)
+    if poses <= FEW_POSES:
+        world, turns = _at_once(parents, lead, rotations, translations)
+    else:
+        world, turns = np.empty((joints, 3, poses)), np.empty((joints, 4, poses))
+        for block, own_turns, own_arms in _blocks(lead, rotations, translations):
+            world[..., block], turns[..., block] = _accumulate(
+                parents, own_turns, own_arms, frozenset(range(joints))
+            )
+    placed, turned = (planes.transpose(2, 0, 1) for planes in (world, turns))
+    return placed.reshape(*lead, joints, 3), turned.reshape(*lead, joints, 4)
 
 
 def positions(
@@ -119,21 +122,21 @@ def positions(
     """Return the joint positions (..., J, 3) alone; arguments as for `forward_kinematics`."""
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     if math.prod(lead) <= FEW_POSES:
-        return _at_once(parents, lead, rotations, translations)[0]
-    world = np.empty((*lead, len(parents), 3))
-    for block, own_turns, own_arms in _blocks(lead, rotations, translations):
-        _rows(world)[block] = _from_planes(position_planes(parents, own_turns, own_arms))
-    return world
+        world = _at_once(parents, lead, rotations, translations)[0]
+    else:
+        world = np.empty((len(parents), 3, math.prod(lead)))
+        for block, own_turns, own_arms in _blocks(lead, rotations, translations):
+            world[..., block] = position_planes(parents, own_turns, own_arms)
+    return world.transpose(2, 0, 1).reshape(*lead, len(parents), 3)
 
 
 def _at_once(
     parents: tuple[int, ...], lead: tuple[int, ...], rotations: Floats, translations: Floats
-) -> tuple[Annotated[Floats, "*poses joints 3"], Annotated[Floats, "*poses joints 4"]]:
-    """Return what `forward_kinematics` does, of few poses."""
+) -> tuple[Annotated[Floats, "joints 3 poses"], Annotated[Floats, "joints 4 poses"]]:
+    """Return what `forward_kinematics` does, of few poses, as planes (J, 3, P) and (J, 4, P)."""
     turns = np.broadcast_to(rotations, (*lead, len(parents), 4)).reshape(-1, len(parents), 4)
     arms = np.broadcast_to(translations, (*lead, len(parents), 3)).reshape(-1, len(parents), 3)
-    placed, turned = _accumulate_levels(parents, turns, arms)
-    return placed.reshape(*lead, len(parents), 3), turned.reshape(*lead, len(parents), 4)
+    return _accumulate_levels(parents, turns, arms)
 
 
 def position_planes(
@@ -153,33 +156,12 @@ def _blocks(
     lead: tuple[int, ...], rotations: Floats, translations: Floats
 ) -> Iterator[tuple[slice, Floats, Floats]]:
     """Yield slices of the poses with their rotations (J, 4, P) and translations (J, 3, P)."""
-    joints = rotations.shape[-2]
-    turns = _rows(np.broadcast_to(rotations, (*lead, joints, 4)))
-    arms = _rows(np.broadcast_to(translations, (*lead, joints, 3)))
-    for start in range(0, len(turns), POSES_PER_BLOCK):
+    whole = (np.broadcast_to(v, (*lead, *v.shape[-2:])) for v in (rotations, translations))
+    turns, arms = (v.reshape(-1, *v.shape[-2:]).transpose(1, 2, 0) for v in whole)
+    for start in range(0, turns.shape[-1], POSES_PER_BLOCK):
         block = slice(start, start + POSES_PER_BLOCK)
-        yield block, _to_planes(turns[block], joints), _to_planes(arms[block], joints)
-
-
-def _rows(
-    values: Annotated[Floats, "... joints components"],
-) -> Annotated[Floats, "poses joints*components"]:
-    """Return values (..., J, k) of joints as one row (P, J k) per pose."""
-    return values.reshape(-1, values.shape[-2] * values.shape[-1])
-
-
-def _to_planes(
-    rows: Annotated[Floats, "poses columns"], joints: int
-) -> Annotated[Floats, "{joints} components poses"]:
-    """Return rows (P, J k) as planes (J, k, P)."""
-    return np.ascontiguousarray(rows.T).reshape(joints, -1, len(rows))
-
-
-def _from_planes(
-    planes: Annotated[Floats, "joints components poses"],
-) -> Annotated[Floats, "poses joints*components"]:
-    """Return planes (J, k, P) as rows (P, J k)."""
-    return planes.reshape(-1, planes.shape[-1]).T
+        first, second = (np.asarray(v[..., block], float, "C") for v in (turns, arms))
+        yield block, first, second
 
 
 def _accumulate(
@@ -232,8 +214,8 @@ def _accumulate_levels(
     parents: tuple[int, ...],
     rotations: Annotated[Floats, "poses joints 4"],
     translations: Annotated[Floats, "poses joints 3"],
-) -> tuple[Annotated[Floats, "poses joints 3"], Annotated[Floats, "poses joints 4"]]:
-    """Return joint positions (P, J, 3) and orientations (P, J, 4) of few poses.
+) -> tuple[Annotated[Floats, "joints 3 poses"], Annotated[Floats, "joints 4 poses"]]:
+    """Return joint positions (J, 3, P) and orientations (J, 4, P) of few poses.
 
     The same operations in the same order as in `quat`, so that results are bitwise equal; a
     quaternion has x and y once more at its end, so that its cyclic permutations are slices.
@@ -259,8 +241,8 @@ def _accumulate_levels(
             turned += above[component] * terms[component, :, rows]
         turns[:4, rows], turns[4:, rows] = turned, turned[1:3]
     # Sums over an array depend on its layout, which is therefore that of larger numbers of poses.
-    placed = np.ascontiguousarray(world[:, tree.ranks].T)
-    return placed, np.ascontiguousarray(turns[:4, tree.ranks].T)
+    placed = np.ascontiguousarray(world[:, tree.ranks].swapaxes(0, 1))
+    return placed, np.ascontiguousarray(turns[:4, tree.ranks].swapaxes(0, 1))
 
 
 def _rotated(

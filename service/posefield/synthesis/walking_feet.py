@@ -308,7 +308,7 @@ def stand(card: ModelCard, rate: float, groups: Sequence[MotionsWithContacts]) -
         for motions, probabilities in groups
         for bones, rotations, roots, likely in zip(
             motions.bone_offsets.astype(np.float64),
-            motions.rotations.astype(np.float64),
+            motions.rotations,
             motions.root_position.astype(np.float64),
             probabilities[..., columns],
             strict=True,
@@ -316,7 +316,7 @@ def stand(card: ModelCard, rate: float, groups: Sequence[MotionsWithContacts]) -
     ]
     plans = body_plans.plan_motions(requests)
     # The rotations of the legs are written into those of the motions.
-    rotations = np.concatenate([np.concatenate(motions.rotations) for motions, _ in groups])
+    rotations = np.concatenate([turns for motions, _ in groups for turns in motions.rotations])
     placed = foot_placement.place_grids(plans, rotations)
     frames_of_groups = frame_groups.FrameGroups(
         np.array([motions.levels.size for motions, _ in groups])
