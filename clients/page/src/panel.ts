@@ -2,6 +2,7 @@
 
 import type { ClipOptions, Model } from "@posefield/runtime";
 import { chooser, el, textButton } from "../../viewer/src/dom.ts";
+import { MANY } from "./walk-view.ts";
 
 export interface PageState {
   controls: Record<string, number>;
@@ -19,7 +20,7 @@ export interface Listeners {
   readonly download: () => void;
 }
 
-const WALKERS = "Walkers, drawn as sticks above 12";
+const WALKERS = `Walkers, drawn as sticks above ${MANY}`;
 
 export class Panel {
   readonly state: PageState;

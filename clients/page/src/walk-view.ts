@@ -15,8 +15,10 @@ const KEYS: Readonly<Record<string, readonly [ahead: number, left: number]>> = {
 };
 /** Rate of turning, rad/s. */
 const TURN = 1.6;
-/** Walkers from which on all are sticks; metres between those of a crowd; pixels of a drag. */
-const [MANY, APART, DRAG] = [12, 1.4, 4];
+/** Walkers above which all are sticks. */
+export const MANY = 12;
+/** Metres between the walkers of a crowd; pixels of a drag. */
+const [APART, DRAG] = [1.4, 4];
 
 export class WalkView implements View {
   readonly ready: Promise<void>;
