@@ -109,6 +109,10 @@ def test_routes_are_followed(walk_path, tmp_path):
         (("-o", "c.npz", "-o", "d.osi", *PARTS), InvalidField, "c and d, expected one name"),
         (("-o", "c.npz", "--motions", 2, *PARTS), InvalidField, "motions: 2, expected none"),
         (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),
+        (("-o", "c.npz", "--seconds", 10, *PARTS), InvalidField, "seconds: 10.0, expected none"),
+        (("-o", "c.npz", "--y-down"), InvalidField, "y_down: True, expected none without traj"),
+        (("-o", "c.npz", "--workers", 2), InvalidField, "workers: 2, expected none without peopl"),
+        (("-o", "c.npz", "--instancing", "flatten"), InvalidField, "instancing: 'flatten', expec"),
     ],
 )
 def test_what_cannot_be_done_is_refused(walk_path, tmp_path, monkeypatch, words, kind, said):

@@ -2,7 +2,6 @@
 
 import sqlite3
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +9,9 @@ from pxr import Usd, UsdGeom
 
 import posefield
 from posefield.common.errors import FileError, InvalidField
-from posefield.encode import crowd_writer
+from posefield.encode import bone_motion, crowd_writer
 from posefield.locomotion import floor_plane
 from posefield.locomotion.locomotion_plan import Route
-from posefield.motion import skeleton
 from posefield.question.walk_question import WalkQuestion
 from posefield.tracks import route_tracks, track_crowd, track_files, track_path
 from posefield.tracks.track import MAX_PEOPLE, Track, floor_points
@@ -81,7 +79,8 @@ def test_all_formats_give_the_same_person(tmp_path):
         write(tmp_path, "a.txt", text),
     ]
     for file in files:
-        (track,) = track_files.read_tracks(file, DEGREES).tracks
+        unit = DEGREES if file.suffix == ".csv" else TrackReading()
+        (track,) = track_files.read_tracks(file, unit).tracks
         assert track.person == "7"
         np.testing.assert_array_equal(track.times, [0.0, 0.1])
         # East is X, north is -Z.
@@ -89,19 +88,30 @@ def test_all_formats_give_the_same_person(tmp_path):
         if file.suffix != ".txt":
             # Northwards.
             np.testing.assert_allclose(np.exp(1j * track.headings), -1.0, atol=1e-12)
+        # y down turns the points over, and the headings with them.
+        (turned,) = track_files.read_tracks(file, replace(unit, y_down=True)).tracks
+        np.testing.assert_array_equal(turned.points, -np.conj(track.points))
+        if track.headings is not None:
+            np.testing.assert_allclose(np.exp(1j * turned.headings), 1.0, atol=1e-12)
+        if file.suffix != ".csv":
+            with pytest.raises(InvalidField, match=rf"'degrees', expected none: \{file.suffix}"):
+                track_files.read_tracks(file, DEGREES)
 
 
 HEAD = "time,id,x,y\n"
 BAD = [
     ("jump.csv", HEAD + "0,a,0,0\n1,a,30,0\n", "jump.csv:3: person 'a': jumps 30.00 m in 1 s"),
+    ("jumps.csv", HEAD + "0,a,0,0\n1,a,30,0\n", "12 m/s; --split parts a person there, --skip-bad"),
     ("twice.csv", HEAD + "0,a,0,0\n0,a,1,0\n", "twice.csv:3: person 'a': twice at time 0 s"),
     ("back.csv", HEAD + "1,a,0,0\n0,a,1,0\n", "goes back from 1 s to 0 s"),
     ("one.csv", HEAD + "1,a,0,0\n", "one sample, expected two or more"),
-    ("nan.csv", HEAD + "0,a,0,0\n1,a,nan,0\n", "nan.csv:3: person 'a': a value that is no number"),
-    ("word.csv", HEAD + "0,a,zero,0\n", "word.csv:2: x 'zero', expected a number"),
-    ("cells.csv", HEAD + "0,a,0\n", "cells.csv:2: 3 cells, expected 4"),
+    ("nan.csv", HEAD + "0,a,0,0\n1,a,nan,0\n", "nan.csv:3: person 'a': x 'nan', expected a number"),
+    ("word.csv", HEAD + "0,a,zero,0\n", "word.csv:2: person 'a': x 'zero', expected a number"),
+    ("cells.csv", HEAD + "0,a,0\n", "person 'a': 2 numbers, expected time, x, y; --skip-bad"),
+    ("id.csv", HEAD + "0,a,0,0\n1,,0,0\n", "id.csv:3: a person without id"),
     ("head.csv", "t,id,x,y\n", "columns t, id, x, y, expected time,id,x,y"),
     ("empty.csv", HEAD, "no person in it"),
+    ("a.json", "", "'a.json' ends in none of .xml"),
     ("far.csv", HEAD + "0,a,0,0\n1,a,1e9,0\n", "from the origin, expected at most"),
     ("none.sqlite", "no database", "no SQLite database"),
     ("none.txt", "1 0 0 0 0\n", "expected '# framerate:' above 0"),
@@ -110,7 +120,7 @@ BAD = [
         "state.xml",
         '<commonRoad timeStepSize="0.1"><dynamicObstacle id="7"><type>pedestrian</type>'
         "<initialState/></dynamicObstacle></commonRoad>",
-        "state.xml:1: a state without exact time",
+        "state.xml:1: person '7': time 'none exact', expected a number",
     ),
     ("cut.xml", "<fcd-export>", "no XML: no element found"),
     (
@@ -118,19 +128,12 @@ BAD = [
         '<!DOCTYPE a [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export>&b;</fcd-export>',
         "a document type or an entity",
     ),
-    (
-        "globe.xml",
-        "<fcd-export>"
-        + "".join(sumo(["a"], t, x=13.0, y=52.0 + 1e-5 * t, speed=1.2) for t in range(20))
-        + "</fcd-export>",
-        "longitude and latitude",
-    ),
 ]
 
 
 @pytest.mark.parametrize(("name", "text", "message"), BAD, ids=[name for name, *_ in BAD])
 def test_bad_files_are_told_with_line_found_and_expected(tmp_path, name, text, message):
-    with pytest.raises(FileError) as caught:
+    with pytest.raises((FileError, InvalidField)) as caught:
         track_files.read_tracks(write(tmp_path, name, text))
     assert message in str(caught.value)
 
@@ -139,44 +142,64 @@ def test_headings_need_their_unit_and_agree_with_it(tmp_path):
     file = write(tmp_path, "h.csv", "time,id,x,y,heading\n0,a,0,0,0\n1,a,1,0,90\n")
     with pytest.raises(FileError, match="expected --heading-unit degrees or radians"):
         track_files.read_tracks(file)
-    with pytest.raises(FileError, match=r"h.csv:3: heading 90 radians, .* degrees\?"):
+    with pytest.raises(FileError, match=r"h.csv:3: .* heading 90 radians, 5156.62 degrees, expec"):
         track_files.read_tracks(file, TrackReading("radians"))
+    bare = write(tmp_path, "bare.csv", HEAD + "0,a,0,0\n1,a,1,0\n")
+    with pytest.raises(InvalidField, match=r"'degrees', but bare\.csv has no column heading"):
+        track_files.read_tracks(bare, DEGREES)
     assert len(track_files.read_tracks(file, DEGREES).tracks) == 1
 
 
-def circle(sign):
-    angles = np.linspace(0.0, 6.0, 61)
-    rows = [
-        f"{t:.2f},a,{np.cos(t):.4f},{sign * np.sin(t):.4f},{(t + np.pi / 2) % (2 * np.pi):.4f}"
-        for t in angles
-    ]
-    return "time,id,x,y,heading\n" + "\n".join(rows) + "\n"
-
-
 def test_a_table_whose_y_points_down_is_told_by_its_headings(tmp_path):
-    up, down = (write(tmp_path, f"{sign}.csv", circle(sign)) for sign in (1, -1))
-    radians = TrackReading("radians")
-    assert len(track_files.read_tracks(up, radians).tracks) == 1
+    moments, radians = np.linspace(0.0, 6.0, 61), TrackReading("radians")
+    rows = "".join(f"{t:.2f},a,{np.sin(t):.4f},{np.cos(t):.4f},{t:.4f}\n" for t in moments)
+    down = write(tmp_path, "down.csv", "time,id,x,y,heading\n" + rows)
+    assert len(track_files.read_tracks(down, replace(radians, y_down=True)).tracks) == 1
     with pytest.raises(FileError, match="is y down"):
         track_files.read_tracks(down, radians)
 
 
-def test_bad_people_are_left_out_and_told_where_that_is_asked_for(tmp_path):
-    file = write(tmp_path, "a.csv", HEAD + "0,a,0,0\n0,b,5,0\n1,a,1,0\n1,b,90,0\n")
-    found = track_files.read_tracks(file, skip_bad=True)
-    assert [track.person for track in found.tracks] == ["a"]
-    assert found.skipped.keys() == {"b"}
-    assert "line 5: jumps 85.00 m" in found.skipped["b"]
+def test_other_units_and_origins_are_told_as_such(tmp_path):
+    """Neither leaving people out nor parting them would help."""
+
+    def said(change, skip_bad=False, **reading):
+        rows = "".join(f"{t},a,{x},{y}\n" for t, x, y in map(change, np.arange(0.0, 4.0, 0.1)))
+        file = write(tmp_path, "a.csv", HEAD + rows)
+        with pytest.raises(FileError) as caught:
+            track_files.read_tracks(file, TrackReading(**reading), skip_bad)
+        return str(caught.value)
+
+    for size, guess in ((100, "centimetres"), (1000, "millimetres"), (30, "in what unit")):
+        for split in (None, 2.0):
+            for skip_bad in (False, True):
+                text = said(lambda t, s=size: (t, s * 1.2 * t, 0), skip_bad, split=split)
+                assert guess in text and "--s" not in text
+                if skip_bad and split is None:
+                    assert "no usable person among 1, the first 'a': line 3: jumps" in text
+    utm = said(lambda t: (t, 690_000 + t, 5_330_000))
+    assert "subtract the origin of the map" in utm and "--s" not in utm
+    for slow in (lambda t: (t, 13.0 + 1e-5 * t, 52.0), lambda t: (1000 * t, 1.2 * t, 0)):
+        assert "longitude and latitude, or times milliseconds?" in said(slow)
 
 
-def test_the_refusal_of_a_person_says_how_to_go_on_and_of_all_why(tmp_path):
-    file = write(tmp_path, "a.csv", HEAD + "0,b,5,0\n1,b,90,0\n")
-    with pytest.raises(
-        FileError, match=r"a\.csv:3: person 'b': jumps.*; --skip-bad leaves .*, --split"
-    ):
-        track_files.read_tracks(file)
-    with pytest.raises(FileError, match="all 1 people are unusable, the first 'b': line 3: jumps"):
-        track_files.read_tracks(file, skip_bad=True)
+def test_cells_that_are_no_numbers_leave_out_their_person_in_every_format(tmp_path):
+    steps = range(3)
+    good, bad = ([(t, who, t + x) for t in steps] for who, x in (("1", 0), ("2", 9)))
+    bad[1] = 1, "2", ""
+    rows = sorted(good + bad)
+    sumo_steps = "".join(sumo([who], t, x=x) for t, who, x in rows)
+    files = {
+        "a.csv": HEAD + "".join(f"{t},{who},{x},0\n" for t, who, x in rows),
+        "a.xml": f"<fcd-export>{sumo_steps}</fcd-export>",
+    }
+    paths = [write(tmp_path, name, text) for name, text in files.items()]
+    data = [(t, int(who), None if x == "" else x, 0.0, 1.0, 0.0) for t, who, x in rows]
+    paths.append(database(tmp_path / "a.sqlite", data, fps="1"))
+    for path in paths:
+        found = track_files.read_tracks(path, skip_bad=True)
+        assert [track.person for track in found.tracks] == ["1"]
+        assert list(found.skipped) == ["2"]
+        assert found.skipped["2"].startswith("line ") and "expected a number" in found.skipped["2"]
 
 
 def test_a_person_who_rides_is_away_and_comes_back_the_same_person(tmp_path, walk):
@@ -225,11 +248,6 @@ def test_clocks_that_count_from_1970_give_the_same_people(tmp_path, walk):
         np.testing.assert_allclose(later.points, path.points, atol=1e-5)
 
 
-def test_an_unknown_ending_is_refused():
-    with pytest.raises(InvalidField, match=r"'a\.json' ends in none of \.xml"):
-        track_files.read_tracks(Path("a.json"))
-
-
 def test_too_many_people_are_refused(tmp_path):
     people = "".join(f"0,p{index},0,0\n" for index in range(MAX_PEOPLE + 1))
     with pytest.raises(FileError, match=f"more than {MAX_PEOPLE} people"):
@@ -245,31 +263,16 @@ def test_people_start_stand_and_turn_along_their_tracks(walk, tmp_path):
     file = write(tmp_path, "street.csv", HEAD + rows + late)
     tracks = track_files.read_tracks(file).tracks
     crowd = track_crowd.build_crowd(walk, walk.gait, WalkQuestion(count=2), tracks)
-    motions = {}
-    first = 0
-    for batch in crowd.batches:
-        for index in range(len(batch)):
-            motions[first] = (
-                skeleton.positions(
-                    crowd.skeleton.parents,
-                    batch.rotations[index].astype(float),
-                    skeleton.translations(
-                        batch.bone_offsets[index].astype(float),
-                        batch.root_position[index].astype(float),
-                    ),
-                )
-                + crowd.placement.positions[first]
-            )
-            first += 1
     assert crowd.frames == 11 * 30 + 1
     np.testing.assert_array_equal(crowd.presence, [[0, 331], [120, 241]])
+    bones = {motion.index: motion.world()[0] for motion in bone_motion.character_motions(crowd)}
     for index, track in enumerate(tracks):
-        frames = np.round(track.times * 30).astype(int)
-        pelvis = floor_plane.project(motions[index][frames, 0])
+        frames = np.round(track.times * 30).astype(int) - crowd.presence[index, 0]
+        pelvis = floor_plane.project(bones[index][frames, 0])
         assert np.abs(pelvis - track.points).max() < 0.15
-        assert motions[index][..., 1].min() > 0.0
+        assert bones[index][..., 1].min() > 0.0
     # Control: the other person is far away.
-    assert np.abs(floor_plane.project(motions[1][frames, 0]) - tracks[0].points[:5]).max() > 1.0
+    assert np.abs(pelvis - tracks[0].points[:5]).max() > 1.0
 
 
 CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]

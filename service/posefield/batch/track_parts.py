@@ -38,11 +38,11 @@ from posefield.tracks.track_files import TrackReading
 MANIFEST = "manifest.json"
 ROW = np.dtype(
     [
-        *(("person", "<i4"), ("line", "<i8"), ("time", "<f8"), ("point", "<c16")),
-        *(("heading", "<f8"), ("headed", "?")),
+        *(("person", "<i4"), ("line", "<i8")),
+        *(("time", "<f8"), ("point", "<c16"), ("heading", "<f8")),
     ]
 )
-"""Row of a spool file. headed: whether it has a heading."""
+"""Row of a spool file."""
 
 
 @dataclass(frozen=True)
@@ -75,22 +75,24 @@ class TrackShard:
     """Rows of the people of one part.
 
     index: of the part. spool: file of its rows. begin: time of the first frame of all parts, s.
-    names: ids of its people, in their order.
+    names: ids of its people, in their order. faults: of some of them, as of `TrackRows`.
     """
 
     index: int
     spool: Path
     begin: float
     names: tuple[str, ...]
+    faults: dict[str, str]
 
 
 @dataclass
 class _Spools:
-    """Spool files of the parts. numbers: of the people, by id."""
+    """Spool files of the parts. numbers: of the people, by id. faults: as of `TrackRows`."""
 
     job: PartsJob
     folder: Path
     numbers: dict[str, int] = field(default_factory=dict)
+    faults: dict[str, str] = field(default_factory=dict)
 
     def add(self, block: TrackRows) -> None:
         """Sort the rows of a block into the files of their parts."""
@@ -98,11 +100,11 @@ class _Spools:
             self.numbers.setdefault(person, len(self.numbers))
         if len(self.numbers) > MAX_PEOPLE:
             raise FileError(self.job.tracks, f"more than {MAX_PEOPLE} people, expected fewer")
+        self.faults = {**block.faults, **self.faults}
         rows = np.empty(len(block.people), ROW)
         rows["person"] = [self.numbers[person] for person in block.people]
         rows["line"], rows["time"], rows["point"] = block.lines, block.times, block.points
-        rows["headed"] = block.headings is not None
-        rows["heading"] = 0.0 if block.headings is None else block.headings
+        rows["heading"] = block.headings
         indices = rows["person"] // self.job.people
         for index in np.unique(indices).tolist():
             with self.file(index).open("ab") as file:
@@ -118,17 +120,18 @@ class _Spools:
         Raises FileError as `track.group` does.
         """
         path, names, size = self.job.tracks, list(self.numbers), self.job.people
-        shards = [
-            TrackShard(index, self.file(index), np.inf, tuple(names[first : first + size]))
-            for index, first in enumerate(range(0, len(names), size))
-        ]
-        begins, facing, skipped = [np.inf], np.zeros(3, complex), dict[str, str]()
+        shards = []
+        for index, first in enumerate(range(0, len(names), size)):
+            some = tuple(names[first : first + size])
+            faults = {name: self.faults[name] for name in some if name in self.faults}
+            shards.append(TrackShard(index, self.file(index), np.inf, some, faults))
+        begins, totals, skipped = [np.inf], np.zeros(5, complex), dict[str, str]()
         for shard in shards:
             checked = track.check(_tracks(self.job, shard), path, self.job.skip_bad)
             begins += [float(person.times[0]) for person in checked.tracks]
-            facing += track.facing(checked.tracks)
+            totals += track.sums(checked.tracks)
             skipped |= checked.skipped
-        track.check_file(path, len(names), skipped, facing)
+        track.check_file(path, len(names), skipped, totals)
         return [replace(shard, begin=min(begins)) for shard in shards]
 
 
@@ -215,10 +218,11 @@ def _tracks(job: PartsJob, shard: TrackShard) -> Iterator[Track]:
         rows["person"], shard.index * job.people + np.arange(len(shard.names)), "right"
     )
     for name, some in zip(shard.names, np.split(rows, stops[:-1]), strict=True):
-        times, points, headings, lines = (
+        times, points, angles, lines = (
             some[column].copy() for column in ("time", "point", "heading", "line")
         )
-        yield Track(name, times, points, headings if some["headed"].all() else None, lines)
+        headings, fault = track.given_headings(angles), shard.faults.get(name, "")
+        yield Track(name, times, points, headings, lines, fault)
 
 
 @lru_cache(maxsize=1)
@@ -240,6 +244,7 @@ def _digest(job: PartsJob, shard: TrackShard) -> str:
         "skip_bad": job.skip_bad,
         "begin": shard.begin,
         "names": shard.names,
+        "faults": shard.faults,
         "versions": [__version__, *map(version, VERSIONED_PACKAGES)],
     }
     hashed = hashlib.sha256(orjson.dumps(facts, option=orjson.OPT_SORT_KEYS))

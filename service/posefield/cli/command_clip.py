@@ -1,7 +1,7 @@
 """The `posefield pose`, `clip` and `crowd` commands: motions of a model."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from msgspec import structs
@@ -88,10 +88,17 @@ def _clip_file(
     return answer, delivery.encode(answer)
 
 
-DEFAULT_COUNT = 500
+DEFAULT_COUNT, DEFAULT_SECONDS = 500, 10.0
 
 
-@with_question_options(WalkQuestion, default_values={"seconds": 10.0}, without={"count"})
+def _refuse(why: str, **options: Any) -> None:
+    """Raise InvalidField for the first of some options that is given."""
+    for name, value in options.items():
+        if value not in (None, False):
+            raise InvalidField(name, f"{value}, expected none {why}")
+
+
+@with_question_options(WalkQuestion, without={"count", "seconds"})
 def crowd(
     model: ModelPath,
     output: Annotated[
@@ -107,6 +114,9 @@ def crowd(
     count: Annotated[
         int | None,
         typer.Option(help=f"number of characters, each on its own path; default: {DEFAULT_COUNT}"),
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help=f"duration, s; default: {DEFAULT_SECONDS:g}")
     ] = None,
     paths: Annotated[
         Path | None,
@@ -129,7 +139,7 @@ def crowd(
         HeadingUnit | None,
         typer.Option(help="unit of the headings of a table, from east against the clock"),
     ] = None,
-    y_down: Annotated[bool, typer.Option(help="y of a table points down, as in images")] = False,
+    y_down: Annotated[bool, typer.Option(help="y points down, as in images")] = False,
     skip_bad: Annotated[
         bool, typer.Option(help="leave out, and name, people whose trajectory is unusable")
     ] = False,
@@ -167,30 +177,31 @@ def crowd(
     process_pool.limit_threads()
     if len(set(output)) < len(output):
         raise InvalidField("output", "the same file twice, expected each once")
-    if trajectories and question.motions:
-        raise InvalidField("motions", f"{question.motions}, expected none: each person has one")
-    reading = TrackReading(heading_unit, y_down, split)
-    if people_per_file is not None:
-        if trajectories is None or paths or count is not None:
-            raise InvalidField("people_per_file", "expected with trajectories alone")
+    if trajectories:
+        _refuse("with trajectories, which say how long", seconds=seconds, paths=paths)
+    else:
+        _refuse("without trajectories", heading_unit=heading_unit, y_down=y_down, split=split)
+        _refuse("without trajectories", skip_bad=skip_bad, people_per_file=people_per_file)
+    if paths or trajectories:
+        _refuse("with paths: each has one character", count=count, motions=question.motions)
+    if people_per_file is None:
+        _refuse("without people_per_file", workers=workers, scheduler=scheduler)
+    reading, tracks = TrackReading(heading_unit, y_down, split), None
+    if trajectories and people_per_file is not None:
         job = crowd_files.parts_job(
             model, trajectories, output, people_per_file, question, reading, skip_bad
         )
         manifest = crowd_files.write_parts(job, workers, scheduler)
         typer.echo(as_json(manifest) if json else crowd_files.parts_text(manifest, job.folder))
         return
-    if workers is not None or scheduler is not None:
-        raise InvalidField("workers", "given without people_per_file, expected only with it")
-    given_paths = paths or trajectories
-    if given_paths and count is not None:
-        raise InvalidField("count", f"{count}, expected none: every path has one character")
-    tracks = None
     if trajectories:
-        if paths:
-            raise InvalidField("paths", "given with trajectories, expected one of both")
         tracks = track_files.read_tracks(trajectories, reading, skip_bad)
         count = len(tracks.tracks)
-    question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
+    question = structs.replace(
+        question,
+        count=DEFAULT_COUNT if count is None else count,
+        seconds=DEFAULT_SECONDS if seconds is None else seconds,
+    )
     opened = open_model(model)
     if paths:
         routes = crowd_files.routes(paths)

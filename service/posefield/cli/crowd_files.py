@@ -16,6 +16,7 @@ from posefield.batch.track_parts import PartsJob
 from posefield.common.errors import FileError, InvalidField
 from posefield.common.units import Floats
 from posefield.console.options import open_model
+from posefield.console.output import counted
 from posefield.console.progress import ProgressBar
 from posefield.encode import crowd_formats
 from posefield.locomotion import gait, locomotion_plan, walking_crowd
@@ -51,25 +52,18 @@ def write_crowd(
     feet = _FootSkateMeter(opened, question.fps)
     watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
     crowd_formats.write_files(watched, outputs, question, model.session.card.roles)
-    followed = ["people", "performers", "begin", "scales", "path_error_cm"] if tracks else []
-    skipped = {} if tracks is None else {"skipped": {**tracks.skipped, **crowd.facts["skipped"]}}
+    facts = {"feet_stand": None, "take": {}, "overlaps": {}, "warnings": [], **crowd.facts}
+    if tracks:
+        facts["skipped"] = {**tracks.skipped, **facts["skipped"]}
     return {
         "file": str(outputs[0]),
         "files": [str(output) for output in outputs],
-        "model": crowd.facts["model"],
         "characters": len(crowd.motion),
         "motions": question.motions or len(crowd.motion),
         "frames": crowd.frames,
         "rate": crowd.rate,
         "seed": question.seed,
-        "level_shares": crowd.facts["level_shares"],
-        "outside_share": crowd.facts["outside_share"],
-        "feet_stand": crowd.facts.get("feet_stand"),
-        "take": crowd.facts.get("take", {}),
-        "overlaps": crowd.facts.get("overlaps", {}),
-        "warnings": crowd.facts.get("warnings", []),
-        **{name: crowd.facts[name] for name in followed},
-        **skipped,
+        **facts,
         **feet.facts(),
     }
 
@@ -121,9 +115,9 @@ def parts_text(manifest: dict[str, Any], folder: Path) -> str:
     size = sum(record["bytes"] for record in records)
     files = [record for record in records if record["file"]]
     worst = max(record["path_error_cm"]["worst"] for record in files)
-    people = sum(len(record["people"]) for record in files)
+    people = counted(sum(len(record["people"]) for record in files), "character")
     lines = [
-        f"{folder}: {people} people in {len(files)} files, {size / 1e6:.1f} MB",
+        f"{folder}: {people} in {counted(len(files), 'file')}, {size / 1e6:.1f} MB",
         f"smoothed paths are {worst:.1f} cm away from their tracks at most",
     ]
     skipped = track_crowd.left_out(manifest["skipped"])
@@ -195,12 +189,13 @@ def _with_progress(crowd: CrowdClip, motions: int, feet: _FootSkateMeter) -> Cro
 
 def report_text(facts: dict[str, Any]) -> str:
     """Return the report of a crowd as text."""
-    shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
     lines = [
-        f"{', '.join(facts['files'])}: {facts['characters']} characters, {facts['frames']} "
-        f"frames at {facts['rate']:g} a second, seed {facts['seed']}",
-        f"poses at each level of detail, the finest first: {', '.join(shares)}",
+        f"{', '.join(facts['files'])}: {counted(facts['characters'], 'character')}, "
+        f"{counted(facts['frames'], 'frame')} at {facts['rate']:g} a second, seed {facts['seed']}"
     ]
+    if "level_shares" in facts:
+        shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
+        lines.append(f"poses at each level of detail, the finest first: {', '.join(shares)}")
     if "skate_cm_per_s" in facts:
         lines.append(
             f"feet on the ground slide at {facts['skate_cm_per_s']:.1f} cm/s, those of the model's "
@@ -213,8 +208,12 @@ def report_text(facts: dict[str, Any]) -> str:
             f"lowered {facts['lowered_cm']:.1f} cm at most"
         )
     if facts["take"]:
-        lines.append(_take_text(facts["take"]))
-    if facts["outside_share"]:
+        take = facts["take"]
+        which = f"take {take['seed']}" if take["seed"] else "no take"
+        which = "a take for each motion" if take["seed"] == "index" else which
+        detail = ", with details sampled" if take["detail"] else ""
+        lines.append(f"{which}, variety {take['variety']:g}{detail}")
+    if facts.get("outside_share"):
         lines.append(
             f"{100 * facts['outside_share']:.1f} % of the poses have some control outside what was "
             "sampled"
@@ -227,11 +226,3 @@ def report_text(facts: dict[str, Any]) -> str:
         )
     lines += track_crowd.shorten(track_crowd.left_out(facts.get("skipped", {})))
     return "\n".join([*lines, *track_crowd.shorten(facts["warnings"])])
-
-
-def _take_text(take: dict[str, Any]) -> str:
-    which = f"take {take['seed']}" if take["seed"] else "no take"
-    if take["seed"] == "index":
-        which = "a take for each motion"
-    detail = ", with details sampled" if take["detail"] else ""
-    return f"{which}, variety {take['variety']:g}{detail}"

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from posefield.console.progress import ProgressBar
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural unless it is one."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def as_json(value: Any) -> str:
     """Return plain values as indented JSON."""
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()

@@ -12,7 +12,7 @@ from posefield.encode import actor_scene, bone_tables, crowd_size, motion_tables
 from posefield.encode.archives import ARROW, NPZ, Format, by_extension
 from posefield.motion.clip import CrowdClip, Motions
 from posefield.question.motion_question import DEFAULT_BODY
-from posefield.question.walk_question import WalkQuestion
+from posefield.question.walk_question import DEFAULT_INSTANCING, WalkQuestion
 
 Roles = Mapping[str, str]
 
@@ -46,16 +46,17 @@ ENDINGS = (*crowd_size.FILES, *CROWD_FILES)
 def ending_of(path: Path, question: WalkQuestion) -> str:
     """Return the ending of a crowd's file: the longest that fits.
 
-    Raises UnknownFormat for another, and InvalidField for a body in a format without bodies.
+    Raises UnknownFormat for another, and InvalidField for a body or an instancing outside of USD.
     """
     fitting = [ending for ending in ENDINGS if path.name.endswith(f".{ending}")]
     if not fitting:
         raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(ENDINGS)}")
     ending = max(fitting, key=len)
-    if ending in CROWD_FILES and question.body is not None:
-        raise InvalidField(
-            "body", f"{question.body!r}, expected none given: {ending} files carry no body"
-        )
+    if ending in CROWD_FILES:
+        for name, default in (("body", None), ("instancing", DEFAULT_INSTANCING)):
+            if (value := getattr(question, name)) != default:
+                text = f"{value!r}, expected none given: {ending} files carry no {name}"
+                raise InvalidField(name, text)
     return ending
 
 

@@ -38,7 +38,7 @@ from posefield.question.motion_question import (
 )
 from posefield.question.walk_question import Instancing, WalkerTake, WalkQuestion
 from posefield.tracks import track, track_crowd
-from posefield.tracks.track import MAX_ANGLE, Track, TrackSet
+from posefield.tracks.track import Track, TrackSet
 
 TRACK_FORMATS: Mapping[str, Format] = {
     **CROWD_FORMATS,
@@ -103,11 +103,11 @@ def read_tracks(body: TracksBody, limit: int) -> TrackSet:
             raise InvalidField(pointer, problem.message)
     if not tracks:
         name, why = next(iter(skipped.items()))
-        text = f"all {len(skipped)} people are unusable, the first {name!r}: {why}"
+        text = f"no usable person among {len(skipped)}, the first {name!r}: {why}"
         raise InvalidField("tracks", text)
-    mirrored = track.find_mirror(track.facing(tracks))
-    if mirrored is not None:
-        raise InvalidField("tracks", mirrored)
+    problem_of_all = track.find_file_problem(track.sums(tracks))
+    if problem_of_all is not None:
+        raise InvalidField("tracks", problem_of_all)
     return TrackSet(tuple(tracks), skipped)
 
 
@@ -121,13 +121,8 @@ def _read(person: TrackBody, where: str) -> tuple[Track, track.TrackProblem | No
         if column is not None and len(column) != count:
             text = f"{len(column)} samples, expected {count} as in times"
             raise InvalidField(f"{where}/{name}", text)
-    angles = None if headings is None else np.array(headings)
-    if angles is not None and np.abs(angles).max() > MAX_ANGLE["radians"]:
-        at = int(np.argmax(np.abs(angles) > MAX_ANGLE["radians"]))
-        text = f"heading {angles[at]:g} radians, expected at most {MAX_ANGLE['radians']:.4g}"
-        raise InvalidField(f"{where}/headings/{at}", f"{text}: degrees?")
     x, y = np.array(person.positions).T
-    faced = None if angles is None else track.floor_headings(angles)
+    faced = None if headings is None else track.floor_headings(np.array(headings))
     walk = Track(person.id, np.array(person.times), track.floor_points(x, y), faced)
     return walk, track.find_problem(walk)
 
@@ -143,23 +138,19 @@ def check_size(
     begin = min(walk.times[0] for walk in tracks.tracks)
     seconds = float(max(walk.times[-1] for walk in tracks.tracks) - begin)
     frames, people = int(seconds * body.fps) + 2, len(tracks.tracks)
-    if frames > settings.crowd_frames:
-        text = f"{frames:.6g} frames from the first sample to the last"
-        raise InvalidField("tracks", f"{text}, expected at most {settings.crowd_frames}")
-    if people * frames > settings.crowd_poses:
-        text = f"{people * frames:.3g} poses of {people} people in {frames} frames"
-        raise InvalidField("tracks", f"{text}, expected at most {settings.crowd_poses}")
     points = character.body_size(card.skeleton, body.body or DEFAULT_BODY)
     counts = CrowdCounts(len(card.skeleton), people, people, frames, points, len(card.curves))
     if ending in CROWD_FORMATS:
         size = crowd_size.file_size_bound(counts, ending, body.instancing == "flatten")
     else:
         size = crowd_size.table_size_bound(counts, ending)
-    if size > settings.output_limit:
-        text = f"{size / 1e6:.1f} MB for {people} people in {frames} frames as {ending}"
-        raise InvalidField(
-            "tracks", f"{text}, expected at most {settings.output_limit / 1e6:.1f} MB"
-        )
+    for number, text, limit in (
+        (frames, "frames from the first sample to the last", settings.crowd_frames),
+        (people * frames, f"poses of {people} in {frames} frames", settings.crowd_poses),
+        (size, f"bytes of {people} in {frames} frames as {ending}", settings.output_limit),
+    ):
+        if number > limit:
+            raise InvalidField("tracks", f"{number} {text}, expected at most {limit}")
 
 
 async def answer_tracks(request: ServiceRequest) -> Response:

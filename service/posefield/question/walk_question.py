@@ -10,6 +10,7 @@ from posefield.common.errors import InvalidField
 from posefield.question.motion_question import DEFAULT_VARIETY, Body, FeetMode, LabelValue
 
 Instancing = Literal["references", "scenegraph", "flatten"]
+DEFAULT_INSTANCING: Instancing = "references"
 WalkerTake = Literal["index"] | Whole
 """Seed of all characters, or "index" for a seed of its own for each."""
 DEFAULT_FOV, DEFAULT_HEIGHT, DEFAULT_PIXELS = math.pi / 3.0, 1080.0, 1.0
@@ -90,7 +91,7 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     ] = False
     instancing: Annotated[
         Instancing, Meta(description="sharing of data between characters in USD")
-    ] = "references"
+    ] = DEFAULT_INSTANCING
     body: Body = None
 
     def __post_init__(self) -> None:

@@ -25,8 +25,10 @@ JUMP = 0.5
 """Shortest jump, m."""
 MAX_SECONDS = 1e10
 """Largest time stamp, s: clocks that count from 1970 are at 2e9, and a float64 has 2e-6 s here."""
-MAX_ANGLE = {"radians": 2.0 * np.pi + 0.01, "degrees": 360.0}
-"""Largest heading of each unit, in that unit."""
+MAX_ANGLE = 2.0 * np.pi + 0.01
+"""Largest heading, rad."""
+SLOWEST = 0.01
+"""Speed that somebody in a file exceeds unless all stand, m/s."""
 MIRRORED, FOLLOWED, MOVING = 0.9, 0.5, 0.5
 """Agreement of headings with the mirrored direction of travel from which on, and that with the
 direction itself up to which, y points down; speed from which on directions count, m/s."""
@@ -55,7 +57,7 @@ class Track:
 
     person: id in the file. times: (S,), s, ascending, as in the file. points: (S,), over the floor,
     m. headings: (S,), rad; None where the file has none. lines: (S,), in the file, from 1, or rows
-    of a table; empty for arrays.
+    of a table; empty for arrays. fault: what is wrong with the first sample without numbers.
     """
 
     person: str
@@ -63,6 +65,7 @@ class Track:
     points: Annotated[FloorVectors, "samples"]
     headings: Annotated[Floats, "samples"] | None = None
     lines: Annotated[Indices, "rows"] | Sequence[int] = ()
+    fault: str = ""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -70,11 +73,12 @@ class Track:
 
 
 class TrackProblem(NamedTuple):
-    """First sample of a track that cannot be used, why, and the column that is at fault."""
+    """First sample of a track that cannot be used, why, the column that is at fault, and advice."""
 
     sample: int
     message: str
     column: str = "positions"
+    advice: str = "--skip-bad leaves such people out"
 
 
 @dataclass(frozen=True)
@@ -89,15 +93,16 @@ class TrackSet:
 class TrackRows:
     """Block of R rows of a file, in its order.
 
-    people: ids (R,). times: (R,), s. points: (R,), m. headings: (R,), rad; None without them.
-    lines: (R,), of the file, from 1.
+    people: ids (R,). times: (R,), s. points: (R,), m. headings: (R,), rad. lines: (R,), of the
+    file, from 1. faults: by id, what is wrong with the first row of a person without numbers.
     """
 
     people: Sequence[str]
     times: Annotated[Floats, "rows"]
     points: Annotated[FloorVectors, "rows"]
-    headings: Annotated[Floats, "rows"] | None
+    headings: Annotated[Floats, "rows"]
     lines: Annotated[Indices, "rows"]
+    faults: Mapping[str, str]
 
 
 def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> TrackSet:
@@ -107,7 +112,9 @@ def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> Tr
     line, for the first unusable track otherwise, and for too many people or none.
     """
     rows: dict[str, list[tuple[TrackRows, Indices]]] = {}
+    faults: dict[str, str] = {}
     for block in blocks:
+        faults = {**block.faults, **faults}
         numbers: dict[str, int] = {}
         whose = np.array([numbers.setdefault(person, len(numbers)) for person in block.people])
         order = np.argsort(whose, kind="stable")
@@ -116,23 +123,24 @@ def group(blocks: Iterable[TrackRows], path: Path, skip_bad: bool = False) -> Tr
             rows.setdefault(person, []).append((block, indices))
         if len(rows) > MAX_PEOPLE:
             raise FileError(path, f"more than {MAX_PEOPLE} people, expected at most as many")
-    tracks = check((_joined(person, pieces) for person, pieces in rows.items()), path, skip_bad)
-    check_file(path, len(rows), tracks.skipped, facing(tracks.tracks))
+    joined = (_joined(person, rows[person], faults.get(person, "")) for person in rows)
+    tracks = check(joined, path, skip_bad)
+    check_file(path, len(rows), tracks.skipped, sums(tracks.tracks))
     return tracks
 
 
 def check_file(
-    path: Path, people: int, skipped: Mapping[str, str], sums: Annotated[FloorVectors, "3"]
+    path: Path, people: int, skipped: Mapping[str, str], totals: Annotated[FloorVectors, "5"]
 ) -> None:
-    """Raise FileError if all people are skipped, or y points down. sums: as of `facing`."""
+    """Raise FileError if all people are skipped, and as of `find_file_problem`."""
     if not people:
         raise FileError(path, "no person in it, expected one or more")
     if people == len(skipped):
         name, why = next(iter(skipped.items()))
-        raise FileError(path, f"all {people} people are unusable, the first {name!r}: {why}")
-    mirrored = find_mirror(sums)
-    if mirrored is not None:
-        raise FileError(path, mirrored)
+        raise FileError(path, f"no usable person among {people}, the first {name!r}: {why}")
+    problem = find_file_problem(totals)
+    if problem is not None:
+        raise FileError(path, problem)
 
 
 def check(tracks: Iterable[Track], path: Path, skip_bad: bool = False) -> TrackSet:
@@ -148,21 +156,25 @@ def check(tracks: Iterable[Track], path: Path, skip_bad: bool = False) -> TrackS
             continue
         line = int(track.lines[problem.sample])
         if not skip_bad:
-            advice = "--skip-bad leaves such people out, --split parts them at jumps"
-            raise FileError(path, f"person {track.person!r}: {problem.message}; {advice}", line)
+            texts = filter(None, (problem.message, problem.advice))
+            raise FileError(path, f"person {track.person!r}: {'; '.join(texts)}", line)
         skipped[track.person] = f"line {line}: {problem.message}"
     return TrackSet(tuple(usable), skipped)
 
 
-def _joined(person: str, pieces: Sequence[tuple[TrackRows, Indices]]) -> Track:
-    times, points, lines = (
+def _joined(person: str, pieces: Sequence[tuple[TrackRows, Indices]], fault: str) -> Track:
+    times, points, headings, lines = (
         np.concatenate([getattr(block, name)[rows] for block, rows in pieces])
-        for name in ("times", "points", "lines")
+        for name in ("times", "points", "headings", "lines")
     )
-    headings = None
-    if all(block.headings is not None for block, _ in pieces):
-        headings = np.concatenate([block.headings[rows] for block, rows in pieces])  # type: ignore[index]
-    return Track(person, times, points, headings, lines)
+    return Track(person, times, points, given_headings(headings), lines, fault)
+
+
+def given_headings(
+    headings: Annotated[Floats, "samples"],
+) -> Annotated[Floats, "samples"] | None:
+    """Return the headings of a person; None where none is a number."""
+    return None if np.isnan(headings).all() else headings
 
 
 def find_problem(track: Track) -> TrackProblem | None:
@@ -172,12 +184,18 @@ def find_problem(track: Track) -> TrackProblem | None:
     finite = np.isfinite(columns).all(axis=0)
     if not finite.all():
         at = int(np.argmin(finite))
-        return TrackProblem(at, "a value that is no number, expected finite ones")
+        return TrackProblem(at, track.fault or "a value that is no number, expected finite ones")
+    if track.headings is not None:
+        angles = np.abs(track.headings - 0.5 * np.pi)
+        if angles.max() > MAX_ANGLE:
+            at = int(np.argmax(angles > MAX_ANGLE))
+            text = f"heading {angles[at]:g} radians, {np.degrees(angles[at]):g} degrees"
+            return TrackProblem(at, f"{text}, expected at most one turn", "headings")
     far = np.maximum(np.abs(track.points.real), np.abs(track.points.imag))
     if far.max() > MAX_COORDINATE:
         at = int(np.argmax(far))
         text = f"{far[at]:g} m from the origin, expected at most {MAX_COORDINATE:g} m"
-        return TrackProblem(at, text)
+        return TrackProblem(at, f"{text}: subtract the origin of the map", advice="")
     if np.abs(track.times).max() > MAX_SECONDS:
         at = int(np.argmax(np.abs(track.times)))
         text = f"time {track.times[at]:g} s, expected at most {MAX_SECONDS:g} s"
@@ -196,41 +214,56 @@ def find_problem(track: Track) -> TrackProblem | None:
     ways = np.abs(np.diff(track.points))
     jumps = ways > np.maximum(JUMP, FASTEST * steps)
     if jumps.any():
-        at = int(np.argmax(jumps))
-        return TrackProblem(
-            at + 1,
-            f"jumps {ways[at]:.2f} m in {steps[at]:g} s at {track.times[at + 1]:g} s, expected at "
-            f"most {FASTEST:g} m/s of x and y in m",
-        )
+        at, advice = int(np.argmax(jumps)), "--split parts a person there, --skip-bad leaves it out"
+        text = f"jumps {ways[at]:.2f} m in {steps[at]:g} s at {track.times[at + 1]:g} s"
+        text += f", expected at most {FASTEST:g} m/s"
+        if jumps.mean() > 0.5 and len(jumps) > 2:
+            text += f", as in {jumps.sum()} of {len(jumps)} steps: "
+            text, advice = text + unit_question(float(np.median(ways / steps))), ""
+        return TrackProblem(at + 1, text, advice=advice)
     return None
 
 
-def facing(tracks: Iterable[Track]) -> Annotated[FloorVectors, "3"]:
-    """Return sums of headings from the direction of travel, and from its mirror, and their number.
+def unit_question(speed: float) -> str:
+    """Return what a median speed beyond that of walkers, m/s, says about the units of a file."""
+    near = [unit for unit, size in (("centi", 100.0), ("milli", 1e3)) if 0.3 < speed / size < 2.5]
+    guess = f"are they in {near[0]}metres?" if near else "in what unit are they?"
+    return f"x and y have to be in m, and times in s: at {speed:.3g} m/s, {guess}"
+
+
+def sums(tracks: Iterable[Track]) -> Annotated[FloorVectors, "5"]:
+    """Return sums of headings from the direction of travel, from its mirror, and their number; and
+    the number of steps that move, and of those at more than `SLOWEST`.
 
     Sums of parts of a file add up to that of the file.
     """
-    sums = np.zeros(3, complex)
+    totals = np.zeros(5, complex)
     for track in tracks:
+        ways, steps = np.diff(track.points), np.diff(track.times)
+        totals[3:] += np.count_nonzero(ways), np.count_nonzero(np.abs(ways) > SLOWEST * steps)
         if track.headings is not None:
-            ways = np.diff(track.points)
-            moving = np.abs(ways) > MOVING * np.diff(track.times)
+            moving = np.abs(ways) > MOVING * steps
             ways = ways[moving]
             faces = np.exp(1j * track.headings[:-1][moving]) / np.abs(ways)
-            sums += (faces @ np.conj(ways), -faces @ ways, len(ways))
-    return sums
+            totals[:3] += (faces @ np.conj(ways), -faces @ ways, len(ways))
+    return totals
 
 
-def find_mirror(sums: Annotated[FloorVectors, "3"]) -> str | None:
-    """Return a sentence where headings agree with travel only if y points down, else None.
+def find_file_problem(totals: Annotated[FloorVectors, "5"]) -> str | None:
+    """Return what is wrong with a file as a whole; None if nothing is. totals: as of `sums`.
 
-    sums: as of `facing`.
+    Nobody moves but at a crawl, or headings agree with travel only if y points down.
     """
-    agreement, opposite = np.abs(sums[:2] / max(abs(sums[2]), 1.0)).tolist()
+    agreement, opposite = np.abs(totals[:2] / max(abs(totals[2]), 1.0)).tolist()
     if opposite > MIRRORED and agreement < FOLLOWED:
         return (
             f"headings agree with the mirrored direction of travel ({opposite:.2f}) and not with "
             f"the direction itself ({agreement:.2f}), expected y north and angles from east "
             "against the clock: is y down?"
+        )
+    if totals[3] and not totals[4]:
+        return (
+            f"people move at less than {SLOWEST:g} m/s all the time, expected m and s: are x and y "
+            "longitude and latitude, or times milliseconds?"
         )
     return None

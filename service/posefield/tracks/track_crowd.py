@@ -273,8 +273,6 @@ def crowd_facts(crowd: TrackCrowd) -> dict[str, Any]:
             "mean": round(100.0 * float(np.concatenate(errors).mean()), 2),
             "worst": round(100.0 * float(max(error.max() for error in errors)), 2),
         },
-        "outside_share": 0.0,
-        "level_shares": [1.0],
         "skipped": crowd.skipped,
         **overlaps,
         "warnings": [

@@ -7,7 +7,7 @@ import csv
 import itertools
 import math
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 
 from posefield.common.errors import FileError, InvalidField
 from posefield.tracks import track
-from posefield.tracks.track import MAX_ANGLE, TrackRows, TrackSet
+from posefield.tracks.track import TrackRows, TrackSet
 
 BLOCK_ROWS = 65_536
 """Rows of a block, which take some 10 MB while they are read."""
@@ -27,8 +27,8 @@ LONGEST_LINE = 100_000
 HeadingUnit = Literal["degrees", "radians"]
 COLUMNS = ("time", "id", "x", "y")
 DATABASE = b"SQLite format 3\0"
-GEOGRAPHIC = 0.01
-"""Share of the stated speed that people in degrees of longitude and latitude seem to move at."""
+MOST_JUMPS = 10
+"""Jumps of a person one after the other that are no jumps: the unit is another."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class TrackReading:
     """Conventions of a table that the file does not state.
 
     heading_unit: of the headings of a table, from east against the clock; they are refused without
-    it. y_down: whether y of a table points down, as in images; its angles turn over with it. split:
-    time without a sample, s, after which, as after a jump, a person comes back as another leg.
+    it. y_down: whether y points down, as in images; angles turn over with it. split: time without a
+    sample, s, after which, as after a jump, a person comes back as another leg.
     """
 
     heading_unit: HeadingUnit | None = None
@@ -46,8 +46,9 @@ class TrackReading:
 
 
 DEFAULT_READING = TrackReading()
-Row = tuple[str, float, float, float, float, int]
-"""Id, time, x, y, angle from east against the clock, rad, not a number without one, and line."""
+Row = tuple[str, float, float, float, float, int, str]
+"""Id, time, x, y, angle from east against the clock, rad, not a number without one, line, and what
+is wrong with a cell, which leaves no number; empty if all are right."""
 
 
 def read_tracks(
@@ -69,33 +70,43 @@ def row_blocks(path: Path, reading: TrackReading = DEFAULT_READING) -> Iterator[
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise InvalidField("trajectories", f"{path.name!r} ends in none of {', '.join(READERS)}")
+    if reading.heading_unit and reader is not _table_rows:
+        text = f"{reading.heading_unit!r}, expected none: {path.suffix} files state it"
+        raise InvalidField("heading_unit", text)
     try:
         rows = reader(path, reading)
         if reading.split is not None:
-            rows = _legs(rows, reading.split)
+            rows = _legs(path, rows, reading.split)
         while batch := list(itertools.islice(rows, BLOCK_ROWS)):
-            people, *numbers, lines = zip(*batch, strict=True)
+            people, *numbers, lines, texts = zip(*batch, strict=True)
+            if "" in people:
+                raise FileError(path, "a person without id", lines[people.index("")])
             times, x, y, angles = np.array(numbers, dtype=np.float64)
             points = track.floor_points(x, -y if reading.y_down else y)
-            angles = -angles if reading.y_down else angles
-            headings = None if np.isnan(angles).all() else track.floor_headings(angles)
-            yield TrackRows(people, times, points, headings, np.array(lines, dtype=np.int64))
+            headings = track.floor_headings(-angles if reading.y_down else angles)
+            pairs = zip(reversed(people), reversed(texts), strict=True)
+            faults = {person: fault for person, fault in pairs if fault}
+            yield TrackRows(people, times, points, headings, np.array(lines, np.int64), faults)
     except OSError as fault:
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
     except UnicodeDecodeError as fault:
         raise FileError(path, f"no text in UTF-8: byte {fault.start}") from fault
 
 
-def _legs(rows: Iterator[Row], longest: float) -> Iterator[Row]:
+def _legs(path: Path, rows: Iterator[Row], longest: float) -> Iterator[Row]:
     """Yield rows whose people have another id after a jump or a longer time without a sample."""
-    before: dict[str, tuple[float, float, float, int]] = {}
-    for person, time, x, y, angle, line in rows:
-        then, east, north, leg = before.get(person, (time, x, y, 1))
+    before: dict[str, tuple[float, float, float, int, int]] = {}
+    for person, time, x, y, angle, line, fault in rows:
+        then, east, north, leg, jumps = before.get(person, (time, x, y, 1, 0))
         step, distance = time - then, math.hypot(x - east, y - north)
-        if step > longest or (step > 0.0 and distance > max(track.JUMP, track.FASTEST * step)):
-            leg += 1
-        before[person] = time, x, y, leg
-        yield track.leg_name(person, leg), time, x, y, angle, line
+        jumped = step > 0.0 and distance > max(track.JUMP, track.FASTEST * step)
+        jumps = jumps + 1 if jumped else 0
+        if jumps == MOST_JUMPS:
+            text = f"person {person!r}: {jumps} jumps one after the other"
+            raise FileError(path, f"{text}: {track.unit_question(distance / step)}", line)
+        leg += jumped or step > longest
+        before[person] = time, x, y, leg, jumps
+        yield track.leg_name(person, leg), time, x, y, angle, line, fault
 
 
 def _number(path: Path, text: str, name: str, line: int) -> float:
@@ -103,6 +114,23 @@ def _number(path: Path, text: str, name: str, line: int) -> float:
         return float(text)
     except ValueError as fault:
         raise FileError(path, f"{name} {text[:40]!r}, expected a number", line) from fault
+
+
+def _numbers(names: Sequence[str], cells: Sequence[Any]) -> tuple[list[float], str]:
+    """Return the numbers of cells, and what is wrong if one is none; not a number each, then."""
+    numbers = list[float]()
+    for name, cell in zip(names, cells, strict=False):
+        try:
+            numbers.append(float(cell))
+        except (TypeError, ValueError):
+            numbers.append(math.nan)
+        if not math.isfinite(numbers[-1]):
+            fault = f"{name} {str(cell)[:40]!r}, expected a number"
+            return [math.nan] * len(names), fault
+    if len(cells) != len(names):
+        fault = f"{len(cells)} numbers, expected {', '.join(names)}"
+        return [math.nan] * len(names), fault
+    return numbers, ""
 
 
 def _table_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
@@ -117,36 +145,24 @@ def _table_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
                 "time,id,x,y,heading",
                 1,
             )
-        unit = reading.heading_unit
-        if len(head) > len(COLUMNS) and unit is None:
+        headed, unit = len(head) > len(COLUMNS), reading.heading_unit
+        if headed and unit is None:
             raise FileError(
                 path,
                 "headings of an unknown unit, expected --heading-unit degrees or radians, counted "
                 "from east against the clock",
                 1,
             )
+        if unit and not headed:
+            raise InvalidField("heading_unit", f"{unit!r}, but {path.name} has no column heading")
+        names, size = (head[0], *head[2:]), math.radians(1.0) if unit == "degrees" else 1.0
         for cells in lines:
-            if not cells:
-                continue
-            if len(cells) != len(head):
-                raise FileError(path, f"{len(cells)} cells, expected {len(head)}", lines.line_num)
-            line = lines.line_num
-            time, x, y, *angles = (
-                _number(path, cells[column], head[column], line)
-                for column in (0, *range(2, len(head)))
-            )
-            angle = _angle(path, angles[0], unit, line) if unit and angles else math.nan
-            yield cells[1].strip(), time, x, y, angle, line
-
-
-def _angle(path: Path, value: float, unit: HeadingUnit, line: int) -> float:
-    """Return an angle, rad, of a table; FileError for one that cannot be of the unit."""
-    if abs(value) > MAX_ANGLE[unit]:
-        other = ": degrees?" if unit == "radians" else ""
-        raise FileError(
-            path, f"heading {value:g} {unit}, expected at most {MAX_ANGLE[unit]:.4g}{other}", line
-        )
-    return math.radians(value) if unit == "degrees" else value
+            if len(cells) == 1:
+                raise FileError(path, f"1 cell, expected {len(head)}", lines.line_num)
+            if cells:
+                (time, x, y, *angles), fault = _numbers(names, (cells[0], *cells[2:]))
+                angle = size * angles[0] if angles else math.nan
+                yield cells[1].strip(), time, x, y, angle, lines.line_num, fault
 
 
 def _lines(path: Path, file: IO[str]) -> Iterator[str]:
@@ -176,15 +192,8 @@ def _jupedsim_text_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
                     raise FileError(
                         path, f"frame rate {rate}, expected '# framerate:' above 0", number
                     )
-                if len(words) < 4:
-                    raise FileError(
-                        path, f"{len(words)} columns, expected id, frame, x and y", number
-                    )
-                frame, x, y = (
-                    _number(path, word, name, number)
-                    for word, name in zip(words[1:4], ("frame", "x", "y"), strict=True)
-                )
-                yield words[0], frame / rate, unit * x, unit * y, math.nan, number
+                (frame, x, y), fault = _numbers(("frame", "x", "y"), words[1:4])
+                yield words[0], frame / rate, unit * x, unit * y, math.nan, number, fault
 
 
 def _jupedsim_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
@@ -204,64 +213,50 @@ def _jupedsim_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
             turned += "where ori_x != 0 or ori_y != 0 group by id"
             axes = {person: axis for person, _, *axis in database.execute(turned)}
             rows = database.execute(
-                "select rowid, frame, id, pos_x, pos_y, ori_x, ori_y from trajectory_data "
+                "select rowid, id, frame, pos_x, pos_y, ori_x, ori_y from trajectory_data "
                 "order by frame, id"
             )
-            for line, frame, person, *values in rows:
-                if not all(isinstance(value, int | float) for value in (frame, *values)):
-                    raise FileError(
-                        path, f"values {frame}, {values} in trajectory_data, expected numbers", line
-                    )
-                x, y, east, north = map(float, values)
-                if east or north:
-                    axes[person] = [east, north]
+            names = "frame", "pos_x", "pos_y", "ori_x", "ori_y"
+            for line, person, *cells in rows:
+                (frame, x, y, *axis), fault = _numbers(names, cells)
+                if not fault and any(axis):
+                    axes[person] = axis
                 east, north = axes.get(person, (0.0, 0.0))
                 angle = math.atan2(north, east) if (east or north) else math.nan
-                yield str(person), frame / rate, x, y, angle, line
-    except sqlite3.Error as fault:
-        raise FileError(path, f"no trajectories of JuPedSim: {fault}") from fault
+                yield str(person), frame / rate, x, y, angle, line, fault
+    except sqlite3.Error as error:
+        raise FileError(path, f"no trajectories of JuPedSim: {error}") from error
 
 
-@dataclass
-class _XmlEvents:
-    """Parser of XML in chunks, which refuses entities and document types: no bombs."""
+def _parse(
+    path: Path, start: Callable[[str, dict[str, str], int], None], end: Callable[[str, str], None]
+) -> Iterator[None]:
+    """Parse XML, and yield after each chunk; entities and document types are refused: no bombs."""
+    parser, texts = expat.ParserCreate(), list[str]()
 
-    path: Path
-    start: Callable[[str, dict[str, str], int], None]
-    end: Callable[[str, str], None]
-    text: str = ""
+    def finish(name: str) -> None:
+        end(name, "".join(texts).strip())
+        texts.clear()
 
-    def feed(self) -> Iterator[None]:
-        """Parse the file; yield after each chunk."""
-        parser = expat.ParserCreate()
-        parser.StartElementHandler = lambda name, values: self.start(
-            name, values, parser.CurrentLineNumber
-        )
-        parser.EndElementHandler = self._end
-        parser.CharacterDataHandler = self._add
-        parser.StartDoctypeDeclHandler = self._refuse
-        parser.EntityDeclHandler = self._refuse
-        try:
-            with self.path.open("rb") as file:
-                while chunk := file.read(CHUNK):
-                    parser.Parse(chunk)
-                    yield
-                parser.Parse(b"", True)
+    def refuse(*_: Any) -> None:
+        raise FileError(path, "a document type or an entity, expected elements alone")
+
+    parser.buffer_text = True
+    parser.StartElementHandler = lambda name, values: start(name, values, parser.CurrentLineNumber)
+    parser.EndElementHandler = finish
+    # Numbers are shorter.
+    parser.CharacterDataHandler = lambda text: texts.append(text[-200:])
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
+    try:
+        with path.open("rb") as file:
+            while chunk := file.read(CHUNK):
+                parser.Parse(chunk)
                 yield
-        except expat.ExpatError as fault:
-            message = expat.ErrorString(fault.code)
-            raise FileError(self.path, f"no XML: {message}", fault.lineno) from fault
-
-    def _add(self, text: str) -> None:
-        # Numbers are shorter.
-        self.text = (self.text + text)[-200:]
-
-    def _end(self, name: str) -> None:
-        self.end(name, self.text.strip())
-        self.text = ""
-
-    def _refuse(self, *_: Any) -> None:
-        raise FileError(self.path, "a document type or an entity, expected elements alone")
+            parser.Parse(b"", True)
+            yield
+    except expat.ExpatError as fault:
+        message = expat.ErrorString(fault.code)
+        raise FileError(path, f"no XML: {message}", fault.lineno) from fault
 
 
 @dataclass
@@ -270,8 +265,6 @@ class _SumoReader:
 
     path: Path
     rows: list[Row]
-    steps: list[tuple[float, float]] = field(default_factory=list)
-    last: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     time: float | None = None
     riding: set[str] = field(default_factory=set)
     legs: dict[str, int] = field(default_factory=dict)
@@ -282,51 +275,22 @@ class _SumoReader:
     def start(self, name: str, values: dict[str, str], line: int) -> None:
         """Take an element."""
         if name == "timestep":
-            self.time = self._value(values, "time", line)
+            self.time = _number(self.path, values.get("time", ""), "time", line)
         elif name == "person":
             if self.time is None:
                 raise FileError(self.path, "a person outside of a timestep", line)
-            if "id" not in values:
-                raise FileError(self.path, "a person without id", line)
-            person = values["id"]
+            person = values.get("id", "")
             if values.get("vehicle"):
                 self.riding.add(person)
                 return
             if person in self.riding:
                 self.riding.remove(person)
                 self.legs[person] = self.legs.get(person, 1) + 1
-            x, y = (self._value(values, axis, line) for axis in "xy")
+            names = "x", "y", "angle"
+            (x, y, angle), fault = _numbers(names, [values.get(name, "") for name in names])
             # SUMO counts degrees from north with the clock.
-            angle = math.radians(90.0 - self._value(values, "angle", line))
-            name = track.leg_name(person, self.legs.get(person, 1))
-            self.rows.append((name, self.time, x, y, angle, line))
-            if "speed" in values:
-                self._check_unit(values, x, y, line)
-
-    def _value(self, values: dict[str, str], name: str, line: int) -> float:
-        if name not in values:
-            raise FileError(self.path, f"no {name}, expected a number", line)
-        return _number(self.path, values[name], name, line)
-
-    def _check_unit(self, values: dict[str, str], x: float, y: float, line: int) -> None:
-        """Raise FileError for people who hardly move for their speed: in degrees of the globe."""
-        if len(self.steps) > 1000 or abs(x) > 180.0 or abs(y) > 90.0:
-            return
-        before = self.last.get(values["id"])
-        speed = self._value(values, "speed", line)
-        if before is not None and self.time is not None and speed > 0.5:
-            seconds = self.time - before[0]
-            self.steps.append((math.hypot(x - before[1], y - before[2]), speed * seconds))
-            if len(self.steps) > 10:
-                gone, stated = map(sum, zip(*self.steps, strict=True))
-                if gone < GEOGRAPHIC * stated:
-                    raise FileError(
-                        self.path,
-                        f"people move {gone:.3g} where their speeds say {stated:.3g} m: longitude "
-                        "and latitude? Expected metres (no --fcd-output.geo)",
-                        line,
-                    )
-        self.last[values["id"]] = (self.time or 0.0, x, y)
+            row = self.time, x, y, math.radians(90.0 - angle), line, fault
+            self.rows.append((track.leg_name(person, self.legs.get(person, 1)), *row))
 
 
 @dataclass
@@ -340,7 +304,7 @@ class _CommonRoadReader:
     kind: str = ""
     line: int = 0
     elements: list[str] = field(default_factory=list)
-    state: dict[str, float] = field(default_factory=dict)
+    state: dict[str, str] = field(default_factory=dict)
 
     def start(self, name: str, values: dict[str, str], line: int) -> None:
         """Take an element."""
@@ -358,16 +322,16 @@ class _CommonRoadReader:
         if name == "type" and above == "dynamicObstacle":
             self.kind = text
         elif (above, name) in (("point", "x"), ("point", "y")):
-            self.state[name] = _number(self.path, text, name, self.line)
+            self.state[name] = text
         elif name == "exact" and above in ("time", "orientation"):
-            self.state[above] = _number(self.path, text, above, self.line)
+            self.state[above] = text
         elif name in ("initialState", "state"):
             if self.kind == "pedestrian":
-                if missing := [key for key in ("time", "x", "y") if key not in self.state]:
-                    raise FileError(self.path, f"a state without exact {missing[0]}", self.line)
-                time, x, y = (self.state[key] for key in ("time", "x", "y"))
-                angle = self.state.get("orientation", math.nan)
-                self.rows.append((self.person, self.step * time, x, y, angle, self.line))
+                names = "time", "x", "y", *(["orientation"] * ("orientation" in self.state))
+                cells = [self.state.get(name, "none exact") for name in names]
+                (time, *numbers), fault = _numbers(names, cells)
+                x, y, angle = numbers if len(numbers) > 2 else (*numbers, math.nan)
+                self.rows.append((self.person, self.step * time, x, y, angle, self.line, fault))
             self.state = {}
 
 
@@ -391,7 +355,7 @@ def _xml_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
             readers.append(ROOTS[name](path, rows))
         readers[0].start(name, values, line)
 
-    for _ in _XmlEvents(path, start, lambda name, text: readers[0].end(name, text)).feed():
+    for _ in _parse(path, start, lambda name, text: readers[0].end(name, text)):
         yield from rows
         rows.clear()
 
