@@ -150,12 +150,11 @@ def test_headings_need_their_unit_and_agree_with_it(tmp_path):
     assert len(track_files.read_tracks(file, DEGREES).tracks) == 1
 
 
-def test_a_table_whose_y_points_down_is_told_by_its_headings(tmp_path):
+def test_headings_of_another_frame_than_y_are_told(tmp_path):
     moments, radians = np.linspace(0.0, 6.0, 61), TrackReading("radians")
     rows = "".join(f"{t:.2f},a,{np.sin(t):.4f},{np.cos(t):.4f},{t:.4f}\n" for t in moments)
     down = write(tmp_path, "down.csv", "time,id,x,y,heading\n" + rows)
-    assert len(track_files.read_tracks(down, replace(radians, y_down=True)).tracks) == 1
-    with pytest.raises(FileError, match="is y down"):
+    with pytest.raises(FileError, match="is one of both turned over"):
         track_files.read_tracks(down, radians)
 
 

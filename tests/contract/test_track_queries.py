@@ -85,7 +85,7 @@ def test_mirrored_tracks_are_refused_as_in_files(query):
     times = list(range(len(angles)))
     mirrored = {"id": "a", "times": times, "headings": angles.tolist(), "positions": ways}
     answer = query("POST", f"{PATH}.npz", json={"tracks": [mirrored]})
-    assert answer.status_code == 422 and "is y down?" in answer.json()["detail"]
+    assert answer.status_code == 422 and "turned over?" in answer.json()["detail"]
 
 
 def test_people_times_frames_are_limited_before_any_work(walks):

@@ -28,7 +28,7 @@ MAX_SECONDS = 1e10
 MAX_ANGLE = 2.0 * np.pi + 0.01
 """Largest heading, rad."""
 SLOWEST = 0.01
-"""Speed that somebody in a file exceeds unless all stand, m/s."""
+"""Speed that is exceeded in a file unless all stand, m/s."""
 MIRRORED, FOLLOWED, MOVING = 0.9, 0.5, 0.5
 """Agreement of headings with the mirrored direction of travel from which on, and that with the
 direction itself up to which, y points down; speed from which on directions count, m/s."""
@@ -226,7 +226,7 @@ def find_problem(track: Track) -> TrackProblem | None:
 
 def unit_question(speed: float) -> str:
     """Return what a median speed beyond that of walkers, m/s, says about the units of a file."""
-    near = [unit for unit, size in (("centi", 100.0), ("milli", 1e3)) if 0.3 < speed / size < 2.5]
+    near = [unit for unit, size in (("centi", 100.0), ("milli", 1e3)) if 0.5 < speed / size < 2.5]
     guess = f"are they in {near[0]}metres?" if near else "in what unit are they?"
     return f"x and y have to be in m, and times in s: at {speed:.3g} m/s, {guess}"
 
@@ -252,14 +252,14 @@ def sums(tracks: Iterable[Track]) -> Annotated[FloorVectors, "5"]:
 def find_file_problem(totals: Annotated[FloorVectors, "5"]) -> str | None:
     """Return what is wrong with a file as a whole; None if nothing is. totals: as of `sums`.
 
-    Nobody moves but at a crawl, or headings agree with travel only if y points down.
+    Headings agree with travel only if y is turned over, or all who move crawl.
     """
     agreement, opposite = np.abs(totals[:2] / max(abs(totals[2]), 1.0)).tolist()
     if opposite > MIRRORED and agreement < FOLLOWED:
         return (
             f"headings agree with the mirrored direction of travel ({opposite:.2f}) and not with "
-            f"the direction itself ({agreement:.2f}), expected y north and angles from east "
-            "against the clock: is y down?"
+            f"the direction itself ({agreement:.2f}), expected angles from x to y: is one of both "
+            "turned over?"
         )
     if totals[3] and not totals[4]:
         return (
