@@ -123,11 +123,7 @@ BAD = [
         "state.xml:1: person '7': time 'none exact', expected a number",
     ),
     ("cut.xml", "<fcd-export>", "no XML: no element found"),
-    (
-        "bomb.xml",
-        '<!DOCTYPE a [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><fcd-export>&b;</fcd-export>',
-        "a document type or an entity",
-    ),
+    ("bomb.xml", '<!DOCTYPE a [<!ENTITY a "a">]><fcd-export/>', "a document type or an entity"),
 ]
 
 
