@@ -161,7 +161,8 @@ def stepped(
 
     phases, passings: as of `stances`. beyond: turns, rad, or ways, m, of the body beyond those of
     the model (F,), or of each foot (F, 2). A foot has the place of the body in the middle of its
-    stance, and goes to the next one while it swings.
+    stance, and goes to the next one while it swings, round turns on a bow past the other leg: half
+    as far aside as the body, since more raises peaks of accelerations.
     """
     middles, shares = stances(phases, passings)
     changes = np.empty((len(phases), 2), beyond.dtype)
@@ -169,6 +170,8 @@ def stepped(
     rising = phases + 1e-9 * np.arange(len(phases))
     of_feet = np.broadcast_to(beyond.T, changes.T.shape)
     for foot, (middle, share, way) in enumerate(zip(middles.T, shares.T, of_feet, strict=True)):
-        before, after = (np.interp(middle + cycle, rising, way) for cycle in (0.0, 1.0))
-        changes[:, foot] = before + share * (after - before) - way
+        before, halfway, after = (np.interp(middle + c, rising, way) for c in (0.0, 0.5, 1.0))
+        bow = halfway - 0.5 * (before + after)
+        bow[(middle < rising[0]) | (middle + 1.0 > rising[-1])] = 0.0
+        changes[:, foot] = before + share * (after - before + 2.0 * (1.0 - share) * bow) - way
     return changes

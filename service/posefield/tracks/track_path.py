@@ -27,7 +27,7 @@ MOVING, CREEPING = 0.25, 0.05
 """Speed from which on a person has a direction of travel, m/s, and mean speed: noise has less."""
 TRAVEL_SPEED = (0.35, 0.5)
 """Speeds between which a person turns from a stated heading to the direction of travel, m/s."""
-HEADING_WINDOW = 0.17
+HEADING_WINDOW = 0.2
 """Standard deviation of the average of headings, s."""
 
 
@@ -59,13 +59,13 @@ def follow(track: Track, origin: float, rate: float) -> TrackPath | None:
     times = origin + np.arange(first, last + 1) / rate
     stated = _interpolate(track.times, track.points, times)
     points = smooth(stated, WINDOW * rate, sharp=True)
-    beyond = np.abs(_derivative(_derivative(points, rate), rate)) > MOST_ACCELERATION
+    beyond = np.abs(np.gradient(np.gradient(points))) * rate**2 > MOST_ACCELERATION
     if beyond.any():
         longer = smooth(stated, LONG_WINDOW * rate)
         near = np.convolve(beyond, np.ones(2 * int(LONG_WINDOW * rate) + 1), "same") > 0.0
         share = smooth(near.astype(complex), SPREAD * rate, fixed=False).real
         points = points + np.clip(share, 0.0, 1.0) * (longer - points)
-    velocities = _derivative(points, rate)
+    velocities = np.gradient(points) * rate
     headings = _headings(track, times, velocities, rate)
     return TrackPath(first, points, velocities, headings, np.abs(points - stated))
 
@@ -93,12 +93,6 @@ def _interpolate(
     return np.asarray(points[piece] + rise * (points[piece + 1] - points[piece]) + step * curve)
 
 
-def _derivative(
-    values: Annotated[FloorVectors, "frames"], rate: float
-) -> Annotated[FloorVectors, "frames"]:
-    return np.gradient(values) * rate
-
-
 def _headings(
     track: Track, times: Frames, velocities: Annotated[FloorVectors, "frames"], rate: float
 ) -> Frames:
@@ -111,7 +105,9 @@ def _headings(
         ways = velocities / np.maximum(speeds, 1e-9)
         headings = np.unwrap(np.angle(share * ways + (1.0 - share) * stated))
     else:
-        slow = smooth(velocities, step_plan.SLOW_WINDOW * rate, fixed=False)
+        # Beside a pause, moves do not make creeping of it.
+        slow = np.where(speeds > MOVING, 0.0, velocities)
+        slow = smooth(slow, step_plan.SLOW_WINDOW * rate, fixed=False)
         creeps = (speeds <= MOVING) & (np.abs(slow) > CREEPING)
         ways = np.where(creeps, slow, velocities)
         headings = _travel_headings(ways, creeps | (speeds > MOVING), rate)
