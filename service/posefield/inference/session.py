@@ -29,7 +29,7 @@ from posefield.common.units import (
     Singles,
     Vector,
 )
-from posefield.inference import onnx_runtime
+from posefield.inference import onnx_runtime, reduced_motion
 from posefield.inference.onnx_runtime import CONTACTS, LABELS
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import support
@@ -45,6 +45,9 @@ captured clip; paths of walking crowds need controls up to 0.2 of a range outsid
 """
 SLACK = 1e-6
 """Share of the range that a control inside it may lie outside by rounding."""
+
+DURATION = ROW_VALUES["duration"]
+"""Value of the graph that is one where times are phases of a clip."""
 
 SinglePoints = Annotated[Singles, "points controls"]
 SingleValues = Annotated[Singles, "points"]
@@ -186,11 +189,11 @@ class GraphParts:
     def __init__(self, content: bytes, source: str) -> None:
         """Take a checked file; source: its name in errors."""
         self._content, self._source = content, source
-        self._parts: dict[tuple[tuple[str, ...], int], tuple[Any, tuple[str, ...]]] = {}
+        self._parts: dict[tuple[tuple[str, ...], int, bool], tuple[Any, tuple[str, ...]]] = {}
 
     def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
         """Return values as `Graph.run` does."""
-        key = tuple(values), level
+        key = tuple(values), level, DURATION in feed
         graph_part = self._parts.get(key)
         if graph_part is None:
             graph_part = self._parts[key] = self._open(*key)
@@ -198,9 +201,12 @@ class GraphParts:
         outputs: list[Any] = session.run(key[0], {n: feed[n] for n in names if n in feed})
         return outputs
 
-    def _open(self, values: tuple[str, ...], level: int) -> tuple[Any, tuple[str, ...]]:
-        """Return an onnxruntime session and the inputs that it has."""
-        content = onnx_file.select_outputs(onnx_file.fix_level(self._content, level), *values)
+    def _open(
+        self, values: tuple[str, ...], level: int, phases: bool
+    ) -> tuple[Any, tuple[str, ...]]:
+        """Return an onnxruntime session and the inputs that it has; phases: as of `Session.run`."""
+        content = onnx_file.fix_level(self._content, level)
+        content = onnx_file.select_outputs(content, *values, inputs=[DURATION] * phases)
         session = onnx_runtime.open_session(content, self._source)
         # Inputs with a default are not among the others.
         ports = [*session.get_inputs(), *session.get_overridable_initializers()]
@@ -229,20 +235,23 @@ class Session:
         *values: str,
         labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None = None,
         level: int = 0,
+        phases: bool = False,
     ) -> list[Any]:
         """Return values of the graph, in their order, for controls (B, d) and times (B, S).
 
         values: outputs, or "coefficients" (B, r3), "frame" (B, S) and "way" (B, 3): sample
         coefficients, canonical frames and the travel of a cycle. times: None for values that do not
         depend on it, as "duration" and "sigma". labels (B or 1, p): weights of the names of all
-        label sets; all sets are left open if None. level: level of detail. Outside the sampled
-        ranges, answers are bounded (`AnswerBounds`), but sigma is that of the controls as asked.
-        Raises ValueError for the contacts of a model without them.
+        label sets; all sets are left open if None. level: level of detail. phases: whether times
+        are shares of the duration, which is then not computed. Outside the sampled ranges, answers
+        are bounded (`AnswerBounds`), but sigma is that of the controls as asked. Raises ValueError
+        for the contacts of a model without them.
         """
         if CONTACTS in values and not self.card.contacts:
             raise ValueError(f"model {self.card.name} has no contacts")
-        if values == ("sigma",) or self.bounds.is_inside(controls):
-            return self._run_unbounded(controls, times, values, labels, level)
+        if phases or values == ("sigma",) or self.bounds.is_inside(controls):
+            controls = self.bounds.limit(controls) if phases else controls
+            return self._run_unbounded(controls, times, values, labels, level, phases)
         rows, raw, bounded = self._outside_durations(controls, labels, level)
         if times is not None:
             # The graph places a time by the duration that it computes itself.
@@ -311,8 +320,11 @@ class Session:
         values: Sequence[str],
         labels: Floats | Singles | None,
         level: int,
+        phases: bool = False,
     ) -> list[Any]:
         feed = {"controls": controls.astype(np.float32, copy=False)}
+        if phases:
+            feed[DURATION] = np.ones((len(controls), 1), np.float32)
         if times is not None:
             feed["time"] = times.astype(np.float32, copy=False)
         if labels is not None and self.card.labels:
@@ -339,6 +351,23 @@ class Session:
             for points in (self.bounds.limit(outside), self.bounds.nearest_sampled(outside))
         )
         return rows, raw, self.bounds.limit_durations(raw, nearest)
+
+    @cached_property
+    def starts(self) -> list[tuple[Annotated[Floats, "3 modes"], Vector]]:
+        """Root positions at the start of a cycle, m, by the sample coefficients, for each level.
+
+        Weights (3, r3) and constants (3,).
+        """
+        weights = onnx_file.initializers(self.content)
+        starts = []
+        for level in self.card.levels:
+            reduced = reduced_motion.read(weights, level, self.card)
+            modes = np.eye(reduced.core.shape[2])
+            # A cycle without its travel ends at its start.
+            end = np.full(len(modes), reduced.frames - 1.0)
+            moves = reduced.moves_of_coefficients(modes, end)
+            starts.append(((moves @ reduced.directions[:, :3]).T.copy(), reduced.mean[:3]))
+        return starts
 
     @cached_property
     def kriging_weights(self) -> KrigingWeights:

@@ -96,13 +96,26 @@ def strides(
     level: int = 0,
 ) -> Strides:
     """Return the cycles of controls (B, d) for labels (B, p), at a level of detail."""
-    after_end = np.full((len(controls), 1), AFTER_END)
-    outputs = ("duration", "travel", "root_position")
-    durations, travel, roots = _run_batches(session, controls, after_end, labels, level, *outputs)
-    gap, turns = travel[:, 0, 1] + 1j * travel[:, 0, 0], travel[:, 0, 2]
-    # A cycle without its travel ends at its start.
-    starts = floor_plane.project(roots[:, 0]) - gap
-    return Strides(durations, floor_plane.inverse_arc(gap, turns), turns, starts)
+    outputs = ("duration", "way", "coefficients")
+    durations, travels, coefficients = _run_batches(
+        session, controls, None, labels, level, *outputs
+    )
+    return unit_strides(session, travels, coefficients, level)._replace(durations=durations)
+
+
+def unit_strides(
+    session: Session,
+    travels: Annotated[Floats, "strides 3"],
+    coefficients: Annotated[Floats, "strides modes"],
+    level: int,
+) -> Strides:
+    """Return cycles that last 1 s, by their travels (B, 3) and sample coefficients (B, r3)."""
+    weights, constant = session.starts[level]
+    # Not a matrix product, whose sums could go in another order for more cycles.
+    starts = np.einsum("bk,ck->bc", coefficients, weights) + constant
+    gap, turns = travels[:, 1] + 1j * travels[:, 0], travels[:, 2]
+    ways = floor_plane.inverse_arc(gap, turns)
+    return Strides(np.ones(len(ways)), ways, turns, floor_plane.project(starts))
 
 
 def straight_strides(
@@ -127,27 +140,13 @@ def synthesize_poses(
     level: int = 0,
 ) -> RelativePoses:
     """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
-    cycles = strides(session, controls, labels, level)
-    return poses_of_strides(session, (controls, labels), cycles, phases, level)
-
-
-def poses_of_strides(
-    session: Session,
-    controls_and_labels: tuple[PointControls, PointLabels],
-    cycles: Strides,
-    phases: PerPoint,
-    level: int = 0,
-) -> RelativePoses:
-    """Return what `synthesize_poses` does, of known cycles (K,).
-
-    controls_and_labels: controls (K, d) and labels (K, p).
-    """
-    controls, labels = controls_and_labels
-    times = (phases * cycles.durations)[:, None]
     optional = (onnx_runtime.CURVES, onnx_runtime.CONTACTS)
     more = [name for name in optional if getattr(session.card, name)]
-    outputs = ["rotations", "root_position", *more]
-    rotations, roots, *values = _run_batches(session, controls, times, labels, level, *outputs)
+    outputs = ["way", "coefficients", "rotations", "root_position", *more]
+    travels, coefficients, rotations, roots, *values = _run_batches(
+        session, controls, phases[:, None], labels, level, *outputs, phases=True
+    )
+    cycles = unit_strides(session, travels, coefficients, level)
     posed = relative_poses(cycles, phases, rotations[:, 0], roots[:, 0])
     arrays: dict[str, Any] = {name: array[:, 0] for name, array in zip(more, values, strict=True)}
     return replace(posed, **arrays)
@@ -165,14 +164,12 @@ def root_places(
     controls: (B, d). labels: (B, p). phases: (P,) of the cycle, the same for all. In a third of the
     time of the poses.
     """
-    # A matrix product with one row sums in another order.
-    twice = np.repeat(np.arange(len(controls)), 2)
-    doubled = strides(session, controls[twice], labels[twice], level)
     count = len(phases)
     rows, times = np.repeat(np.arange(len(controls)), count), np.tile(phases, len(controls))
-    cycles = Strides._make(value[::2][rows] for value in doubled)
-    at = (times * cycles.durations)[:, None]
-    (roots,) = _run_batches(session, controls[rows], at, labels[rows], level, "root_position")
+    inputs = controls[rows], times[:, None], labels[rows], level
+    outputs = ("way", "coefficients", "root_position")
+    travels, coefficients, roots = _run_batches(session, *inputs, *outputs, phases=True)
+    cycles = unit_strides(session, travels, coefficients, level)
     return _relative_places(cycles, times, roots[:, 0]).reshape(-1, count)
 
 
@@ -182,28 +179,10 @@ def contact_probabilities(
     labels: PointLabels,
     phases: PerPoint,
     level: int = 0,
-    durations: PerPoint | None = None,
 ) -> Annotated[Floats, "points contacts"]:
-    """Return the probabilities (K, C) of the contacts on the card, at phases (K,) of the cycle.
-
-    durations: of the cycles (K,), s, as of `strides`; computed if they are not known.
-    """
-    probabilities = np.empty((len(controls), len(session.card.contacts)))
-    for rows in batches(len(controls)):
-        cancellation.check()
-        batch_controls, batch_labels = controls[rows], labels[rows]
-        if durations is None:
-            (seconds,) = session.run(
-                batch_controls, None, "duration", labels=batch_labels, level=level
-            )
-            times = phases[rows] * seconds
-        else:
-            times = phases[rows] * durations[rows]
-        (likely,) = session.run(
-            batch_controls, times[:, None], onnx_runtime.CONTACTS, labels=batch_labels, level=level
-        )
-        probabilities[rows] = likely[:, 0]
-    return probabilities
+    """Return the probabilities (K, C) of the contacts on the card, at phases (K,) of the cycle."""
+    inputs = controls, phases[:, None], labels, level, onnx_runtime.CONTACTS
+    return _run_batches(session, *inputs, phases=True)[0][:, 0]
 
 
 def relative_poses(
@@ -281,17 +260,20 @@ def _first_clips(card: ModelCard) -> tuple[Indices, Annotated[Indices, "clips"]]
 def _run_batches(
     session: Session,
     controls: PointControls,
-    times: Annotated[Floats, "points frames"],
+    times: Annotated[Floats, "points frames"] | None,
     labels: PointLabels | RowLabels,
     level: int,
     *outputs: str,
+    phases: bool = False,
 ) -> list[Annotated[Floats, "points ..."]]:
     """Return the graph's outputs for any number of rows, computed in batches."""
     arrays: list[Floats] = []
     for rows in batches(len(controls)):
         cancellation.check()
-        inputs = controls[rows], times[rows]
-        batch_arrays = session.run(*inputs, *outputs, labels=labels[rows], level=level)
+        inputs = controls[rows], None if times is None else times[rows]
+        batch_arrays = session.run(
+            *inputs, *outputs, labels=labels[rows], level=level, phases=phases
+        )
         if not arrays:
             arrays = [
                 np.empty((len(controls), *batch_array.shape[1:])) for batch_array in batch_arrays

@@ -14,7 +14,7 @@ Reference: https://protobuf.dev/programming-guides/encoding/. Groups, which prot
 refused. docs/decisions/0022-model-file-checks.md states the reasons for not using a library.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -207,14 +207,14 @@ def fix_level(model: bytes, level: int) -> bytes:
     return _replace_graph(model, lambda graph: _freeze_level(graph, level))
 
 
-def select_outputs(model: bytes, *outputs: str) -> bytes:
+def select_outputs(model: bytes, *outputs: str, inputs: Sequence[str] = ()) -> bytes:
     """Return the model with these outputs, and the nodes, weights and inputs that they need.
 
-    outputs: names of float32 values of the graph. Raises ValueError for bytes that are not an ONNX
-    file.
+    outputs: names of float32 values of the graph. inputs: names of such values that are given
+    instead of computed. Raises ValueError for bytes that are not an ONNX file.
     """
-    names = {output.encode() for output in outputs}
-    return _replace_graph(model, lambda graph: _prune_graph(graph, names))
+    output_names, input_names = ({name.encode() for name in names} for names in (outputs, inputs))
+    return _replace_graph(model, lambda graph: _prune_graph(graph, output_names, input_names))
 
 
 def initializers(model: bytes) -> dict[str, Array]:
@@ -245,8 +245,12 @@ def _read_tensor(content: bytes) -> tuple[str, Array]:
     return field_of[TENSOR_NAME].content.decode(), array.reshape(axes)
 
 
-def _prune_graph(graph: bytes, outputs: set[bytes]) -> bytes:
-    fields = list(wire_fields(graph))
+def _prune_graph(graph: bytes, outputs: set[bytes], inputs: set[bytes]) -> bytes:
+    fields = [
+        field
+        for field in wire_fields(graph)
+        if field.number != NODE or not inputs & _field_names(field.content, NODE_OUTPUT)
+    ]
     needed = set(outputs)
     # Nodes are in topological order: each stands before those that read its outputs.
     for field in reversed(fields):
@@ -256,8 +260,10 @@ def _prune_graph(graph: bytes, outputs: set[bytes]) -> bytes:
     there = {
         name for f in fields if f.number == OUTPUT for name in _field_names(f.content, VALUE_NAME)
     }
-    added = (encode_bytes(OUTPUT, _float_output(name)) for name in sorted(outputs - there))
-    return content + b"".join(added)
+    added = [(OUTPUT, outputs - there), (INPUT, inputs & needed)]
+    return content + b"".join(
+        encode_bytes(kind, _float_value(name)) for kind, names in added for name in sorted(names)
+    )
 
 
 def _is_needed(field: Field, names: set[bytes]) -> bool:
@@ -266,8 +272,8 @@ def _is_needed(field: Field, names: set[bytes]) -> bool:
     )
 
 
-def _float_output(name: bytes) -> bytes:
-    """Return the description of an output of float32 numbers of any shape."""
+def _float_value(name: bytes) -> bytes:
+    """Return the description of an input or output of float32 numbers of any shape."""
     kind = encode_bytes(TYPE_TENSOR, encode_varint(ELEMENT_TYPE, FLOAT))
     return encode_bytes(VALUE_NAME, name) + encode_bytes(VALUE_TYPE, kind)
 

@@ -103,7 +103,7 @@ def forward_kinematics(
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     poses, joints = math.prod(lead), len(parents)
     if poses <= FEW_POSES:
-        world, turns = _at_once(parents, lead, rotations, translations)
+        world, turns = _accumulate_levels(parents, lead, rotations, translations)
     else:
         world, turns = np.empty((joints, 3, poses)), np.empty((joints, 4, poses))
         for block, own_turns, own_arms in _blocks(lead, rotations, translations):
@@ -122,21 +122,12 @@ def positions(
     """Return the joint positions (..., J, 3) alone; arguments as for `forward_kinematics`."""
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     if math.prod(lead) <= FEW_POSES:
-        world = _at_once(parents, lead, rotations, translations)[0]
+        world = _accumulate_levels(parents, lead, rotations, translations)[0]
     else:
         world = np.empty((len(parents), 3, math.prod(lead)))
         for block, own_turns, own_arms in _blocks(lead, rotations, translations):
             world[..., block] = position_planes(parents, own_turns, own_arms)
     return world.transpose(2, 0, 1).reshape(*lead, len(parents), 3)
-
-
-def _at_once(
-    parents: tuple[int, ...], lead: tuple[int, ...], rotations: Floats, translations: Floats
-) -> tuple[Annotated[Floats, "joints 3 poses"], Annotated[Floats, "joints 4 poses"]]:
-    """Return what `forward_kinematics` does, of few poses, as planes (J, 3, P) and (J, 4, P)."""
-    turns = np.broadcast_to(rotations, (*lead, len(parents), 4)).reshape(-1, len(parents), 4)
-    arms = np.broadcast_to(translations, (*lead, len(parents), 3)).reshape(-1, len(parents), 3)
-    return _accumulate_levels(parents, turns, arms)
 
 
 def position_planes(
@@ -156,8 +147,8 @@ def _blocks(
     lead: tuple[int, ...], rotations: Floats, translations: Floats
 ) -> Iterator[tuple[slice, Floats, Floats]]:
     """Yield slices of the poses with their rotations (J, 4, P) and translations (J, 3, P)."""
-    whole = (np.broadcast_to(v, (*lead, *v.shape[-2:])) for v in (rotations, translations))
-    turns, arms = (v.reshape(-1, *v.shape[-2:]).transpose(1, 2, 0) for v in whole)
+    arrays = (np.broadcast_to(v, (*lead, *v.shape[-2:])) for v in (rotations, translations))
+    turns, arms = (v.reshape(-1, *v.shape[-2:]).transpose(1, 2, 0) for v in arrays)
     for start in range(0, turns.shape[-1], POSES_PER_BLOCK):
         block = slice(start, start + POSES_PER_BLOCK)
         first, second = (np.asarray(v[..., block], float, "C") for v in (turns, arms))
@@ -211,16 +202,16 @@ def tree_levels(parents: tuple[int, ...]) -> TreeLevels:
 
 
 def _accumulate_levels(
-    parents: tuple[int, ...],
-    rotations: Annotated[Floats, "poses joints 4"],
-    translations: Annotated[Floats, "poses joints 3"],
+    parents: tuple[int, ...], lead: tuple[int, ...], rotations: Floats, translations: Floats
 ) -> tuple[Annotated[Floats, "joints 3 poses"], Annotated[Floats, "joints 4 poses"]]:
     """Return joint positions (J, 3, P) and orientations (J, 4, P) of few poses.
 
     The same operations in the same order as in `quat`, so that results are bitwise equal; a
     quaternion has x and y once more at its end, so that its cyclic permutations are slices.
     """
-    tree, count = tree_levels(parents), len(rotations)
+    tree, count = tree_levels(parents), math.prod(lead)
+    arrays = (np.broadcast_to(v, (*lead, *v.shape[-2:])) for v in (rotations, translations))
+    rotations, translations = (v.reshape(-1, *v.shape[-2:]) for v in arrays)
     sorted_rotations = rotations.transpose(2, 1, 0)[:, tree.order]
     arms = translations.transpose(2, 1, 0)[:, tree.order]
     arms = np.concatenate([arms, arms[:2]])

@@ -41,9 +41,8 @@ def walk_passage(
     those of the plan, wrapped.
     """
     phases = plan.phases % 1.0
-    done = plan.walker.strides(plan.controls, level)
-    posed = _poses(model, plan.walker, plan.controls, done, phases, level, take)
-    contacts = _contacts(model, plan.walker, plan.controls, done, phases, level)
+    posed = _poses(model, plan.walker, plan.controls, phases, level, take)
+    contacts = _contacts(model, plan.walker, plan.controls, phases, level)
     if plan.steps is not None:
         frames = np.arange(len(plan))
         posed = plan.steps.apply((0 * frames, frames), 0 * frames, posed)
@@ -73,15 +72,14 @@ def cycle_passage(
     rows = np.repeat(controls[None], frames, axis=0)
     phases = np.arange(frames) / frames
     cycle = walker.strides(controls[None], level)
-    done = walker.strides(rows, level)
-    posed = _poses(model, walker, rows, done, phases, level, take)
+    posed = _poses(model, walker, rows, phases, level, take)
     turned = phases * cycle.turns
     roots = floor_plane.arc_displacement(phases * cycle.travels, turned)
     roots = roots + posed.places * np.exp(1j * turned)
     return Passage(
         floor_plane.turn_roots(posed.rotations, turned),
         floor_plane.at_height(roots, posed.heights),
-        _contacts(model, walker, rows, done, phases, level),
+        _contacts(model, walker, rows, phases, level),
         _sigmas(model, walker, rows),
         phases,
     )
@@ -102,16 +100,15 @@ def _poses(
     model: Synthesizer,
     walker: Walker,
     controls: PointControls,
-    cycles: Strides,
     phases: PerPoint,
     level: int,
     take: TakeSettings | None,
 ) -> RelativePoses:
-    """Return the poses (F) at controls (F, d), whose strides are known, and at phases (F,)."""
+    """Return the poses (F) at controls (F, d) and at phases (F,)."""
     labels = walker.labels(len(controls))
     if take is None:
-        return stride.poses_of_strides(model.session, (controls, labels), cycles, phases, level)
-    count = len(controls)
+        return stride.synthesize_poses(model.session, controls, labels, phases, level)
+    count, cycles = len(controls), walker.strides(controls, level)
     takes = CharacterTakes(
         np.full(count, take.seed), np.full(count, take.variety), np.full(count, take.detail)
     )
@@ -124,7 +121,6 @@ def _contacts(
     model: Synthesizer,
     walker: Walker,
     controls: PointControls,
-    cycles: Strides,
     phases: PerPoint,
     level: int,
 ) -> Annotated[Floats, "frames feet"]:
@@ -134,10 +130,8 @@ def _contacts(
     if not feet:
         return np.zeros((len(controls), 0))
     labels = walker.labels(len(controls))
-    probabilities = stride.contact_probabilities(
-        model.session, controls, labels, phases, level, cycles.durations
-    )
-    return np.clip(probabilities[:, [card.contacts.index(cycles) for cycles in feet]], 0.0, 1.0)
+    probabilities = stride.contact_probabilities(model.session, controls, labels, phases, level)
+    return np.clip(probabilities[:, [card.contacts.index(foot) for foot in feet]], 0.0, 1.0)
 
 
 def _sigmas(

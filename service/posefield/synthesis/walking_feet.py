@@ -148,24 +148,21 @@ def _relative_poses(
     """Return K poses relative to the travel, of pairs of a character (K,) and a frame (K,)."""
     labels, phases = plan.labels.weights[plan.who[pair[0]]], plan.phases[pair]
     controls = plan.controls[pair]
-    strides = stride.strides(model.session, controls, labels, level)
     corrector = model.solver.corrector(level)
     rows = np.searchsorted(deviations.chosen, pair[0])
     card = model.session.card
     counts = len(card.curves), len(card.contacts)
     shapes = ((len(card.skeleton), 4), (3,), *((count,) for count in counts))
     posed = [np.empty((len(phases), *shape)) for shape in shapes]
-    names = ("coefficients", "frame", "way", *[CONTACTS] * bool(card.contacts))
+    names = ("way", "coefficients", "frame", *[CONTACTS] * bool(card.contacts))
+    strides = []
     limits = hinges.from_card(card.hinges)
     for batch in stride.batches(len(phases)):
         cancellation.check()
-        times = (phases[batch] * strides.durations[batch])[:, None]
-        coefficients, canonical, travel, *contacts = (
-            array.astype(float)
-            for array in model.session.run(
-                controls[batch], times, *names, labels=labels[batch], level=level
-            )
-        )
+        inputs = controls[batch], phases[batch][:, None]
+        answers = model.session.run(*inputs, *names, labels=labels[batch], level=level, phases=True)
+        travel, coefficients, canonical, *contacts = (array.astype(float) for array in answers)
+        strides.append(stride.unit_strides(model.session, travel, coefficients, level))
         frames = canonical[:, 0]
         deviations_of_batch = deviations.coefficients[rows[batch], pair[1][batch]]
         changes = take_variation.change_coefficients(corrector, deviations_of_batch)
@@ -180,7 +177,8 @@ def _relative_poses(
         for column, values in zip(posed, (*poses, *contacts), strict=False):
             column[batch] = values.reshape(column[batch].shape)
     rotations, roots, *rest = posed
-    relative = stride.relative_poses(strides, phases, rotations, roots)
+    cycles = stride.Strides._make(map(np.concatenate, zip(*strides, strict=True)))
+    relative = stride.relative_poses(cycles, phases, rotations, roots)
     curves, likely = (array if array.shape[1] else None for array in rest)
     return replace(relative, curves=curves, contacts=likely)
 
