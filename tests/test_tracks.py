@@ -415,4 +415,7 @@ def test_who_creeps_steps_and_who_trembles_does_not_tramp(walk):
         ((_, plan, motions),) = track_crowd.find_people(walk, walk.gait, order, [track]).batches()
         assert least <= np.ptp(np.unwrap(plan.phases[0], period=1.0)) <= most
         assert motions.feet.skate[0] < 0.01
+        # Also who stands is alive.
+        head = motions.rotations[0, :, walk.session.card.skeleton.names.index("Head")]
+        assert np.ptp(head, axis=0).max() > 0.005
     assert path_of(east)[1].headings == pytest.approx(np.pi / 2, abs=0.02)

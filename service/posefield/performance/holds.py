@@ -182,7 +182,7 @@ def add_sway(
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
     sway = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
-    direction = np.exp(1j * quat.twist(rotations[0, 0], UP))
+    direction = np.exp(1j * quat.twist(rotations[:, 0], UP))
     swayed = roots + floor_plane.at_height(direction * (sway[:, :2] @ SWAY), np.zeros(1))
     vectors = sway[:, 2:].reshape(len(roots), -1, 3)
     turned = rotations.copy()

@@ -18,6 +18,7 @@ from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.walking_crowd import MAX_POSES, POSES_PER_BATCH, MotionsWithContacts
 from posefield.motion.clip import CrowdClip, Motions, Placement, StandingFeet
+from posefield.performance import holds
 from posefield.performance.step_plan import Strider
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
@@ -128,7 +129,7 @@ class TrackCrowd:
         cancellation.check()
         rate, card = self.question.fps, self.gait.session.card
         combinations = self.gait.labels.draw(np.array([person.number for person in people]))
-        numbers = np.array([(person.phase, person.sway) for person in people])
+        numbers = np.array([person.phase for person in people])
         scales = np.array([person.scale for person in people])
         paths = [person.path for person in people]
         plan = track_plan.plan_people(self.striders, paths, combinations, numbers, scales, rate)
@@ -140,7 +141,15 @@ class TrackCrowd:
         relative = replace(plan, places=plan.places - starts[:, None])
         world = replace(plan, places=plan.places * scales[:, None])
         levels = walking_crowd.build_schedule(self.model, world, self.question)
-        return plan, predict(self.gait.session, relative, np.arange(len(people)), levels)
+        motions, likely = predict(self.gait.session, relative, np.arange(len(people)), levels)
+        if plan.stepping is not None:
+            joints = {role: card.skeleton.names.index(joint) for role, joint in card.roles.items()}
+            for row, person in enumerate(people):
+                stands, seed = plan.stepping.shares[row] ** 2, int(person.sway * 2**31)
+                poses = motions.rotations[row], motions.root_position[row]
+                swayed = holds.add_sway(*poses, joints, stands, rate, seed)
+                motions.rotations[row], motions.root_position[row] = swayed
+        return plan, (motions, likely)
 
 
 def find_people(

@@ -4,7 +4,6 @@ A person who is taller by a share walks a path that is shorter by it.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices, PerCharacter
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.performance import holds, step_plan
+from posefield.performance import step_plan
 from posefield.performance.standing_pose import Walker
 from posefield.performance.step_plan import StepPlan, Strider
 from posefield.tracks.track_path import TrackPath
@@ -31,22 +30,19 @@ def plan_people(
     striders: Sequence[Strider],
     paths: Sequence[TrackPath],
     combinations: Annotated[Indices, "people"],
-    numbers: Annotated[Floats, "people 2"],
+    numbers: Annotated[Floats, "people"],
     scales: PerCharacter,
     rate: float,
 ) -> LocomotionPlan:
     """Return the plan of people (N) whose paths have equal lengths.
 
-    combinations: of labels of each. numbers: random ones from 0 to 1, of the phase and of the
-    sway. scales: heights over those of the model.
+    combinations: of labels of each. numbers: random ones from 0 to 1, of the phase. scales: heights
+    over those of the model.
     """
     gait, frames, plans = striders[0].walker.gait, len(paths[0]), list[StepPlan]()
     for path, labels, draw, scale in zip(paths, combinations, numbers, scales, strict=True):
         body = path.points / scale, path.headings
-        plan = step_plan.plan_steps(striders[labels], body, float(draw[0]), rate)
-        sway = holds.waves(frames, rate, 2, int(draw[1] * 2**31)) @ holds.SWAY
-        sway *= plan.shares**2 * np.exp(1j * plan.headings)
-        plans.append(replace(plan, points=plan.points + sway))
+        plans.append(step_plan.plan_steps(striders[labels], body, float(draw), rate))
     names = "speeds", "turning", "phases", "points", "headings"
     columns = {name: np.stack([getattr(plan, name) for plan in plans]) for name in names}
     knots = np.unique(np.append(np.arange(0, frames, max(1, int(KNOT_SECONDS * rate))), frames - 1))
