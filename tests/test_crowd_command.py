@@ -1,6 +1,7 @@
 """Tests of `posefield crowd`: files, output and errors."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from typer.testing import CliRunner
 from posefield import cli
 from posefield.common.errors import FileError, FormError, InvalidField, UnknownFormat
 
+ROUTES = Path(__file__).parent / "data/bad_routes.json"
 PARTS = ("--people-per-file", 2, "--trajectories", "x.csv")
 
 
@@ -105,7 +107,12 @@ def test_routes_are_followed(walk_path, tmp_path):
         (("-o", "c.usd", "--seconds", "1e308"), InvalidField, "poses, expected"),
         (("-o", "c.npz", "--fps", 10, "--feet", "stand"), InvalidField, "feet: 'stand'"),
         (("-o", "c.npz", "--paths", "none.json"), FileError, "none.json: cannot be read"),
-        (("-o", "c.npz", "--paths", __file__), FileError, "test_crowd_command.py: not JSON"),
+        (("-o", "c.npz", "--paths", __file__), FormError, "Expected `array`, got `str`"),
+        (
+            ("-o", "c.npz", "--paths", ROUTES),
+            FormError,
+            "0/waypoints/1: Expected `array` of length",
+        ),
         (("-o", "c.npz", "-o", "d.osi", *PARTS), InvalidField, "c and d, expected one name"),
         (("-o", "c.npz", "--motions", 2, *PARTS), InvalidField, "motions: 2, expected none"),
         (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),

@@ -219,6 +219,9 @@ def test_time_without_samples_is_told_and_splits_a_track_where_asked(tmp_path, w
     file = write(tmp_path, "a.csv", text.partition("9.0,")[0])
     tracks = track_files.read_tracks(file).tracks
     (told,) = track_crowd.find_people(walk, walk.gait, WalkQuestion(fps=10.0), tracks).limits
+    frames = Track("f", 25.0 * tracks[0].times, tracks[0].points)
+    (slow, _) = track_crowd.find_people(walk, walk.gait, WalkQuestion(fps=10.0), [frames]).limits
+    assert "all are slower than 0.25 m/s: are times numbers of frames" in slow.text
     assert "'3' at 2.90 s: no sample for 3.1 s, and goes straight to the next one" in told.text
     legs = track_files.read_tracks(jump, TrackReading(split=2.0)).tracks
     assert [(leg.person, len(leg)) for leg in legs] == [("3", 30), ("3~2", 30), ("3~3", 2)]

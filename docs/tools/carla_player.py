@@ -5,7 +5,6 @@ and rest poses the walkers have. Needs walkers with bones `crl_*` (0.9.13 on).""
 
 import sys
 
-import carla
 import numpy as np
 
 TRUNK = ("", "hips__C", "spine__C", "spine01__C", "neck__C", "Head__C")
@@ -54,9 +53,11 @@ def pose(rest, bones, turns):
 
 
 def main(path, host="localhost"):
+    global carla
+    import carla
+
     data, walkers, world = dict(np.load(path)), {}, carla.Client(host, 2000).get_world()
-    names = data["names"].tolist()
-    order = [names.index(f"crl_{bone}") for bone in PARENTS]
+    order = [data["names"].tolist().index(f"crl_{bone}") for bone in PARENTS]
     bones, turns = data["bones"][:, order], data["turns"][:, order]
     kinds = world.get_blueprint_library().filter("walker.pedestrian.*")
     for time in np.unique(data["time"]):
@@ -68,8 +69,8 @@ def main(path, host="localhost"):
                 walker = world.spawn_actor(kinds[int(person) % len(kinds)], where)
                 walker.set_simulate_physics(False)
                 world.wait_for_tick()
-                rest = {bone.name[4:]: bone for bone in walker.get_bones().bone_transforms}
-                walkers[person] = walker, rest
+                rest = walker.get_bones().bone_transforms
+                walkers[person] = walker, {bone.name[4:]: bone for bone in rest}
             walker, rest = walkers[person]
             walker.set_transform(where)
             walker.set_bones(pose(rest, bones[row], turns[row]))
@@ -77,4 +78,5 @@ def main(path, host="localhost"):
         world.wait_for_tick()
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    print(__doc__) if {"-h", "--help"} & {*sys.argv} or not sys.argv[1:] else main(*sys.argv[1:])

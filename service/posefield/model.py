@@ -33,11 +33,14 @@ from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 from posefield.robots import robot_clip
 from posefield.robots.robot_motion import RobotMotion
-from posefield.synthesis import clips, poses, walking_feet
+from posefield.synthesis import clips, poses
 from posefield.synthesis.poses import MAX_POSES
 from posefield.synthesis.synthesizer import Synthesizer
+from posefield.tracks import track_crowd, track_question
+from posefield.tracks.track import MAX_PEOPLE, TrackSet
+from posefield.tracks.track_question import TracksQuestion
 
-Question = TypeVar("Question", PoseQuestion, ClipQuestion, WalkQuestion, PerformanceQuestion)
+Question = TypeVar("Question", bound=msgspec.Struct)
 Script = Mapping[str, Any] | PerformanceQuestion | str | Path
 """Script of a performance, as the body of a request, or the path of a JSON file with one."""
 
@@ -105,10 +108,14 @@ class Performance(PerformanceAnswer):
 
 @dataclass(frozen=True)
 class Crowd:
-    """Walking crowd of a model, whose motions are computed as it is saved."""
+    """Walking crowd of a model, whose motions are computed as it is saved.
+
+    tracks: that its people follow; None for random paths.
+    """
 
     synthesizer: Synthesizer
     question: WalkQuestion
+    tracks: TrackSet | None = None
 
     def save(self, path: str | Path) -> Mapping[str, Any]:
         """Write a file by the ending of its path (`crowd_formats`); return the crowd's facts.
@@ -118,7 +125,7 @@ class Crowd:
         """
         path, question = Path(path), self.question
         crowd_formats.ending_of(path, question)
-        crowd = walking_feet.build_crowd(self.synthesizer, self.synthesizer.gait, question)
+        crowd = track_crowd.of_question(self.synthesizer, question, self.tracks)
         crowd_formats.write(crowd, path, question, self.synthesizer.session.card.roles)
         return crowd.facts
 
@@ -145,8 +152,16 @@ class Model:
         return Clip(answer.clip, answer.trust, answer.robot, answer.loops)
 
     def crowd(self, **fields: Any) -> Crowd:
-        """Return a crowd of a cyclic model on random paths. fields: of a WalkQuestion."""
-        return Crowd(self.synthesizer, decode(WalkQuestion, fields))
+        """Return a crowd of a cyclic model on random paths, or of people who follow tracks.
+
+        fields: of a WalkQuestion; with tracks, which are dicts of id, times (S,), s, positions
+        (S, 2), m, x east and y north, and maybe headings (S,), rad, of a TracksQuestion.
+        """
+        if "tracks" not in fields:
+            return Crowd(self.synthesizer, decode(WalkQuestion, fields))
+        question = decode(TracksQuestion, fields)
+        tracks = track_question.read_tracks(question, MAX_PEOPLE)
+        return Crowd(self.synthesizer, question.question(len(tracks.tracks)), tracks)
 
     def perform(self, script: Script) -> Performance:
         """Return the performance of a script in which this model is the only one."""

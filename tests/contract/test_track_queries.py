@@ -46,6 +46,10 @@ def test_the_bytes_are_those_of_the_command(ending, query, tmp_path):
     answer = query("POST", f"{PATH}.{ending}", json=body)
     assert answer.status_code == 200, answer.text
     assert answer.content == output.read_bytes()
+    assert ("_gt_380.osi" in answer.headers["Content-Disposition"]) == (ending == "osi")
+    arrays = [{**one, "times": np.array(one["times"])} for one in (ANNA, BEN)]
+    posefield.load("cmu_walk").crowd(tracks=arrays, take="index").save(output)
+    assert answer.content == output.read_bytes()
     other = query("POST", f"{PATH}.{ending}", json={**body, "take": 0})
     assert other.content != answer.content
 

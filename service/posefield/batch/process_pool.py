@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import copy_context
 from functools import partial
 from itertools import chain, islice
@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 from posefield.batch.job import VERSIONED_PACKAGES
 from posefield.common import cancellation
 from posefield.common.cancellation import SINGLE_THREAD_ENV, Cancellation, Cancelled
-from posefield.common.errors import ClusterError, WorkerDied
+from posefield.common.errors import ClusterError, InvalidField, WorkerDied
 
 POLL_INTERVAL = 0.1
 """Seconds between two checks for a stop."""
@@ -73,6 +73,22 @@ def runner(workers: int, resumes: str = RESUMES) -> Runner:
     resumes: end of the message if a process dies.
     """
     return run_here if workers == 1 else partial(_run_in_processes, workers, resumes)
+
+
+def open_runner(
+    workers: int | None, scheduler: str | None = None, resumes: str = RESUMES
+) -> AbstractContextManager[Runner]:
+    """Return the processes of a command, one per core by default, or the cluster of a scheduler.
+
+    Raises InvalidField for numbers that do not fit.
+    """
+    if workers is not None and scheduler is not None:
+        raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
+    if workers is not None and workers < 1:
+        raise InvalidField("workers", f"{workers}, expected 1 or more")
+    if scheduler is None:
+        return nullcontext(runner(workers or usable_cores(), resumes))
+    return cluster_runner(scheduler)
 
 
 def usable_cores() -> int:

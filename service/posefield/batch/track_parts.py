@@ -221,7 +221,7 @@ def _tracks(job: PartsJob, shard: TrackShard) -> Iterator[Track]:
         times, points, angles, lines = (
             some[column].copy() for column in ("time", "point", "heading", "line")
         )
-        headings, fault = track.given_headings(angles), shard.faults.get(name, "")
+        headings, fault = None if np.isnan(angles).all() else angles, shard.faults.get(name, "")
         yield Track(name, times, points, headings, lines, fault)
 
 

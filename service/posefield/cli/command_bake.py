@@ -8,11 +8,11 @@ import orjson
 import typer
 from msgspec import structs
 
-from posefield.batch import blend_space, layouts, run
+from posefield.batch import blend_space, layouts, process_pool, run
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.rows import Row, RowFault, open_source
 from posefield.cli import command_export
-from posefield.cli.command_export import ExportMonitor, RunArguments
+from posefield.cli.command_export import ExportMonitor
 from posefield.common.errors import InvalidField
 from posefield.console.options import Json, ModelPath, with_question_options
 from posefield.model_file import checked_file
@@ -74,7 +74,7 @@ def bake(
         question.body,
     )
     work = WorkerInput(job, content, output, about=((blend_space.FILE, text),))
-    runner = command_export.open_runner(RunArguments(workers=workers))
+    runner = process_pool.open_runner(workers)
     with runner as processes, ExportMonitor() as monitor:
         outcome = run.run(work, source, monitor, processes)
     for line in blend_space.sentences(facts):

@@ -4,7 +4,7 @@ import hashlib
 import signal
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -17,10 +17,8 @@ from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.clip_files import MAX_KEPT_FAULTS
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.layouts import LAYOUTS
-from posefield.batch.process_pool import Runner
 from posefield.batch.rows import open_source
 from posefield.batch.run import RunOutcome, Shard
-from posefield.common.errors import InvalidField
 from posefield.console.options import (
     CharacterOptions,
     Json,
@@ -152,22 +150,11 @@ def export(
     # Workers of a cluster have other working folders.
     local = execution.scheduler and not target.URL.match(output)
     location = str(Path(output).absolute()) if local else output
-    with open_runner(execution) as runner, ExportMonitor() as monitor:
+    opened_runner = process_pool.open_runner(execution.workers, execution.scheduler)
+    with opened_runner as runner, ExportMonitor() as monitor:
         work = WorkerInput(job, content, location, execution.skip_errors, character)
         outcome = run.run(work, source, monitor, runner, shard, execution.verify)
     finish(output, outcome, monitor, execution.verify, json)
-
-
-def open_runner(execution: RunArguments) -> AbstractContextManager[Runner]:
-    """Return the processes of an export; InvalidField for numbers that do not fit."""
-    workers, scheduler = execution.workers, execution.scheduler
-    if workers is not None and scheduler is not None:
-        raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
-    if workers is not None and workers < 1:
-        raise InvalidField("workers", f"{workers}, expected 1 or more")
-    if scheduler is None:
-        return nullcontext(process_pool.runner(workers or process_pool.usable_cores()))
-    return process_pool.cluster_runner(scheduler)
 
 
 def _character(output: str, execution: RunArguments) -> "UserCharacter | None":

@@ -1,15 +1,14 @@
 """The `crowd` command: writes a walking crowd of a model to a file and reports on it."""
 
-import codecs
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
+from msgspec import Struct
 
 from posefield.batch import process_pool, track_parts
 from posefield.batch.track_parts import PartsJob
@@ -19,12 +18,12 @@ from posefield.console.options import open_model
 from posefield.console.output import counted
 from posefield.console.progress import ProgressBar
 from posefield.encode import crowd_formats
-from posefield.locomotion import gait, locomotion_plan, walking_crowd
+from posefield.locomotion import walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import Route
 from posefield.motion.clip import CrowdClip, Motions, StandingFeet
+from posefield.question import json_decoding
 from posefield.question.walk_question import WalkQuestion
-from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_crowd
 from posefield.tracks.track import TrackSet
@@ -44,17 +43,10 @@ def write_crowd(
     """
     for output in outputs:
         crowd_formats.ending_of(output, question)
-    opened = gait.fit_gait(model.session)
-    if tracks is None:
-        crowd = walking_feet.build_crowd(model, opened, question)
-    else:
-        crowd = track_crowd.build_crowd(model, opened, question, tracks.tracks)
-    feet = _FootSkateMeter(opened, question.fps)
+    crowd = track_crowd.of_question(model, question, tracks)
+    feet = _FootSkateMeter(model.gait, question.fps)
     watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
     crowd_formats.write_files(watched, outputs, question, model.session.card.roles)
-    facts = {"feet_stand": None, "take": {}, "overlaps": {}, "warnings": [], **crowd.facts}
-    if tracks:
-        facts["skipped"] = {**tracks.skipped, **facts["skipped"]}
     return {
         "file": str(outputs[0]),
         "files": [str(output) for output in outputs],
@@ -63,7 +55,11 @@ def write_crowd(
         "frames": crowd.frames,
         "rate": crowd.rate,
         "seed": question.seed,
-        **facts,
+        "feet_stand": None,
+        "take": {},
+        "overlaps": {},
+        "warnings": [],
+        **crowd.facts,
         **feet.facts(),
     }
 
@@ -94,16 +90,12 @@ def parts_job(
 def write_parts(job: PartsJob, workers: int | None, scheduler: str | None) -> dict[str, Any]:
     """Write the parts of a crowd by processes or on a Dask cluster; return their manifest.
 
-    Raises InvalidField for both or for no process, and as `track_parts.write` does.
+    Raises as `process_pool.open_runner` and `track_parts.write` do.
     """
-    if scheduler is not None and workers is not None:
-        raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
-    if workers is not None and workers < 1:
-        raise InvalidField("workers", f"{workers}, expected 1 or more")
     resumes = "finished parts are kept, and the same command resumes"
-    local = nullcontext(process_pool.runner(workers or 1, resumes))
-    chosen = local if scheduler is None else process_pool.cluster_runner(scheduler)
-    with chosen as runner, ExitStack() as bars:
+    workers = workers if workers is not None or scheduler else 1
+    opened = process_pool.open_runner(workers, scheduler, resumes)
+    with opened as runner, ExitStack() as bars:
         return track_parts.write(
             job, runner, lambda count: bars.enter_context(ProgressBar("parts", count)).advance
         )
@@ -126,18 +118,23 @@ def parts_text(manifest: dict[str, Any], folder: Path) -> str:
     return "\n".join(lines + track_crowd.shorten(skipped) + track_crowd.shorten(worst_first))
 
 
-def routes(path: Path) -> Sequence[Route]:
-    """Return the routes of a JSON file.
+class RouteQuestion(Struct, frozen=True, forbid_unknown_fields=True):
+    """Route of a JSON file: x and z of its places, m, and the speed, m/s."""
 
-    Raises FileError for a file that is not JSON, and InvalidField for invalid routes.
-    """
+    waypoints: list[tuple[float, float]]
+    speed: float
+
+
+def routes(path: Path) -> Sequence[Route]:
+    """Return the routes of a JSON file; FileError without one, and FormError for invalid ones."""
     try:
-        plain = orjson.loads(path.read_bytes().removeprefix(codecs.BOM_UTF8))
+        content = path.read_bytes()
     except OSError as fault:
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
-    except orjson.JSONDecodeError as fault:
-        raise FileError(path, f"not JSON: {fault}") from fault
-    return locomotion_plan.parse_routes(plain)
+    questions = json_decoding.decode_question(list[RouteQuestion], content)
+    if not questions:
+        raise InvalidField("paths", "no route, expected one or more")
+    return [Route(np.array(route.waypoints), route.speed) for route in questions]
 
 
 @dataclass(frozen=True)

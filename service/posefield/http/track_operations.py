@@ -7,14 +7,10 @@ meant first, and Accept cannot choose among three formats that are all NPZ.
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
 
-import numpy as np
-from msgspec import Meta, Struct
 from starlette.responses import Response
 
-from posefield.common import atomic_files, cancellation
-from posefield.common.bounded_types import Whole
+from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.encode import character, crowd_formats, crowd_size
 from posefield.encode.archives import Format
@@ -29,16 +25,11 @@ from posefield.locomotion import walking_crowd
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.clip import CrowdClip
 from posefield.question import json_decoding
-from posefield.question.motion_question import (
-    DEFAULT_BODY,
-    DEFAULT_VARIETY,
-    Body,
-    FeetMode,
-    LabelValue,
-)
-from posefield.question.walk_question import Instancing, WalkerTake, WalkQuestion
-from posefield.tracks import track, track_crowd
-from posefield.tracks.track import Track, TrackSet
+from posefield.question.motion_question import DEFAULT_BODY
+from posefield.question.walk_question import WalkQuestion
+from posefield.tracks import track_crowd, track_question
+from posefield.tracks.track import TrackSet
+from posefield.tracks.track_question import TracksQuestion
 
 TRACK_FORMATS: Mapping[str, Format] = {
     **CROWD_FORMATS,
@@ -47,88 +38,8 @@ TRACK_FORMATS: Mapping[str, Format] = {
 """Formats of one file: Gazebo's world has files beside it."""
 
 
-class TrackBody(Struct, frozen=True, forbid_unknown_fields=True):
-    """Track (schema of the contract)."""
-
-    id: Annotated[str, Meta(min_length=1, max_length=200)]
-    times: list[float]
-    positions: list[tuple[float, float]]
-    headings: list[float] | None = None
-
-
-class TracksBody(Struct, frozen=True, forbid_unknown_fields=True):
-    """TracksQuestion (schema of the contract)."""
-
-    tracks: list[TrackBody]
-    skip_bad: bool = False
-    fps: float = 30.0
-    seed: Whole = 0
-    labels: dict[str, LabelValue] = {}
-    level: Whole | None = None
-    feet: FeetMode | None = None
-    take: WalkerTake = 0
-    variety: float = DEFAULT_VARIETY
-    detail: bool = False
-    instancing: Instancing = "references"
-    body: Body = None
-
-    def question(self, count: int) -> WalkQuestion:
-        """Return the question for a crowd of so many people."""
-        names = set(self.__struct_fields__) - {"tracks", "skip_bad"}
-        return WalkQuestion(count=count, **{name: getattr(self, name) for name in names})
-
-
-def read_tracks(body: TracksBody, limit: int) -> TrackSet:
-    """Return the tracks of a body, checked as those of a file are.
-
-    limit: of people. Raises InvalidField, with the pointer to the sample, for the first unusable
-    track unless it is left out, for an id that two have, and for too many people or none.
-    """
-    if not 1 <= len(body.tracks) <= limit:
-        raise InvalidField("tracks", f"{len(body.tracks)} people, expected 1 to {limit}")
-    tracks, skipped, first = [], {}, dict[str, int]()
-    for index, person in enumerate(body.tracks):
-        cancellation.check()
-        if person.id in first:
-            text = f"{person.id!r}, expected another than that of tracks/{first[person.id]}"
-            raise InvalidField(f"tracks/{index}/id", text)
-        first[person.id] = index
-        walk, problem = _read(person, f"tracks/{index}")
-        if problem is None:
-            tracks.append(walk)
-        elif body.skip_bad:
-            skipped[person.id] = f"sample {problem.sample}: {problem.message}"
-        else:
-            pointer = f"tracks/{index}/{problem.column}/{problem.sample}"
-            raise InvalidField(pointer, problem.message)
-    if not tracks:
-        name, why = next(iter(skipped.items()))
-        text = f"no usable person among {len(skipped)}, the first {name!r}: {why}"
-        raise InvalidField("tracks", text)
-    problem_of_all = track.find_file_problem(track.sums(tracks))
-    if problem_of_all is not None:
-        raise InvalidField("tracks", problem_of_all)
-    return TrackSet(tuple(tracks), skipped)
-
-
-def _read(person: TrackBody, where: str) -> tuple[Track, track.TrackProblem | None]:
-    """Return a track and its problem; InvalidField for columns of different or no length."""
-    count, headings = len(person.times), person.headings
-    if not count:
-        raise InvalidField(f"{where}/times", "no sample, expected two or more")
-    for name in ("positions", "headings"):
-        column = getattr(person, name)
-        if column is not None and len(column) != count:
-            text = f"{len(column)} samples, expected {count} as in times"
-            raise InvalidField(f"{where}/{name}", text)
-    x, y = np.array(person.positions).T
-    faced = None if headings is None else track.floor_headings(np.array(headings))
-    walk = Track(person.id, np.array(person.times), track.floor_points(x, y), faced)
-    return walk, track.find_problem(walk)
-
-
 def check_size(
-    body: TracksBody, tracks: TrackSet, ending: str, card: ModelCard, settings: Settings
+    body: TracksQuestion, tracks: TrackSet, ending: str, card: ModelCard, settings: Settings
 ) -> None:
     """Raise InvalidField for frames, poses or bytes beyond the limits, before anything is made.
 
@@ -161,19 +72,21 @@ async def answer_tracks(request: ServiceRequest) -> Response:
 
     def work() -> tuple[list[str], Iterator[bytes]]:
         check_values(content, settings.crowd_limit)
-        body = json_decoding.decode_question(TracksBody, content)
-        tracks = read_tracks(body, settings.crowd_limit)
+        body = json_decoding.decode_question(TracksQuestion, content)
+        tracks = track_question.read_tracks(body, settings.crowd_limit)
         check_size(body, tracks, ending, card, settings)
         question = body.question(len(tracks.tracks))
         crowd_formats.ending_of(Path(f"crowd.{ending}"), question)
-        crowd = track_crowd.build_crowd(model, model.gait, question, tracks.tracks)
-        skipped = track_crowd.left_out({**tracks.skipped, **crowd.facts["skipped"]})
+        crowd = track_crowd.of_question(model, question, tracks)
+        skipped = track_crowd.left_out(crowd.facts["skipped"])
         warnings = track_crowd.shorten([*skipped, *crowd.facts["warnings"]])
         return warnings, _pieces(crowd, ending, question, card.roles)
 
+    # OSI's libraries know the message by the name.
+    name = f"{model.name}_gt_380" if ending == "osi" else model.name
     warnings, pieces = await run_in_thread(work, limiter=CROWD_LIMITER)
     form = TRACK_FORMATS[ending]
-    return responses.stream(pieces, form, model.name, warnings, CROWD_LIMITER, model.identity)
+    return responses.stream(pieces, form, name, warnings, CROWD_LIMITER, model.identity)
 
 
 def _pieces(

@@ -6,12 +6,11 @@ the levels are known in advance, so a finer one is complete before the coarser w
 """
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.errors import InvalidField
 from posefield.common.units import (
     CharacterFrames,
     CharacterPoints,
@@ -95,28 +94,6 @@ class Route:
 
     waypoints: Floats
     speed: float
-
-
-def parse_routes(plain: Any) -> list[Route]:
-    """Return the routes of [{"waypoints": [[x, z], ...], "speed": v}, ...].
-
-    Raises InvalidField for malformed values.
-    """
-    if not isinstance(plain, list) or not plain:
-        raise InvalidField("paths", "expected a list of one or more routes")
-    return [_parse_route(f"paths/{index}", entry) for index, entry in enumerate(plain)]
-
-
-def _parse_route(field: str, entry: Any) -> Route:
-    if not isinstance(entry, dict) or set(entry) != {"waypoints", "speed"}:
-        raise InvalidField(field, "expected an object of waypoints and speed")
-    try:
-        waypoints = np.array(entry["waypoints"])
-        if waypoints.dtype.kind not in "if" or isinstance(entry["speed"], str | bool):
-            raise ValueError(waypoints.dtype)
-        return Route(waypoints.astype(float), float(entry["speed"]))
-    except (TypeError, ValueError) as fault:
-        raise InvalidField(field, "expected pairs of numbers and a number") from fault
 
 
 Numbers = TypeVar("Numbers", Floats, FloorVectors)

@@ -14,7 +14,6 @@ import numpy as np
 
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, Indices
-from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion.floor_plane import FloorVectors
 
 MAX_PEOPLE = 100_000
@@ -23,10 +22,10 @@ FASTEST = 12.0
 """Speed beyond which no person runs, m/s: a faster step is a jump if it is longer than `JUMP`."""
 JUMP = 0.5
 """Shortest jump, m."""
+FARTHEST = 1e5
+"""Largest coordinate, m: a float32, as of tables and renderers, has 8 mm here."""
 MAX_SECONDS = 1e10
 """Largest time stamp, s: clocks that count from 1970 are at 2e9, and a float64 has 2e-6 s here."""
-MAX_ANGLE = 2.0 * np.pi + 0.01
-"""Largest heading, rad."""
 SLOWEST = 0.01
 """Speed that is exceeded in a file unless all stand, m/s."""
 MIRRORED, FOLLOWED, MOVING = 0.9, 0.5, 0.5
@@ -138,8 +137,7 @@ def check_file(
     if people == len(skipped):
         name, why = next(iter(skipped.items()))
         raise FileError(path, f"no usable person among {people}, the first {name!r}: {why}")
-    problem = find_file_problem(totals)
-    if problem is not None:
+    if problem := find_file_problem(totals):
         raise FileError(path, problem)
 
 
@@ -167,14 +165,8 @@ def _joined(person: str, pieces: Sequence[tuple[TrackRows, Indices]], fault: str
         np.concatenate([getattr(block, name)[rows] for block, rows in pieces])
         for name in ("times", "points", "headings", "lines")
     )
-    return Track(person, times, points, given_headings(headings), lines, fault)
-
-
-def given_headings(
-    headings: Annotated[Floats, "samples"],
-) -> Annotated[Floats, "samples"] | None:
-    """Return the headings of a person; None where none is a number."""
-    return None if np.isnan(headings).all() else headings
+    headed = None if np.isnan(headings).all() else headings
+    return Track(person, times, points, headed, lines, fault)
 
 
 def find_problem(track: Track) -> TrackProblem | None:
@@ -187,14 +179,14 @@ def find_problem(track: Track) -> TrackProblem | None:
         return TrackProblem(at, track.fault or "a value that is no number, expected finite ones")
     if track.headings is not None:
         angles = np.abs(track.headings - 0.5 * np.pi)
-        if angles.max() > MAX_ANGLE:
-            at = int(np.argmax(angles > MAX_ANGLE))
+        if angles.max() > 2.0 * np.pi + 0.01:
+            at = int(np.argmax(angles > 2.0 * np.pi + 0.01))
             text = f"heading {angles[at]:g} radians, {np.degrees(angles[at]):g} degrees"
             return TrackProblem(at, f"{text}, expected at most one turn", "headings")
     far = np.maximum(np.abs(track.points.real), np.abs(track.points.imag))
-    if far.max() > MAX_COORDINATE:
+    if far.max() > FARTHEST:
         at = int(np.argmax(far))
-        text = f"{far[at]:g} m from the origin, expected at most {MAX_COORDINATE:g} m"
+        text = f"{far[at]:g} m from the origin, expected at most {FARTHEST:g} m"
         return TrackProblem(at, f"{text}: subtract the origin of the map", advice="")
     if np.abs(track.times).max() > MAX_SECONDS:
         at = int(np.argmax(np.abs(track.times)))

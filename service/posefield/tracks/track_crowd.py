@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from itertools import chain, groupby
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.tracks import track_path, track_plan
-from posefield.tracks.track import Track
+from posefield.tracks.track import Track, TrackSet
 from posefield.tracks.track_path import TrackPath
 
 SIZES = (0.94, 1.06)
@@ -33,6 +33,8 @@ TAKES = 2**31
 """Number of takes from which one is drawn for a person."""
 MOST_SPEED = 2.2
 """Speed up to which people walk, m/s; beyond it their feet slide, which is told."""
+SLOW, WAY = 0.25, 2.0
+"""Speed that all stay below, m/s, and distance that one goes nevertheless, m, which is told."""
 FAR, ASIDE = 0.08, np.radians(45.0)
 """Distance from a track, m, and angle from a given heading, rad, that are told."""
 LONG_STEP, STEPS = 1.5, 5.0
@@ -86,7 +88,13 @@ class TrackCrowd:
     @cached_property
     def limits(self) -> list[PersonLimit]:
         """Limits of walkers that their tracks pass, the worst first."""
-        limits = chain.from_iterable(_limits(self, person) for person in self.people)
+        limits = [limit for person in self.people for limit in _limits(self, person)]
+        paths = [person.path for person in self.people]
+        fastest = max((np.abs(path.velocities).max() for path in paths), default=0.0)
+        gone = max((abs(path.points[-1] - path.points[0]) for path in paths), default=0.0)
+        if fastest < SLOW and gone > WAY:
+            text = f"all are slower than {SLOW:g} m/s: are times numbers of frames, not seconds?"
+            limits.append(PersonLimit(SLOW / fastest * 1e3, text))
         return sorted(limits, key=lambda limit: -limit.excess)
 
     @cached_property
@@ -204,14 +212,21 @@ def build_crowd(
     gait: Gait,
     question: WalkQuestion,
     tracks: Sequence[Track],
-    begin: float | None = None,
 ) -> CrowdClip:
     """Return the crowd of people on tracks, on one clock; they are hidden outside of their tracks.
 
-    begin: as of `find_people`. Raises InvalidField as `find_people` does, and for tracks that are
-    all too short.
+    Raises InvalidField as `find_people` does, and for tracks that are all too short.
     """
-    return crowd_clip(find_people(model, gait, question, tracks, begin))
+    return crowd_clip(find_people(model, gait, question, tracks))
+
+
+def of_question(model: Synthesizer, question: WalkQuestion, tracks: TrackSet | None) -> CrowdClip:
+    """Return the crowd of tracks, or on random paths if they are None. Raises as `build_crowd`."""
+    if tracks is None:
+        return walking_feet.build_crowd(model, model.gait, question)
+    crowd = build_crowd(model, model.gait, question, tracks.tracks)
+    skipped = {**tracks.skipped, **crowd.facts["skipped"]}
+    return replace(crowd, facts={**crowd.facts, "skipped": skipped})
 
 
 def crowd_clip(crowd: TrackCrowd) -> CrowdClip:

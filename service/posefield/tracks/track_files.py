@@ -157,12 +157,10 @@ def _table_rows(path: Path, reading: TrackReading) -> Iterator[Row]:
             raise InvalidField("heading_unit", f"{unit!r}, but {path.name} has no column heading")
         names, size = (head[0], *head[2:]), math.radians(1.0) if unit == "degrees" else 1.0
         for cells in lines:
-            if len(cells) == 1:
-                raise FileError(path, f"1 cell, expected {len(head)}", lines.line_num)
             if cells:
                 (time, x, y, *angles), fault = _numbers(names, (cells[0], *cells[2:]))
                 angle = size * angles[0] if angles else math.nan
-                yield cells[1].strip(), time, x, y, angle, lines.line_num, fault
+                yield "".join(cells[1:2]).strip(), time, x, y, angle, lines.line_num, fault
 
 
 def _lines(path: Path, file: IO[str]) -> Iterator[str]:

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.locomotion import collision_avoidance, floor_plane, gait, locomotion_plan
+from posefield.locomotion import collision_avoidance, floor_plane, gait
 from posefield.locomotion.locomotion_plan import POINT_SPACING, Paths
 
 
@@ -28,20 +27,6 @@ def test_even_turns_are_a_circle_between_places_too():
     assert np.abs(np.abs(places - 2.0j) - 2.0).max() < 1e-12
     assert tangents[0, -1] == pytest.approx(7.5)
     assert ways.curvatures == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize(
-    ("plain", "field"),
-    [
-        ({}, "paths"),
-        ([{"waypoints": [[0, 0], [1]], "speed": 1}], "paths/0"),
-        ([{"waypoints": [[0, 0], [1, 1]], "speed": "fast"}], "paths/0"),
-    ],
-)
-def test_what_is_no_route_is_refused(plain, field):
-    with pytest.raises(InvalidField) as refusal:
-        locomotion_plan.parse_routes(plain)
-    assert refusal.value.field == field
 
 
 def test_characters_that_wander_stay_within_what_was_sampled(own):
