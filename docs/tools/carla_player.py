@@ -14,7 +14,7 @@ for side in ("__L", "__R"):
     for limb in (("shoulder", "arm", "foreArm", "hand"), ("thigh", "leg", "foot", "toe")):
         PARENTS |= {limb[n + 1] + side: limb[n] + side for n in range(3)}
 CHILDREN = {parent: bone for bone, parent in PARENTS.items() if not bone.endswith("__C")}
-HALF_HEIGHT = 0.93  # Of a walker, whose origin is in its middle, m.
+MIDDLE = np.array([0.0, 0.0, 0.93])  # Of a walker, where its origin is, m.
 
 
 def turn(q):
@@ -62,8 +62,7 @@ def main(path, host="localhost"):
     kinds = world.get_blueprint_library().filter("walker.pedestrian.*")
     for time in np.unique(data["time"]):
         for row in np.flatnonzero(data["time"] == time).tolist():
-            x, y, z = data["location"][row].tolist()
-            where = carla.Transform(carla.Location(x, y, z + HALF_HEIGHT))
+            where = carla.Transform(carla.Location(*(data["location"][row] + MIDDLE).tolist()))
             where.rotation.yaw, person = float(np.degrees(data["yaw"][row])), data["person"][row]
             if person not in walkers:
                 walker = world.spawn_actor(kinds[int(person) % len(kinds)], where)
@@ -78,5 +77,4 @@ def main(path, host="localhost"):
         world.wait_for_tick()
 
 
-if __name__ == "__main__":
-    print(__doc__) if {"-h", "--help"} & {*sys.argv} or not sys.argv[1:] else main(*sys.argv[1:])
+print(__doc__) if {"-h", "--help"} & {*sys.argv} or not sys.argv[1:] else main(*sys.argv[1:])
