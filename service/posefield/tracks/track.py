@@ -220,7 +220,7 @@ def unit_question(speed: float) -> str:
     """Return what a median speed beyond that of walkers, m/s, says about the units of a file."""
     near = [unit for unit, size in (("centi", 100.0), ("milli", 1e3)) if 0.5 < speed / size < 2.5]
     guess = f"are they in {near[0]}metres?" if near else "in what unit are they?"
-    return f"x and y have to be in m, and times in s: at {speed:.3g} m/s, {guess}"
+    return f"x and y have to be in m, and times in s: at {speed:.0f} m/s, {guess}"
 
 
 def sums(tracks: Iterable[Track]) -> Annotated[FloorVectors, "5"]:
