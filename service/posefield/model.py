@@ -108,10 +108,7 @@ class Performance(PerformanceAnswer):
 
 @dataclass(frozen=True)
 class Crowd:
-    """Walking crowd of a model, whose motions are computed as it is saved.
-
-    tracks: that its people follow; None for random paths.
-    """
+    """Walking crowd of a model, on tracks or random paths, computed as it is saved."""
 
     synthesizer: Synthesizer
     question: WalkQuestion
