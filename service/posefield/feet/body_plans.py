@@ -73,10 +73,8 @@ def _plan_alike(requests: Sequence[PlanRequest]) -> list[FeetPlan]:
     character = requests[0].character
     legs, arms = character.legs, character.kept
     groups = frame_groups.of_lengths([request.roots for request in requests])
-    rotations, roots = (
-        np.concatenate([getattr(request, name) for request in requests])
-        for name in ("rotations", "roots")
-    )
+    rotations = [request.rotations for request in requests]
+    roots = np.concatenate([request.roots for request in requests])
     bones = np.stack([request.character.bones for request in requests])
     poses = limbs.evaluate_motions(character.parents, bones, legs + arms, rotations, roots, groups)
     cyclic = np.array([request.cycle is not None for request in requests])
@@ -297,8 +295,9 @@ def _needs(bodies: _Bodies, paths: FootPaths, followed: Frames) -> Annotated[Flo
         if tilts is not None:
             arm = footsteps.tilted(bodies.planes, tilts, arm)
         hip = poses.position(leg.upper) - followed[:, None] * UP
-        reach = limbs.firm_reach(poses, leg)
-        if leg.tip != leg.lower:
+        if leg.tip == leg.lower:
+            reach = limbs.firm_reach(poses, leg)
+        else:
             distance = np.linalg.norm(hip - ball + arm, axis=-1)
             # A micrometre of slack, so that rounding lifts no heel.
             reach = limbs.leg_chord(poses, leg, distance) + 1e-6

@@ -147,7 +147,7 @@ def _place_alike(
     rotations, roots = (np.concatenate(arrays) for arrays in poses_of_motions)
     bones = np.stack([plan.character.bones for plan in plans])
     poses = limbs.evaluate_motions(
-        body.parents, bones, body.legs + body.kept, rotations, roots, groups
+        body.parents, bones, body.legs + body.kept, [rotations], roots, groups
     )
     at_frames = np.concatenate([at * plan.rate for plan, at in zip(plans, times, strict=True)])
     placing = _Placing.at(plans, poses, groups, at_frames)

@@ -69,10 +69,17 @@ class LimbPoses:
         """Return the orientations (F, 4) of a joint's parent."""
         return self.orientations[..., self.parents[self.joints.index(joint)], :]
 
+    def bone(self, joint: int) -> Annotated[Floats, "_ 3"]:
+        """Return the bone (1, 3) that ends at a joint, m; (F, 3) for groups.
+
+        It is in the frame of the joint's parent, which turns it.
+        """
+        bones: Floats = self.bones[..., self.joints.index(joint), :]
+        return bones[None] if self.groups is None else bones[self.groups.group]
+
     def length(self, joint: int) -> Annotated[Floats, "_"]:
         """Return the length (1,) of the bone that ends at a joint, m; (F,) for groups."""
-        lengths: Floats = np.linalg.norm(self.bones[..., self.joints.index(joint), :], axis=-1)
-        return lengths[..., None] if self.groups is None else lengths[self.groups.group]
+        return np.asarray(np.linalg.norm(self.bone(joint), axis=-1))
 
     def split(self) -> "list[LimbPoses]":
         """Return the poses of each motion of the groups."""
@@ -136,18 +143,18 @@ def evaluate_motions(
     parents: Sequence[int],
     bones: Annotated[Floats, "motions joints 3"],
     limbs: Sequence[Limb],
-    rotations: Annotated[Floats, "frames joints 4"],
+    rotations: Sequence[Annotated[Floats, "_ joints 4"]],
     roots: Annotated[Floats, "frames 3"],
     groups: FrameGroups,
 ) -> LimbPoses:
     """Return the poses of the limbs of several motions, one after another; bones (M, J, 3), m."""
     joints, compact_parents = _compact(parents, [limb.tip for limb in limbs])
-    arms = bones[:, list(joints)]
+    chain = list(joints)
+    arms = bones[:, chain]
     translations = arms[groups.group]
     translations[:, 0] = roots
-    evaluated = skeleton.forward_kinematics(
-        compact_parents, rotations[:, list(joints)], translations
-    )
+    turns = np.concatenate([motion[:, chain] for motion in rotations])
+    evaluated = skeleton.forward_kinematics(compact_parents, turns, translations)
     return LimbPoses(joints, compact_parents, arms, *evaluated, groups)
 
 
@@ -321,12 +328,9 @@ def _solve_hinged(poses: LimbPoses, limb: Limb, hinge: Hinge, end: Points) -> Li
     The middle joint bends about its axis to the wanted distance, and the limb turns about its upper
     joint by the smallest rotation towards the end.
     """
-    limits = hinges.one_joint(hinge)
-    upper, frame = poses.position(limb.upper), poses.orientation(limb.upper)
-    inner = poses.orientation(limb.middle)
-    above = quat.rotate(quat.conj(frame), poses.position(limb.middle) - upper)
-    below = quat.rotate(quat.conj(inner), poses.position(limb.lower) - poses.position(limb.middle))
-    bent = quat.mul(quat.conj(frame), inner)[:, None]
+    limits, frame = hinges.one_joint(hinge), poses.orientation(limb.upper)
+    above, below = poses.bone(limb.middle), poses.bone(limb.lower)
+    bent = quat.mul(quat.conj(frame), poses.orientation(limb.middle))[:, None]
     bent = limits.bend(bent, above, below, np.sum(np.square(end), axis=-1))[:, 0]
     towards = quat.rotate(frame, above + quat.rotate(bent, below))
     thigh = quat.mul(shortest_turn(towards, end), frame)

@@ -320,8 +320,12 @@ def heights_above(
 def row_percentiles(
     values: Annotated[Floats, "values"], row: Indices, rows: int, percent: float
 ) -> PerRow:
-    """Return percentiles (R,) of the values (V,) of rows (V,), interpolated; zero without any."""
-    ordered, counts = values[np.lexsort((values, row))], np.bincount(row, minlength=rows)
+    """Return percentiles (R,) of values (V,) that lie row after row (V,).
+
+    They are interpolated, and zero for rows without any.
+    """
+    counts = np.bincount(row, minlength=rows)
+    ordered = np.concatenate([np.sort(of_row) for of_row in FrameGroups(counts).split(values)])
     percentiles = np.zeros(rows)
     some = counts > 0
     first, last = (np.cumsum(counts) - counts)[some], counts[some] - 1

@@ -176,8 +176,8 @@ def mean_skate_speed(
     feet: positions, m. rate: frames a second. A foot is planted while it is within 2 cm of the
     lowest height that it has in the motion. Zero if no foot is planted for two frames in a row.
     """
-    heights = feet @ UP
+    heights, steps = feet[..., 1], np.diff(feet, axis=-3)
     down = heights < heights.min(axis=-2, keepdims=True) + PLANTED_HEIGHT
     planted = down[..., 1:, :] & down[..., :-1, :]
-    speeds = rate * np.linalg.norm(np.diff(feet, axis=-3) * (1.0 - UP), axis=-1)
+    speeds = rate * np.sqrt(np.square(steps[..., 0]) + np.square(steps[..., 2]))
     return np.sum(speeds * planted, axis=(-2, -1)) / np.maximum(planted.sum(axis=(-2, -1)), 1)

@@ -119,12 +119,15 @@ class Hinges:
         room = MOST + np.where(away > 0.0, self.high - near, near - self.low)
         free = FREE if centres is None else 0.5 * room
         excess = (np.abs(away) - free) / (room - free)
-        beyond = excess > 0.0
-        # Zero where nothing is beyond: the hyperbolic functions of no excess are 0 and 1.
-        excess = np.where(beyond, excess, 0.0)
-        saturated = near + np.sign(away) * (free + (room - free) * np.tanh(excess))
-        limited = np.where(beyond, saturated, angles)
-        return LimitedAngles(limited, 1.0 / np.square(np.cosh(excess)), beyond.any(axis=-1))
+        beyond, limited, shares = excess > 0.0, angles.copy(), np.ones(angles.shape)
+        if beyond.any():
+            excess, near, away, free, room = (
+                np.broadcast_to(values, angles.shape)[beyond]
+                for values in (excess, near, away, free, room)
+            )
+            limited[beyond] = near + np.sign(away) * (free + (room - free) * np.tanh(excess))
+            shares[beyond] = 1.0 / np.square(np.cosh(excess))
+        return LimitedAngles(limited, shares, beyond.any(axis=-1))
 
     def limited_turns(self, turns: HingeRotations, limited: LimitedAngles) -> HingeRotations:
         """Return the rotations (..., H, 4) of limited angles; those within the limits as before."""
@@ -143,11 +146,11 @@ class Hinges:
         """Return the angles (..., H, 3), rad, of rotations (..., H, 4) as `angles` does."""
         # Not a matrix product, whose sums could go in another order for more poses.
         frames = self.frames
-        w, x, y, z = (turns[..., None, axis] for axis in range(4))
-        components = (
-            frames[..., 0] * w + frames[..., 1] * x + frames[..., 2] * y + frames[..., 3] * z
+        w, x, y, z = (turns[..., axis] for axis in range(4))
+        real, flexed, twisted, aside = (
+            row[..., 0] * w + row[..., 1] * x + row[..., 2] * y + row[..., 3] * z
+            for row in frames.swapaxes(0, 1)
         )
-        real, flexed, twisted, aside = (components[..., axis] for axis in range(4))
         middle = 0.5 * (self.low + self.high)[:, 0]
         flexion = 2.0 * np.arctan2(flexed, real)
         flexion -= 2.0 * np.pi * np.round((flexion - middle) / (2.0 * np.pi))
@@ -155,19 +158,21 @@ class Hinges:
         cosine, sine = real / np.maximum(size, 1e-12), flexed / np.maximum(size, 1e-12)
         twist = 2.0 * np.arctan2(cosine * twisted + sine * aside, size)
         sideways = 2.0 * np.arctan2(cosine * aside - sine * twisted, size)
-        return np.stack([flexion, twist, sideways], axis=-1)
+        angles = quat.components_first(flexion, 3)
+        angles[..., 1], angles[..., 2] = twist, sideways
+        return angles
 
     def bend(
         self,
         rotations: Annotated[Floats, "frames 1 4"],
-        above: Annotated[Floats, "frames 3"],
-        below: Annotated[Floats, "frames 3"],
+        above: Annotated[Floats, "#frames 3"],
+        below: Annotated[Floats, "#frames 3"],
         squares: Annotated[Floats, "frames"],
     ) -> Annotated[Floats, "frames 1 4"]:
         """Return the rotations (F, 1, 4) with which the ends of a limb of one hinge are apart.
 
-        above, below: bones (F, 3), m, in the frames of the parent and of the joint. squares: of the
-        distances (F,), m². What is off the hinge stays, within the limits.
+        above, below: bones (F, 3), m, or one for all, in the frames of the parent and of the joint.
+        squares: of the distances (F,), m². What is off the hinge stays, within the limits.
         """
         angles = self.limit(self.turn_angles(rotations)).angles
         straight = angles * [0.0, 1.0, 1.0]
@@ -196,7 +201,8 @@ class Hinges:
             cosine * twist - sine * sideways,
             cosine * sideways + sine * twist,
         )
-        turns = sum(part[..., None] * self.frames[:, row] for row, part in enumerate(parts))
+        columns = [sum(map(np.multiply, parts, rows)) for rows in self.frames.transpose(2, 1, 0)]
+        turns = np.moveaxis(np.stack(columns), 0, -1)
         same = np.sum(turns * near, axis=-1, keepdims=True) >= 0.0
         return quat.normalize(np.where(same, turns, -turns))
 

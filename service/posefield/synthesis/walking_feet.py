@@ -14,7 +14,6 @@ from posefield.constraints import take_variation
 from posefield.feet import body_plans, foot_placement, footsteps
 from posefield.feet.footsteps import Character, PlanRequest
 from posefield.inference.onnx_runtime import CONTACTS
-from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.session import Session
 from posefield.kriging import random_field
 from posefield.locomotion import locomotion_plan, stride, walking_crowd
@@ -170,7 +169,9 @@ def _relative_poses(
         coefficients[:, : changes.shape[1]] += changes
         moves = corrector.reduced.moves_of_coefficients(coefficients, frames)
         moves += deviations.detail_rows(rows[batch], frames)[:, : moves.shape[1]]
-        poses = _poses(corrector.reduced, moves, frames, travel)
+        turns, path, values = corrector.reduced.poses_of_moves(moves)
+        gone = (frames / (corrector.reduced.frames - 1))[:, None] * travel
+        poses = *skeleton.add_travel(turns, path, gone), values
         if len(limits):
             turns = corrector.reduced.joint_turns(predicted, limits.joints)
             poses = limits.within(poses[0], limits.turn_angles(turns)), *poses[1:]
@@ -181,22 +182,6 @@ def _relative_poses(
     relative = stride.relative_poses(cycles, phases, rotations, roots)
     curves, likely = (array if array.shape[1] else None for array in rest)
     return replace(relative, curves=curves, contacts=likely)
-
-
-def _poses(
-    reduced: ReducedTensor,
-    moves: Annotated[Floats, "poses freedoms"],
-    frames: Annotated[Floats, "poses"],
-    travel: Annotated[Floats, "poses 3"],
-) -> tuple[
-    Annotated[Floats, "poses joints 4"],
-    Annotated[Floats, "poses 3"],
-    Annotated[Floats, "poses curves"],
-]:
-    """Return rotations (K, J, 4), root positions (K, 3), m, and curves (K, C), with travel."""
-    rotations, roots, values = reduced.poses_of_moves(moves)
-    travel_so_far = (frames / (reduced.frames - 1))[:, None] * travel
-    return *skeleton.add_travel(rotations, roots, travel_so_far), values
 
 
 MIN_RATE = 20.0
