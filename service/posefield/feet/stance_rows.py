@@ -320,10 +320,7 @@ def heights_above(
 def row_percentiles(
     values: Annotated[Floats, "values"], row: Indices, rows: int, percent: float
 ) -> PerRow:
-    """Return percentiles (R,) of values (V,) that lie row after row (V,).
-
-    They are interpolated, and zero for rows without any.
-    """
+    """Return percentiles (R,) of values (V,) that lie row after row (V,); zero without any."""
     counts = np.bincount(row, minlength=rows)
     ordered = np.concatenate([np.sort(of_row) for of_row in FrameGroups(counts).split(values)])
     percentiles = np.zeros(rows)

@@ -24,8 +24,9 @@ def at_height(
     points: Annotated[FloorVectors, "*#batch"], height: Scalars
 ) -> Annotated[Floats, "*batch 3"]:
     """Return points (..., 3), m, at a height above floor points (...)."""
+    points, heights = np.broadcast_arrays(points, height)
     placed = quat.components_first(points.imag, 3)
-    placed[..., 1], placed[..., 2] = height, points.real
+    placed[..., 1], placed[..., 2] = heights, points.real
     return placed
 
 

@@ -17,6 +17,7 @@ from posefield.common.units import (
     Bones,
     Floats,
     Frames,
+    Indices,
     JointRotations,
     RootPath,
     Rotations,
@@ -27,6 +28,7 @@ from posefield.feet.limbs import Limb
 from posefield.feet.stance_rows import STANDING
 from posefield.kriging import random_field
 from posefield.locomotion import floor_plane
+from posefield.locomotion.stepping import LEAST_SHARE
 from posefield.motion import quat, skeleton
 from posefield.motion.hinges import Hinge
 from posefield.motion.skeleton import Skeleton
@@ -181,23 +183,24 @@ def add_sway(
 
     joints: by role. envelope: gain (F,) of the sway. rate: frames a second.
     """
-    sway = waves(len(roots), rate, 2 + 3 * len(ANGLES), seed) * envelope[:, None]
-    direction = np.exp(1j * quat.twist(rotations[:, 0], UP))
-    swayed = roots + floor_plane.at_height(direction * (sway[:, :2] @ SWAY), np.zeros(1))
-    vectors = sway[:, 2:].reshape(len(roots), -1, 3)
-    turned = rotations.copy()
+    frames = np.flatnonzero(envelope > LEAST_SHARE)
+    sway = waves(frames, rate, 2 + 3 * len(ANGLES), seed) * envelope[frames, None]
+    direction = np.exp(1j * quat.twist(rotations[frames, 0], UP))
+    swayed, turned = roots.copy(), rotations.copy()
+    swayed[frames] += floor_plane.at_height(direction * (sway[:, :2] @ SWAY), np.zeros(1))
+    vectors = sway[:, 2:].reshape(len(frames), len(ANGLES), 3)
     for number, role in enumerate(ANGLES):
         if role in joints:
             turn = quat.exp(np.radians(ANGLES[role]) * vectors[:, number])
-            turned[:, joints[role]] = quat.mul(turned[:, joints[role]], turn)
+            turned[frames, joints[role]] = quat.mul(turned[frames, joints[role]], turn)
     return turned, swayed
 
 
 def waves(
-    frames: int, rate: float, channels: int, seed: int
+    frames: Annotated[Indices, "frames"], rate: float, channels: int, seed: int
 ) -> Annotated[Floats, "frames channels"]:
     """Return smooth random numbers (F, C) with a mean of zero and a variance of one over seeds."""
-    angles = 2.0 * np.pi * np.arange(1, frames + 1)[:, None] / rate * FREQUENCIES
+    angles = 2.0 * np.pi * (frames[:, None] + 1) / rate * FREQUENCIES
     basis = np.hstack([np.cos(angles), np.sin(angles)]) / np.tile(FREQUENCIES, 2)
     numbers = random_field.normals(seed, STREAM, 2 * len(FREQUENCIES), channels)
     return np.asarray(basis @ numbers / np.sqrt(np.sum(FREQUENCIES**-2.0)))
