@@ -172,8 +172,9 @@ def test_other_units_and_origins_are_told_as_such(tmp_path):
                     assert "no usable person among 1, the first 'a': line 3: jumps" in text
     utm = said(lambda t: (t, 690_000 + t, 5_330_000))
     assert "subtract the origin of the map" in utm and "--s" not in utm
-    for slow in (lambda t: (t, 13.0 + 1e-5 * t, 52.0), lambda t: (1000 * t, 1.2 * t, 0)):
-        assert "longitude and latitude, or times milliseconds?" in said(slow)
+    assert "are x and y longitude and latitude?" in said(lambda t: (t, 13.0 + 1e-5 * t, 52.0))
+    with pytest.raises(pytest.fail.Exception, match="DID NOT RAISE"):  # Who stands, and trembles.
+        said(lambda t: (t, 0.001 * (t % 0.2 > 0.05), 0.0))
 
 
 def test_cells_that_are_no_numbers_leave_out_their_person_in_every_format(tmp_path):
@@ -221,7 +222,7 @@ def test_time_without_samples_is_told_and_splits_a_track_where_asked(tmp_path, w
     (told,) = track_crowd.find_people(walk, walk.gait, WalkQuestion(fps=10.0), tracks).limits
     frames = Track("f", 25.0 * tracks[0].times, tracks[0].points)
     (slow, _) = track_crowd.find_people(walk, walk.gait, WalkQuestion(fps=10.0), [frames]).limits
-    assert "all are slower than 0.25 m/s: are times numbers of frames" in slow.text
+    assert "all are slower than 0.25 m/s: are times in frames or milliseconds" in slow.text
     assert "'3' at 2.90 s: no sample for 3.1 s, and goes straight to the next one" in told.text
     legs = track_files.read_tracks(jump, TrackReading(split=2.0)).tracks
     assert [(leg.person, len(leg)) for leg in legs] == [("3", 30), ("3~2", 30), ("3~3", 2)]

@@ -26,7 +26,7 @@ FARTHEST = 1e5
 """Largest coordinate, m: a float32, as of tables and renderers, has 8 mm here."""
 MAX_SECONDS = 1e10
 """Largest time stamp, s: clocks that count from 1970 are at 2e9, and a float64 has 2e-6 s here."""
-SLOWEST = 0.01
+SLOWEST = 1e-4
 """Speed that is exceeded in a file unless all stand, m/s."""
 MIRRORED, FOLLOWED, MOVING = 0.9, 0.5, 0.5
 """Agreement of headings with the mirrored direction of travel from which on, and that with the
@@ -255,7 +255,7 @@ def find_file_problem(totals: Annotated[FloorVectors, "5"]) -> str | None:
         )
     if totals[3] and not totals[4]:
         return (
-            f"people move at less than {SLOWEST:g} m/s all the time, expected m and s: are x and y "
-            "longitude and latitude, or times milliseconds?"
+            f"people move at less than {SLOWEST:g} m/s all the time, expected m: are x and y "
+            "longitude and latitude?"
         )
     return None

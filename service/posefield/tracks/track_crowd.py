@@ -93,7 +93,7 @@ class TrackCrowd:
         fastest = max((np.abs(path.velocities).max() for path in paths), default=0.0)
         gone = max((abs(path.points[-1] - path.points[0]) for path in paths), default=0.0)
         if fastest < SLOW and gone > WAY:
-            text = f"all are slower than {SLOW:g} m/s: are times numbers of frames, not seconds?"
+            text = f"all are slower than {SLOW:g} m/s: are times in frames or milliseconds?"
             limits.append(PersonLimit(SLOW / fastest * 1e3, text))
         return sorted(limits, key=lambda limit: -limit.excess)
 
