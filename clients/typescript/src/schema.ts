@@ -2294,7 +2294,7 @@ export interface components {
         /**
          * @description Request for people who follow tracks. The world is that of simulators: x east, y north. The
          *     clock begins at the first sample of all. A track that cannot be walked (times that do not
-         *     ascend, jumps) is an error with a pointer to its sample.
+         *     ascend, jumps, places more than 100 km from the origin) is an error with a pointer to its sample.
          * @example {
          *       "tracks": [
          *         {
@@ -2368,7 +2368,7 @@ export interface components {
              */
             detail: boolean;
             /**
-             * @description Sharing of data in USD.
+             * @description Sharing of data in USD; other formats refuse it.
              * @default references
              * @enum {string}
              */

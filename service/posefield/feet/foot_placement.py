@@ -265,9 +265,10 @@ class _Placing(NamedTuple):
                 toe = quat.rotate(tip, np.broadcast_to(limb.toe, end.shape))
                 bent = quat.mul(ball_path.toe_bends(toe, lowest_toe), tip)
                 ankle = quat.mul(foot, orientations)
-                rotations[:, limb.tip] = quat.mul(quat.conj(ankle), bent)
-        rotations[:, limb.upper], rotations[:, limb.middle] = upper, middle
-        rotations[:, limb.lower] = lower
+                rotations[:, limb.tip] = quat.normalize(quat.mul(quat.conj(ankle), bent))
+        # Poses in single precision are no exact rotations, and errors of a chain add up.
+        turns = np.stack([upper, middle, lower], axis=1)
+        rotations[:, [limb.upper, limb.middle, limb.lower]] = quat.normalize(turns)
 
     def _anchored(
         self,
