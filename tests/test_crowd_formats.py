@@ -229,7 +229,9 @@ def test_bad_endings_bodies_and_skeletons_are_refused(crowd, model, tmp_path):
     with pytest.raises(UnknownFormat, match=r"a\.fbx"):
         save(crowd(), model, tmp_path / "a.fbx")
     with pytest.raises(InvalidField, match="osi files carry no body"):
-        save(crowd(), model, tmp_path / "a.osi", body="bones")
+        crowd_formats.endings_of([tmp_path / "a.osi"], WalkQuestion(body="bones"))
+    both = tmp_path / "a.osi", tmp_path / "a.usd"
+    assert crowd_formats.endings_of(both, WalkQuestion(body="bones")) == ("osi", "usd")
     roles = dict(model.session.card.roles)
     del roles["leftHand"]
     for name in ("a.osi", "a.carla.npz"):

@@ -172,7 +172,7 @@ def test_other_units_and_origins_are_told_as_such(tmp_path):
                     assert "no usable person among 1, the first 'a': line 3: jumps" in text
     utm = said(lambda t: (t, 690_000 + t, 5_330_000))
     assert "subtract the origin of the map" in utm and "--s" not in utm
-    assert "are x and y longitude and latitude?" in said(lambda t: (t, 13.0 + 1e-5 * t, 52.0))
+    assert "longitude and latitude, not m?" in said(lambda t: (t, 13.0 + 1e-5 * t, 52.0))
     with pytest.raises(pytest.fail.Exception, match="DID NOT RAISE"):  # Who stands, and trembles.
         said(lambda t: (t, 0.001 * (t % 0.2 > 0.05), 0.0))
 

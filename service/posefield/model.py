@@ -121,7 +121,7 @@ class Crowd:
         and FileError if the file cannot be written.
         """
         path, question = Path(path), self.question
-        crowd_formats.ending_of(path, question)
+        crowd_formats.endings_of([path], question)
         crowd = track_crowd.of_question(self.synthesizer, question, self.tracks)
         crowd_formats.write(crowd, path, question, self.synthesizer.session.card.roles)
         return crowd.facts

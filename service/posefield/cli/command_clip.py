@@ -178,12 +178,12 @@ def crowd(
     if len(set(output)) < len(output):
         raise InvalidField("output", "the same file twice, expected each once")
     if trajectories:
-        _refuse("with trajectories, which say how long", seconds=seconds, paths=paths)
+        _refuse("with trajectories", seconds=seconds, paths=paths)
     else:
         _refuse("without trajectories", heading_unit=heading_unit, y_down=y_down, split=split)
         _refuse("without trajectories", skip_bad=skip_bad, people_per_file=people_per_file)
     if paths or trajectories:
-        _refuse("with paths: each has one character", count=count, motions=question.motions)
+        _refuse("for given paths: each has one character", count=count, motions=question.motions)
     if people_per_file is None:
         _refuse("without people_per_file", workers=workers, scheduler=scheduler)
     reading, tracks = TrackReading(heading_unit, y_down, split), None

@@ -41,8 +41,7 @@ def write_crowd(
     tracks: that its people follow; None for random paths. Raises InvalidField for an invalid query
     or extension, and FileError if a file cannot be written.
     """
-    for output in outputs:
-        crowd_formats.ending_of(output, question)
+    crowd_formats.endings_of(outputs, question)
     crowd = track_crowd.of_question(model, question, tracks)
     feet = _FootSkateMeter(model.gait, question.fps)
     watched = _with_progress(crowd, question.motions or len(crowd.motion), feet)
@@ -75,9 +74,9 @@ def parts_job(
 ) -> PartsJob:
     """Return the job of a crowd in parts, in a folder named as the outputs without their endings.
 
-    Raises InvalidField for outputs of several names, and as `crowd_formats.ending_of` does.
+    Raises InvalidField for outputs of several names, and as `crowd_formats.endings_of` does.
     """
-    endings = tuple(crowd_formats.ending_of(output, question) for output in outputs)
+    endings = crowd_formats.endings_of(outputs, question)
     pairs = zip(outputs, endings, strict=True)
     names = (path.with_name(path.name.removesuffix(f".{end}")) for path, end in pairs)
     folder, *more = dict.fromkeys(names)

@@ -1,6 +1,6 @@
 """Table of the files of crowds, by the ending of their names."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,31 +43,35 @@ CROWD_FILES = by_extension(
 ENDINGS = (*crowd_size.FILES, *CROWD_FILES)
 
 
-def ending_of(path: Path, question: WalkQuestion) -> str:
-    """Return the ending of a crowd's file: the longest that fits.
-
-    Raises UnknownFormat for another, and InvalidField for a body or an instancing outside of USD.
-    """
+def ending_of(path: Path) -> str:
+    """Return the ending of a crowd's file, the longest that fits; UnknownFormat for another."""
     fitting = [ending for ending in ENDINGS if path.name.endswith(f".{ending}")]
     if not fitting:
         raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(ENDINGS)}")
-    ending = max(fitting, key=len)
-    if ending in CROWD_FILES:
-        for name, default in (("body", None), ("instancing", DEFAULT_INSTANCING)):
-            if (value := getattr(question, name)) != default:
-                text = f"{value!r}, expected none given: {ending} files carry no {name}"
-                raise InvalidField(name, text)
-    return ending
+    return max(fitting, key=len)
+
+
+def endings_of(paths: Sequence[Path], question: WalkQuestion) -> tuple[str, ...]:
+    """Return the endings of the files of a crowd.
+
+    Raises as `ending_of` does, and InvalidField for a body or an instancing if none is of USD.
+    """
+    endings = tuple(map(ending_of, paths))
+    for name, default in (("body", None), ("instancing", DEFAULT_INSTANCING)):
+        value = getattr(question, name)
+        if value != default and CROWD_FILES.keys() >= {*endings}:
+            text = f"{value!r}, expected none given: {endings[0]} files carry no {name}"
+            raise InvalidField(name, text)
+    return endings
 
 
 def write(crowd: CrowdClip, path: Path, question: WalkQuestion, roles: Roles) -> None:
     """Write a crowd atomically in the format of the path's ending.
 
-    question: has the body and the instancing in USD. roles: of the skeleton's joints. Raises as
-    `ending_of` does, InvalidField for a crowd that the format cannot have, and FileError if the
-    file cannot be written.
+    question: has the body and the instancing in USD. roles: of the skeleton's joints. Raises
+    UnknownFormat, InvalidField for a crowd that the format cannot have, and FileError.
     """
-    form = CROWD_FILES.get(ending_of(path, question))
+    form = CROWD_FILES.get(ending_of(path))
     if form is None:
         # usd-core takes 0.12 CPU seconds to import.
         from posefield.encode import crowd_writer

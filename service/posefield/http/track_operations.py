@@ -76,7 +76,7 @@ async def answer_tracks(request: ServiceRequest) -> Response:
         tracks = track_question.read_tracks(body, settings.crowd_limit)
         check_size(body, tracks, ending, card, settings)
         question = body.question(len(tracks.tracks))
-        crowd_formats.ending_of(Path(f"crowd.{ending}"), question)
+        crowd_formats.endings_of([Path(f"crowd.{ending}")], question)
         crowd = track_crowd.of_question(model, question, tracks)
         skipped = track_crowd.left_out(crowd.facts["skipped"])
         warnings = track_crowd.shorten([*skipped, *crowd.facts["warnings"]])

@@ -254,8 +254,5 @@ def find_file_problem(totals: Annotated[FloorVectors, "5"]) -> str | None:
             "turned over?"
         )
     if totals[3] and not totals[4]:
-        return (
-            f"people move at less than {SLOWEST:g} m/s all the time, expected m: are x and y "
-            "longitude and latitude?"
-        )
+        return f"all move at less than {SLOWEST:g} m/s: are x and y longitude and latitude, not m?"
     return None

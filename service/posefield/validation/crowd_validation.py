@@ -264,7 +264,7 @@ def _gap_warning(
         return None
     first = int(characters[inside][0])
     variance = float(support.variance(points[inside][:1])[0])
-    count = f"{np.count_nonzero(inside)} characters; the first, character {first}, lies"
+    count = f"character {first}, the first of {np.count_nonzero(inside)}, lies"
     text = question_validation.gap_warning(count, variance, support.limit)
     if question.extrapolate == "refuse":
         raise OutsideSamples("controls", text, first)
