@@ -12,8 +12,7 @@ NAMES = ("posefield", "posefield-train", "posefield-client")
 def build(folder):
     """Write the wheels and sdists into a folder."""
     for name in NAMES:
-        words = ["build", "--quiet", "--package", name, "--out-dir", folder]
-        subprocess.run([UV, *words], cwd=ROOT, check=True)
+        subprocess.run([UV, "build", "-q", "--package", name, "-o", folder], cwd=ROOT, check=True)
 
 
 def install(dist, folder, python, *packages):
@@ -25,5 +24,6 @@ def install(dist, folder, python, *packages):
     subprocess.run([UV, *export, *words], **options)
     subprocess.run([UV, "venv", "--quiet", "--python", python, folder / "env"], **options)
     where = ["--python", folder / "env/bin/python", "--find-links", dist, "--constraints", pins]
-    subprocess.run([UV, "pip", "install", "--quiet", *where, *packages], **options)
+    fresh = [f"--refresh-package={name}" for name in NAMES]  # Not of a like path of another run.
+    subprocess.run([UV, "pip", "install", "--quiet", *fresh, *where, *packages], **options)
     return folder / "env/bin"
