@@ -118,7 +118,7 @@ def test_routes_are_followed(walk_path, tmp_path):
         (("-o", "c.npz", "--paths", "x", "--count", 2), InvalidField, "count: 2, expected none"),
         (("-o", "c.npz", "--seconds", 10, *PARTS), InvalidField, "seconds: 10.0, expected none"),
         (("-o", "c.npz", "--y-down"), InvalidField, "y_down: True, expected none without traj"),
-        (("-o", "c.npz", "--workers", 2), InvalidField, "workers: 2, expected none without peopl"),
+        (("-o", "c.npz", "--workers", 0), InvalidField, "workers: 0, expected none without peopl"),
         (("-o", "c.npz", "--instancing", "flatten"), InvalidField, "instancing: 'flatten', expec"),
     ],
 )

@@ -94,7 +94,7 @@ DEFAULT_COUNT, DEFAULT_SECONDS = 500, 10.0
 def _refuse(why: str, **options: Any) -> None:
     """Raise InvalidField for the first of some options that is given."""
     for name, value in options.items():
-        if value not in (None, False):
+        if value is not None and value is not False:
             raise InvalidField(name, f"{value}, expected none {why}")
 
 

@@ -106,9 +106,9 @@ def forward_kinematics(
         world, turns = _accumulate_levels(parents, lead, rotations, translations)
     else:
         world, turns = np.empty((joints, 3, poses)), np.empty((joints, 4, poses))
-        for block, own_turns, own_arms in _blocks(lead, rotations, translations):
+        for block, block_turns, block_arms in _blocks(lead, rotations, translations):
             world[..., block], turns[..., block] = _accumulate(
-                parents, own_turns, own_arms, frozenset(range(joints))
+                parents, block_turns, block_arms, frozenset(range(joints))
             )
     placed, turned = (planes.transpose(2, 0, 1) for planes in (world, turns))
     return placed.reshape(*lead, joints, 3), turned.reshape(*lead, joints, 4)
@@ -125,8 +125,8 @@ def positions(
         world = _accumulate_levels(parents, lead, rotations, translations)[0]
     else:
         world = np.empty((len(parents), 3, math.prod(lead)))
-        for block, own_turns, own_arms in _blocks(lead, rotations, translations):
-            world[..., block] = position_planes(parents, own_turns, own_arms)
+        for block, block_turns, block_arms in _blocks(lead, rotations, translations):
+            world[..., block] = position_planes(parents, block_turns, block_arms)
     return world.transpose(2, 0, 1).reshape(*lead, len(parents), 3)
 
 

@@ -178,9 +178,9 @@ def find_problem(track: Track) -> TrackProblem | None:
         at = int(np.argmin(finite))
         return TrackProblem(at, track.fault or "a value that is no number, expected finite ones")
     if track.headings is not None:
-        angles = np.abs(track.headings - 0.5 * np.pi)
-        if angles.max() > 2.0 * np.pi + 0.01:
-            at = int(np.argmax(angles > 2.0 * np.pi + 0.01))
+        angles, turn = np.abs(track.headings - 0.5 * np.pi), 2.0 * np.pi + 0.01
+        if angles.max() > turn:
+            at = int(np.argmax(angles > turn))
             text = f"heading {angles[at]:g} radians, {np.degrees(angles[at]):g} degrees"
             return TrackProblem(at, f"{text}, expected at most one turn", "headings")
     far = np.maximum(np.abs(track.points.real), np.abs(track.points.imag))

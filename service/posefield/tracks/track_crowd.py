@@ -137,10 +137,10 @@ class TrackCrowd:
         cancellation.check()
         rate, card = self.question.fps, self.gait.session.card
         combinations = self.gait.labels.draw(np.array([person.number for person in people]))
-        numbers = np.array([person.phase for person in people])
+        draws = np.array([person.phase for person in people])
         scales = np.array([person.scale for person in people])
         paths = [person.path for person in people]
-        plan = track_plan.plan_people(self.striders, paths, combinations, numbers, scales, rate)
+        plan = track_plan.plan_people(self.striders, paths, combinations, draws, scales, rate)
         takes = walking_feet.of_question(card, structs.replace(self.question, count=len(people)))
         if takes is not None and takes.take == "index":
             takes = replace(takes, seeds=np.array([person.take for person in people]))

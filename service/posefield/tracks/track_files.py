@@ -33,7 +33,7 @@ MOST_JUMPS = 10
 
 @dataclass(frozen=True)
 class TrackReading:
-    """Conventions of a table that the file does not state.
+    """Conventions of a file that it does not state.
 
     heading_unit: of the headings of a table, from east against the clock; they are refused without
     it. y_down: whether y points down, as in images; angles turn over with it. split: time without a

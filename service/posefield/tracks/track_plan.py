@@ -30,17 +30,17 @@ def plan_people(
     striders: Sequence[Strider],
     paths: Sequence[TrackPath],
     combinations: Annotated[Indices, "people"],
-    numbers: Annotated[Floats, "people"],
+    draws: Annotated[Floats, "people"],
     scales: PerCharacter,
     rate: float,
 ) -> LocomotionPlan:
     """Return the plan of people (N) whose paths have equal lengths.
 
-    combinations: of labels of each. numbers: random ones from 0 to 1, of the phase. scales: heights
-    over those of the model.
+    combinations: of labels of each. draws: random numbers from 0 to 1, of the phase. scales:
+    heights over those of the model.
     """
     gait, frames, plans = striders[0].walker.gait, len(paths[0]), list[StepPlan]()
-    for path, labels, draw, scale in zip(paths, combinations, numbers, scales, strict=True):
+    for path, labels, draw, scale in zip(paths, combinations, draws, scales, strict=True):
         body = path.points / scale, path.headings
         plans.append(step_plan.plan_steps(striders[labels], body, float(draw), rate))
     names = "speeds", "turning", "phases", "points", "headings"
